@@ -1,0 +1,156 @@
+"""What went wrong, where, and what to do about it.
+
+Every error that Atwood raises on purpose is an `AtwoodError`.  It carries three pieces: a message (what went
+wrong), `where` (the component path or file the message is about) and `advice` (what the reader can do).  The
+pieces stay apart as attributes, so that a program can act on them, and read as one sentence in a traceback.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+__all__ = [
+    "AtwoodError",
+    "ConnectError",
+    "DeclarationError",
+    "KernelEvaluationError",
+    "ParameterError",
+    "ResultError",
+    "SolveError",
+    "StartError",
+    "TopologyError",
+    "UnsupportedError",
+    "UsageError",
+    "near_matches",
+    "suggestion",
+]
+
+
+class AtwoodError(Exception):
+    """Base of all errors that Atwood raises on purpose.
+
+    Parameters
+    ----------
+    message
+        What went wrong, in plain words.
+    where
+        What the message is about: a component path such as ``crane.rope``, or a file.
+    advice
+        What the reader can do about it.
+    """
+
+    def __init__(self, message: str, *, where: str = "", advice: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.where = where
+        self.advice = advice
+
+    def __str__(self) -> str:
+        text = f"{self.where}: {self.message}" if self.where else self.message
+        if not self.advice:
+            return text
+        if text and text[-1] not in ".!?:;":
+            text += "."
+        return f"{text} {self.advice}".strip()
+
+
+class DeclarationError(AtwoodError):
+    """A component, connector or model is declared in a way that cannot mean anything."""
+
+
+class ParameterError(AtwoodError):
+    """A parameter is unknown, missing, or has a value that is not admissible."""
+
+
+class ConnectError(AtwoodError):
+    """Two connectors cannot be connected."""
+
+
+class TopologyError(AtwoodError):
+    """The parts are fine one by one, but the mechanism they make is not."""
+
+
+class StartError(AtwoodError):
+    """No consistent start was found: positions, speeds or forces contradict each other."""
+
+
+class SolveError(AtwoodError):
+    """The integration could not go on."""
+
+
+class KernelEvaluationError(AtwoodError):
+    """An expression has no value at this state: a division by zero, or a function outside its domain."""
+
+
+class ResultError(AtwoodError):
+    """A result was asked for something that it does not hold."""
+
+
+class UsageError(AtwoodError):
+    """A function or command was called in a way it does not understand."""
+
+
+class UnsupportedError(AtwoodError):
+    """The request makes sense, but Atwood cannot do it."""
+
+
+def near_matches(word: str, choices: Iterable[str], n: int = 3) -> list[str]:
+    """Return the choices that look most like a word, best first.
+
+    Parameters
+    ----------
+    word
+        What was written.
+    choices
+        What exists.
+    n
+        The largest number of matches to return.
+
+    Returns
+    -------
+    list of str
+        At most `n` of the choices, as they are spelled there.  Upper and lower case count as equal.
+    """
+    spellings: dict[str, list[str]] = {}
+    for choice in choices:
+        same = spellings.setdefault(choice.casefold(), [])
+        if choice not in same:
+            same.append(choice)
+    close = get_close_matches(word.casefold(), spellings, n=max(n, 1), cutoff=0.6)
+    return [choice for key in close for choice in spellings[key]][: max(n, 0)]
+
+
+def suggestion(word: str, choices: Iterable[str]) -> str:
+    """Return a hint for a name that does not exist.
+
+    Parameters
+    ----------
+    word
+        What was written.
+    choices
+        What exists.
+
+    Returns
+    -------
+    str
+        ``"did you mean 'mass'?"`` where something looks alike; else a list of what exists where that is
+        short; else an empty string.
+    """
+    known = list(dict.fromkeys(choices))
+    close = near_matches(word, known)
+    if close:
+        return f"did you mean {_either([repr(name) for name in close])}?"
+    if 0 < len(known) <= _SHORT_LIST:
+        return f"there is {', '.join(repr(name) for name in sorted(known))}"
+    return ""
+
+
+_SHORT_LIST = 12
+
+
+def _either(names: list[str]) -> str:
+    """Join names as a reader would say them: a, b or c."""
+    if len(names) == 1:
+        return names[0]
+    return f"{', '.join(names[:-1])} or {names[-1]}"
