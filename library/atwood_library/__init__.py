@@ -1,0 +1,1 @@
+"""The standard component library of Atwood."""
