@@ -1,0 +1,394 @@
+"""How nodes are made: local algebra applied while an expression is written down.
+
+Each function returns the node of one operation after cheap simplifications that look one level down.  They
+change a value by rounding at most.  A product with the constant 0 is the constant 0: a structural zero means
+"not there", whatever the other factor would be.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from atwood.errors import AtwoodError
+from atwood.expr.operations import BINARY, UNARY, solve_or_nan
+
+if TYPE_CHECKING:
+    from atwood.expr.graph import Expression, Graph
+
+_ODD = frozenset({"sin", "tan", "asin", "atan", "sinh", "tanh", "sign"})
+_EVEN = frozenset({"cos", "cosh", "absolute"})
+_NEVER_NEGATIVE = frozenset({"sqrt", "exp", "cosh", "absolute"})
+
+
+def add(a: Expression, b: Expression) -> Expression:
+    """Return ``a + b``."""
+    if b.operation == "constant":
+        a, b = b, a
+    graph = a.graph
+    if a.operation == "constant":
+        if b.operation == "constant":
+            return graph.constant(a.payload + b.payload)
+        return _shift(a.payload, b)
+    if b.operation == "neg":
+        if a.operation == "neg":
+            return negate(add(a.arguments[0], b.arguments[0]))
+        return subtract(a, b.arguments[0])
+    if a.operation == "neg":
+        return subtract(b, a.arguments[0])
+    merged = _merge(a, b, 1.0)
+    if merged is not None:
+        return merged
+    return graph.node("add", (a, b) if a.index < b.index else (b, a))
+
+
+def subtract(a: Expression, b: Expression) -> Expression:
+    """Return ``a - b``."""
+    graph = a.graph
+    if b.operation == "constant":
+        return add(graph.constant(-b.payload), a)
+    if a is b:
+        return graph.zero
+    if a.operation == "constant":
+        return _shift_minus(a.payload, b)
+    if b.operation == "neg":
+        return add(a, b.arguments[0])
+    if a.operation == "neg":
+        return negate(add(a.arguments[0], b))
+    merged = _merge(a, b, -1.0)
+    return graph.node("sub", (a, b)) if merged is None else merged
+
+
+def _shift(c: float, b: Expression) -> Expression:
+    """Return ``c + b`` for a constant c and a b that is not constant."""
+    graph = b.graph
+    if c == 0.0:
+        return b
+    if b.operation == "neg":
+        return subtract(graph.constant(c), b.arguments[0])
+    if b.operation in ("add", "sub") and b.arguments[0].operation == "constant":
+        total = c + b.arguments[0].payload
+        if math.isfinite(total):
+            rest = b.arguments[1]
+            head = graph.constant(total)
+            return add(head, rest) if b.operation == "add" else subtract(head, rest)
+    return graph.node("add", (graph.constant(c), b))
+
+
+def _shift_minus(c: float, b: Expression) -> Expression:
+    """Return ``c - b`` for a constant c and a b that is not constant."""
+    graph = b.graph
+    if c == 0.0:
+        return negate(b)
+    if b.operation == "neg":
+        return _shift(c, b.arguments[0])
+    if b.operation in ("add", "sub") and b.arguments[0].operation == "constant":
+        total = c - b.arguments[0].payload
+        if math.isfinite(total):
+            rest = b.arguments[1]
+            return _shift_minus(total, rest) if b.operation == "add" else _shift(total, rest)
+    return graph.node("sub", (graph.constant(c), b))
+
+
+def _merge(a: Expression, b: Expression, side: float) -> Expression | None:
+    """Return ``a + side * b`` as one product if both are constants times the same thing."""
+    factor_a, core_a = _split(a)
+    factor_b, core_b = _split(b)
+    if core_a is not core_b:
+        return None
+    total = factor_a + side * factor_b
+    if not math.isfinite(total):
+        return None
+    return multiply(a.graph.constant(total), core_a)
+
+
+def _split(a: Expression) -> tuple[float, Expression]:
+    """Return an expression as a constant factor and the rest."""
+    if a.operation == "mul" and a.arguments[0].operation == "constant":
+        core = a.arguments[1]
+        if not (core.operation == "mul" and core.arguments[0].operation == "constant"):
+            return a.arguments[0].payload, core
+    return 1.0, a  # also if two constants could not become one without overflow: then leave both alone
+
+
+def multiply(a: Expression, b: Expression) -> Expression:
+    """Return ``a * b``."""
+    if b.operation == "constant":
+        a, b = b, a
+    graph = a.graph
+    if a.operation == "constant":
+        if b.operation == "constant":
+            return graph.constant(a.payload * b.payload)
+        return _scale(a.payload, b)
+    if b.operation == "neg":
+        if a.operation == "neg":
+            return multiply(a.arguments[0], b.arguments[0])
+        return negate(multiply(a, b.arguments[0]))
+    if a.operation == "neg":
+        return negate(multiply(a.arguments[0], b))
+    if a is b and a.operation == "sqrt":
+        return a.arguments[0]
+    factor_a, core_a = _split(a)
+    factor_b, core_b = _split(b)
+    if core_a is not a or core_b is not b:
+        factor = factor_a * factor_b
+        if _is_safe(factor):
+            return multiply(graph.constant(factor), multiply(core_a, core_b))
+    return graph.node("mul", (a, b) if a.index < b.index else (b, a))
+
+
+def _scale(c: float, b: Expression) -> Expression:
+    """Return ``c * b`` for a constant c and a b that is not constant."""
+    graph = b.graph
+    if c == 0.0:
+        return graph.zero
+    if c == 1.0:
+        return b
+    if c == -1.0:
+        return negate(b)
+    if b.operation == "neg":
+        return _scale(-c, b.arguments[0])
+    if b.operation in ("mul", "div") and b.arguments[0].operation == "constant":
+        product = c * b.arguments[0].payload
+        if _is_safe(product):
+            rest = b.arguments[1]
+            return _scale(product, rest) if b.operation == "mul" else divide(graph.constant(product), rest)
+    return graph.node("mul", (graph.constant(c), b))
+
+
+def _is_safe(factor: float) -> bool:
+    """Return whether a product of constants neither overflowed nor lost digits by underflow."""
+    return 1e-290 < abs(factor) < 1e290
+
+
+def divide(a: Expression, b: Expression) -> Expression:
+    """Return ``a / b``; dividing by the constant 0 is an error."""
+    graph = a.graph
+    if b.operation == "constant":
+        divisor = b.payload
+        if divisor == 0.0:
+            raise AtwoodError(
+                f"{a!r} is divided by the constant 0",
+                advice="A quantity that is exactly zero shapes the equations: leave the part out, or give it a size.",
+            )
+        if a.operation == "constant":
+            return graph.constant(a.payload / divisor)
+        if _is_safe(divisor):
+            return _scale(1.0 / divisor, a)
+    if a.operation == "constant" and a.payload == 0.0:
+        return graph.zero
+    if b.operation == "neg":
+        return negate(divide(a, b.arguments[0]))
+    if a.operation == "neg":
+        return negate(divide(a.arguments[0], b))
+    factor, core = _split(b)
+    if a.operation == "constant" and core is not b:
+        quotient = a.payload / factor
+        if _is_safe(quotient):
+            return divide(graph.constant(quotient), core)
+    return graph.node("div", (a, b))
+
+
+def negate(a: Expression) -> Expression:
+    """Return ``-a``, without an operation of its own where the sign can go elsewhere."""
+    graph = a.graph
+    operation = a.operation
+    if operation == "constant":
+        return graph.constant(-a.payload)
+    if operation == "neg":
+        return a.arguments[0]
+    if operation == "sub":
+        return subtract(a.arguments[1], a.arguments[0])
+    if operation in ("mul", "div", "add") and a.arguments[0].operation == "constant":
+        head = graph.constant(-a.arguments[0].payload)
+        rest = a.arguments[1]
+        if operation == "mul":
+            return multiply(head, rest)
+        return divide(head, rest) if operation == "div" else subtract(head, rest)
+    return graph.node("neg", (a,))
+
+
+def _opposite(a: Expression) -> Expression | None:
+    """Return ``-a`` if that is the plainer of the two."""
+    if a.operation == "neg":
+        return a.arguments[0]
+    if a.operation in ("mul", "div"):
+        head = a.arguments[0]
+        if head.operation == "constant" and head.payload < 0.0:
+            return negate(a)
+    return None
+
+
+def power(a: Expression, b: Expression) -> Expression:
+    """Return ``a ** b``; whole constant exponents become products."""
+    graph = a.graph
+    if b.operation == "constant":
+        exponent = b.payload
+        if a.operation == "constant":
+            return graph.constant(BINARY["pow"](a.payload, exponent))
+        if exponent == 0.5:
+            return unary("sqrt", a)
+        if exponent == -0.5:
+            return divide(graph.one, unary("sqrt", a))
+        if exponent.is_integer() and abs(exponent) <= 1024:
+            whole = _whole_power(a, abs(int(exponent)))
+            return whole if exponent >= 0.0 else divide(graph.one, whole)
+    return graph.node("pow", (a, b))
+
+
+def _whole_power(a: Expression, exponent: int) -> Expression:
+    """Return a whole power by repeated squaring."""
+    result = a.graph.one
+    square = a
+    while exponent:
+        if exponent & 1:
+            result = multiply(result, square)
+        exponent >>= 1
+        if exponent:
+            square = multiply(square, square)
+    return result
+
+
+def unary(operation: str, a: Expression) -> Expression:
+    """Return the node of a function of one argument."""
+    graph = a.graph
+    if operation == "neg":
+        return negate(a)
+    if a.operation == "constant":
+        return graph.constant(UNARY[operation](a.payload))
+    if operation in _ODD:
+        opposite = _opposite(a)
+        if opposite is not None:
+            return negate(unary(operation, opposite))
+    elif operation in _EVEN:
+        opposite = _opposite(a)
+        if opposite is not None:
+            return unary(operation, opposite)
+        if operation == "absolute" and (a.operation in _NEVER_NEGATIVE or _is_square(a)):
+            return a
+    elif operation == "sqrt" and _is_square(a):
+        return unary("absolute", a.arguments[0])
+    elif operation == "logical_not" and a.operation == "logical_not":
+        inner = a.arguments[0]
+        if _is_condition(inner):
+            return inner
+    return graph.node(operation, (a,))
+
+
+def _is_square(a: Expression) -> bool:
+    return a.operation == "mul" and a.arguments[0] is a.arguments[1]
+
+
+def _is_condition(a: Expression) -> bool:
+    return a.operation.startswith(("less", "logical"))
+
+
+def binary(operation: str, a: Expression, b: Expression) -> Expression:
+    """Return the node of any operation of two arguments, with its simplifications."""
+    special = _BINARY_BUILDERS.get(operation)
+    if special is not None:
+        return special(a, b)
+    if a.operation == "constant" and b.operation == "constant":
+        return a.graph.constant(BINARY[operation](a.payload, b.payload))
+    if operation in ("minimum", "maximum") and a is b:
+        return a
+    return a.graph.node(operation, (a, b))
+
+
+def less(a: Expression, b: Expression) -> Expression:
+    """Return the condition ``a < b``."""
+    return a.graph.zero if a is b else _plain_binary("less", a, b)
+
+
+def less_equal(a: Expression, b: Expression) -> Expression:
+    """Return the condition ``a <= b``."""
+    return _plain_binary("less_equal", a, b)
+
+
+def _plain_binary(operation: str, a: Expression, b: Expression) -> Expression:
+    if a.operation == "constant" and b.operation == "constant":
+        return a.graph.constant(BINARY[operation](a.payload, b.payload))
+    return a.graph.node(operation, (a, b))
+
+
+def logical(operation: str, a: Expression, b: Expression) -> Expression:
+    """Return the condition ``a and b`` or ``a or b``."""
+    if a is b and _is_condition(a):
+        return a
+    if b.operation == "constant":
+        a, b = b, a
+    if a.operation == "constant" and (b.operation == "constant" or _is_condition(b)):
+        if operation == "logical_and":
+            return b if a.payload != 0.0 else a.graph.zero
+        return b if a.payload == 0.0 else a.graph.one
+    return a.graph.node(operation, (a, b))
+
+
+def select(condition: Expression, a: Expression, b: Expression) -> Expression:
+    """Return ``a`` where the condition is not zero, else ``b``."""
+    if condition.operation == "constant":
+        return a if condition.payload != 0.0 else b
+    if a is b:
+        return a
+    if condition.operation == "logical_not":
+        return select(condition.arguments[0], b, a)
+    return condition.graph.node("select", (condition, a, b))
+
+
+def solve(entries: Sequence[Expression], right: Sequence[Expression]) -> list[Expression]:
+    """Return the unknowns of a linear system given row by row."""
+    size = len(right)
+    if all(value.is_zero for value in right):
+        return list(right)
+    if size == 1:
+        return [divide(right[0], entries[0])]
+    graph = right[0].graph
+    if all(value.operation == "constant" for value in (*entries, *right)):
+        numbers = solve_or_nan(size, [e.payload for e in entries], [r.payload for r in right])
+        if any(number != number for number in numbers):
+            raise AtwoodError("a linear system with a constant singular matrix has no solution")
+        return [graph.constant(number) for number in numbers]
+    node = graph.node("solve", (*entries, *right), size)
+    return [component(node, i) for i in range(size)]
+
+
+def component(node: Expression, position: int) -> Expression:
+    """Return one unknown of a linear solve."""
+    return node.graph.node("component", (node,), position)
+
+
+def external(function: Any, arguments: Sequence[Expression]) -> Expression:
+    """Return the call of an external function."""
+    graph = arguments[0].graph
+    if all(argument.operation == "constant" for argument in arguments):
+        return graph.constant(function.function(*(argument.payload for argument in arguments)))
+    return graph.node("external", tuple(arguments), function)
+
+
+_BINARY_BUILDERS: dict[str, Callable[[Expression, Expression], Expression]] = {
+    "add": add,
+    "sub": subtract,
+    "mul": multiply,
+    "div": divide,
+    "pow": power,
+    "less": less,
+    "logical_and": lambda a, b: logical("logical_and", a, b),
+    "logical_or": lambda a, b: logical("logical_or", a, b),
+}
+
+
+def build(graph: Graph, operation: str, arguments: Sequence[Expression], payload: Any = None) -> Expression:
+    """Return the node of any operation, with its simplifications; the way to rebuild a graph.
+
+    A ``solve`` node is returned as it stands; simplify it through :func:`solve`.
+    """
+    if operation in UNARY:
+        return unary(operation, arguments[0])
+    if operation in BINARY:
+        return binary(operation, arguments[0], arguments[1])
+    if operation == "select":
+        return select(arguments[0], arguments[1], arguments[2])
+    if operation == "external":
+        return external(payload, arguments)
+    return graph.node(operation, tuple(arguments), payload)
