@@ -1,0 +1,219 @@
+"""Connectors: where parts meet.
+
+Connecting makes the across quantities (position, orientation) equal and the through quantities (force, torque) sum
+to zero.  Through quantities are positive *into* the component.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
+
+from atwood.errors import DeclarationError, UsageError
+from atwood.expr import Scalar
+from atwood.model.vector import Vector
+
+if TYPE_CHECKING:
+    from atwood.model.component import Component
+
+__all__ = ["Connector", "ConnectorSpec", "Frame", "Groove", "InputRef", "Motion", "OutputRef", "Point", "connector"]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a connector knows while a law is evaluated; what the law may not read is None.
+
+    Attributes
+    ----------
+    position, velocity, acceleration
+        Of the connector, in world axes.
+    axes
+        The frame's x, y and z axes, in world axes.
+    angle
+        Rotation of the frame in the plane, counter-clockwise as seen on the page, rad.
+    angular_velocity, angular_acceleration
+        Of the frame, in world axes.
+    """
+
+    position: Vector
+    velocity: Vector | None = None
+    acceleration: Vector | None = None
+    axes: tuple[Vector, Vector, Vector] | None = None
+    angle: Scalar = None
+    angular_velocity: Vector | None = None
+    angular_acceleration: Vector | None = None
+
+
+class Connector:
+    """Base of all connectors.
+
+    Parameters
+    ----------
+    component
+        The component that it belongs to.
+    name
+        Its name there.
+    motion
+        The quantities a law sees; None outside a law.
+    """
+
+    across: ClassVar[Mapping[str, str]] = {}
+    """Quantities that become equal where connectors meet, with their units."""
+    through: ClassVar[Mapping[str, str]] = {}
+    """Quantities that sum to zero where connectors meet, positive into the component, with their units."""
+    family: ClassVar[str] = ""
+    """Connectors of one family can meet."""
+
+    __slots__ = ("component", "motion", "name")
+
+    def __init__(self, component: Component, name: str, motion: Motion | None = None) -> None:
+        self.component = component
+        self.name = name
+        self.motion = motion
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.path}>"
+
+    @property
+    def path(self) -> str:
+        """The dotted path of the connector."""
+        prefix = self.component.path
+        return f"{prefix}.{self.name}" if prefix else self.name
+
+    def _read(self, quantity: str) -> Any:
+        if self.motion is None:
+            raise UsageError(
+                f"its {quantity} has a value only inside a law",
+                where=self.path,
+                advice="After a run, read the quantity from the result.",
+            )
+        value = getattr(self.motion, quantity)
+        if value is None:
+            raise DeclarationError(f"this law may not read its {quantity}", where=self.path)
+        return value
+
+
+class Point(Connector):
+    """A point where forces pass and no torque does: end of a rod, of a spring, of a rope; a mass point."""
+
+    across: ClassVar[Mapping[str, str]] = {"position": "m"}
+    through: ClassVar[Mapping[str, str]] = {"force": "N"}
+    family: ClassVar[str] = "mechanical"
+    __slots__ = ()
+
+    @property
+    def position(self) -> Vector:
+        """Position in world axes, m."""
+        value: Vector = self._read("position")
+        return value
+
+    @property
+    def velocity(self) -> Vector:
+        """Velocity in world axes, m/s."""
+        value: Vector = self._read("velocity")
+        return value
+
+    @property
+    def acceleration(self) -> Vector:
+        """Acceleration in world axes, m/s^2; only observables may read it."""
+        value: Vector = self._read("acceleration")
+        return value
+
+
+class Frame(Point):
+    """A point with an orientation, where forces and torques pass.
+
+    Joined to a plain point it shares the position only: a hinge without friction.
+    """
+
+    across: ClassVar[Mapping[str, str]] = {"position": "m", "orientation": "1"}
+    through: ClassVar[Mapping[str, str]] = {"force": "N", "torque": "N*m"}
+    __slots__ = ()
+
+    @property
+    def angle(self) -> Scalar:
+        """Rotation in the plane, counter-clockwise as seen on the page, rad."""
+        return self._read("angle")
+
+    @property
+    def angular_velocity(self) -> Vector:
+        """Angular velocity in world axes, rad/s."""
+        value: Vector = self._read("angular_velocity")
+        return value
+
+    @property
+    def angular_acceleration(self) -> Vector:
+        """Angular acceleration in world axes, rad/s^2; only observables may read it."""
+        value: Vector = self._read("angular_acceleration")
+        return value
+
+    def to_world(self, vector: Vector) -> Vector:
+        """Return, in world axes, a vector that is given in the axes of this frame."""
+        x_axis, y_axis, z_axis = self._read("axes")
+        return x_axis * vector.x + y_axis * vector.y + z_axis * vector.z
+
+
+class Groove(Point):
+    """The groove of a pulley, which takes a rope; its position is the centre of the pulley."""
+
+    family: ClassVar[str] = "groove"
+    __slots__ = ()
+
+
+class ConnectorSpec:
+    """The declaration of a connector in a class body; see `connector`."""
+
+    def __init__(self, kind: type[Connector], doc: str, count: str | None) -> None:
+        self.kind = kind
+        self.doc = doc
+        self.count = count
+        self.name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = self.name or name
+
+    def __get__(self, instance: Component | None, owner: type) -> Any:
+        return self if instance is None else instance._connector(self)
+
+    def names(self, component: Component) -> tuple[str, ...]:
+        """Return the names of the connectors it declares on a component: one, or an array of them."""
+        if self.count is None:
+            return (self.name,)
+        return tuple(f"{self.name}[{i}]" for i in range(component._value(self.count)))
+
+
+_C = TypeVar("_C", bound=Connector)
+
+
+def connector(kind: type[_C], doc: str, *, count: str | None = None, init: Literal[False] = False) -> Any:
+    """Declare a connector in the class body of a component.
+
+    Parameters
+    ----------
+    kind
+        `Point`, `Frame` or `Groove`.
+    doc
+        One line that says where it is.
+    count
+        Name of the integer parameter that says how many there are; then it is a tuple of connectors.
+    """
+    if not doc.strip():
+        raise DeclarationError("a connector needs one line that says where it is")
+    return ConnectorSpec(kind, doc, count)
+
+
+@dataclass(frozen=True)
+class InputRef:
+    """An input of a component, as one end of a signal connection."""
+
+    component: Component
+    name: str
+
+
+@dataclass(frozen=True)
+class OutputRef:
+    """A scalar observable of a component, as the other end of a signal connection."""
+
+    component: Component
+    name: str

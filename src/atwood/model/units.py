@@ -1,0 +1,142 @@
+"""Units with their dimensions: read, compared and converted to SI.
+
+A unit is written as it is read: ``"kg*m^2"``, ``"N/m"``, ``"N m s/rad"``, ``"1"``.  An angle counts as a number.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+from atwood.errors import DeclarationError, ParameterError, suggestion
+
+__all__ = ["Unit", "parse_quantity", "parse_unit"]
+
+_Exponents = tuple[int, int, int, int]
+"""Powers of mass, length, time and electric current."""
+
+_BASE: dict[str, tuple[float, _Exponents]] = {
+    "1": (1.0, (0, 0, 0, 0)),
+    "rad": (1.0, (0, 0, 0, 0)),
+    "deg": (math.pi / 180.0, (0, 0, 0, 0)),
+    "rev": (2.0 * math.pi, (0, 0, 0, 0)),
+    "kg": (1.0, (1, 0, 0, 0)),
+    "g": (1e-3, (1, 0, 0, 0)),
+    "t": (1e3, (1, 0, 0, 0)),
+    "m": (1.0, (0, 1, 0, 0)),
+    "mm": (1e-3, (0, 1, 0, 0)),
+    "cm": (1e-2, (0, 1, 0, 0)),
+    "km": (1e3, (0, 1, 0, 0)),
+    "s": (1.0, (0, 0, 1, 0)),
+    "ms": (1e-3, (0, 0, 1, 0)),
+    "min": (60.0, (0, 0, 1, 0)),
+    "h": (3600.0, (0, 0, 1, 0)),
+    "Hz": (1.0, (0, 0, -1, 0)),
+    "N": (1.0, (1, 1, -2, 0)),
+    "kN": (1e3, (1, 1, -2, 0)),
+    "J": (1.0, (1, 2, -2, 0)),
+    "kJ": (1e3, (1, 2, -2, 0)),
+    "W": (1.0, (1, 2, -3, 0)),
+    "kW": (1e3, (1, 2, -3, 0)),
+    "Pa": (1.0, (1, -1, -2, 0)),
+    "A": (1.0, (0, 0, 0, 1)),
+    "C": (1.0, (0, 0, 1, 1)),
+    "V": (1.0, (1, 2, -3, -1)),
+    "T": (1.0, (1, 0, -2, -1)),
+}
+
+_FACTOR = re.compile(r"\s*([*/·\s]?)\s*([A-Za-z]+|1)(?:\s*(?:\^|\*\*)\s*(-?\d+))?")
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: its text, its size in SI, and the powers of mass, length, time and current in it.
+
+    Attributes
+    ----------
+    text
+        The unit as it was written.
+    factor
+        How many SI units it is.
+    exponents
+        Powers of kg, m, s and A.
+    """
+
+    text: str
+    factor: float
+    exponents: _Exponents
+
+    def has_dimension_of(self, other: Unit) -> bool:
+        """Return whether a value in this unit can be given in the other."""
+        return self.exponents == other.exponents
+
+
+@lru_cache(maxsize=512)
+def parse_unit(text: str) -> Unit:
+    """Read a unit.
+
+    Parameters
+    ----------
+    text
+        Unit names joined by ``*``, ``/`` or a space, each with an optional integer power.
+
+    Raises
+    ------
+    DeclarationError
+        If a name in it is not a unit.
+    """
+    factor = 1.0
+    exponents = [0, 0, 0, 0]
+    position, first = 0, True
+    stripped = text.strip()
+    while position < len(stripped):
+        match = _FACTOR.match(stripped, position)
+        if match is None or (not first and not match.group(1) and not stripped[position].isspace()):
+            raise DeclarationError(f"cannot read the unit {text!r}", advice="Write it like 'kg*m^2' or 'N/m'.")
+        operator, name, power_text = match.groups()
+        if name not in _BASE:
+            raise DeclarationError(f"{name!r} is not a unit, in {text!r}", advice=suggestion(name, _BASE))
+        power = int(power_text or 1) * (-1 if operator == "/" else 1)
+        size, powers = _BASE[name]
+        factor *= size**power
+        exponents = [e + power * p for e, p in zip(exponents, powers, strict=True)]
+        position, first = match.end(), False
+    a, b, c, d = exponents
+    return Unit(text, factor, (a, b, c, d))
+
+
+def parse_quantity(text: str, unit: Unit, where: str) -> float:
+    """Read a number with an optional unit, such as ``"30 cm"``, and return it in the SI unit asked for.
+
+    Parameters
+    ----------
+    text
+        What was written.
+    unit
+        The unit that the value is declared with; a bare number is taken to be in it.
+    where
+        The path that an error names.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a number, or its unit has another dimension.
+    """
+    match = _QUANTITY.match(text)
+    if match is None:
+        raise ParameterError(f"{text!r} is not a number", where=where, advice=f"Give a number in {unit.text}.")
+    number, unit_text = match.groups()
+    if not unit_text:
+        return float(number)
+    try:
+        given = parse_unit(unit_text)
+    except DeclarationError as error:
+        raise ParameterError(error.message, where=where, advice=error.advice) from None
+    if not given.has_dimension_of(unit):
+        raise ParameterError(
+            f"{unit_text!r} does not measure what is asked for here", where=where, advice=f"Give it in {unit.text}."
+        )
+    return float(number) * given.factor / unit.factor
