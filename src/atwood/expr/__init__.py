@@ -37,6 +37,7 @@ from atwood.expr.functions import (
 from atwood.expr.graph import Expression, Graph
 from atwood.expr.operations import ExternalFunction
 from atwood.expr.program import InputGroup, OutputGroup, Program
+from atwood.expr.sympy_bridge import from_sympy, to_sympy, to_sympy_shared
 
 __all__ = [
     "Expression",
@@ -61,6 +62,7 @@ __all__ = [
     "evaluate",
     "exp",
     "external",
+    "from_sympy",
     "hypot",
     "jacobian",
     "jvp",
@@ -77,5 +79,7 @@ __all__ = [
     "substitute",
     "tan",
     "tanh",
+    "to_sympy",
+    "to_sympy_shared",
     "vjp",
 ]
