@@ -41,3 +41,8 @@ def test_every_module_of_the_framework_has_a_place_in_the_layers() -> None:
     }
     unplaced = sorted(name for name in modules - {"__init__", "__main__"} if f"atwood.{name}" not in settings)
     assert not unplaced, f"name these in the layers of pyproject.toml: {unplaced}"
+
+
+def test_the_solver_library_is_loaded_only_when_a_run_starts() -> None:
+    done = run_python("-c", "import sys, atwood.solve.ida_sundae; print('sksundae' in sys.modules)")
+    assert done.stdout.strip() == "False", done.stderr

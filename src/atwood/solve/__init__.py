@@ -1,0 +1,1 @@
+"""From a kernel to a motion: start values, integration, events, accuracy."""
