@@ -1,1 +1,49 @@
-"""The standard component library of Atwood."""
+"""The component library of Atwood."""
+
+from atwood_library.forces.damper import Damper
+from atwood_library.forces.force import Force
+from atwood_library.forces.spring import Spring
+from atwood_library.forces.torque import Torque
+from atwood_library.forces.torsion_damper import TorsionDamper
+from atwood_library.forces.torsion_spring import TorsionSpring
+from atwood_library.joints.drive import Drive
+from atwood_library.joints.pivot import Pivot
+from atwood_library.joints.rotary_drive import RotaryDrive
+from atwood_library.joints.slider import Slider
+from atwood_library.joints.weld import Weld
+from atwood_library.parts.ground import Ground
+from atwood_library.parts.link import Link
+from atwood_library.parts.mass_1d import Mass1D
+from atwood_library.parts.point_mass import PointMass
+from atwood_library.parts.rod import Rod
+from atwood_library.ropes.pulley import Pulley
+from atwood_library.ropes.rope import Rope
+from atwood_library.sensors.energy_sensor import EnergySensor
+from atwood_library.sensors.force_sensor import ForceSensor
+from atwood_library.sensors.position_sensor import PositionSensor
+from atwood_library.sensors.relative_position_sensor import RelativePositionSensor
+
+__all__ = [
+    "Damper",
+    "Drive",
+    "EnergySensor",
+    "Force",
+    "ForceSensor",
+    "Ground",
+    "Link",
+    "Mass1D",
+    "Pivot",
+    "PointMass",
+    "PositionSensor",
+    "Pulley",
+    "RelativePositionSensor",
+    "Rod",
+    "Rope",
+    "RotaryDrive",
+    "Slider",
+    "Spring",
+    "Torque",
+    "TorsionDamper",
+    "TorsionSpring",
+    "Weld",
+]

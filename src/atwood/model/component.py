@@ -39,6 +39,8 @@ class Binding:
         Observables that are known without their formula, such as a joint coordinate.
     reactions
         Reactions by name.
+    energies
+        ``"kinetic"`` and ``"potential"`` energy of the model that the component is placed in.
     """
 
     values: Mapping[str, Any]
@@ -49,6 +51,7 @@ class Binding:
     sides: Mapping[tuple[str, str], float] = field(default_factory=dict)
     known: Mapping[str, Any] = field(default_factory=dict)
     reactions: Mapping[str, Any] = field(default_factory=dict)
+    energies: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(parameter, signal, connector))
@@ -177,6 +180,13 @@ class Component:
                 f"this law may not read the reaction {name!r}", where=self.path, advice=suggestion(name, reactions)
             )
         return reactions[name]
+
+    def energy_around(self, kind: str) -> Scalar:
+        """Return the kinetic or potential energy of the enclosing model; only within an observable."""
+        energies = self._binding().energies
+        if kind not in energies:
+            raise DeclarationError(f"this law may not read the {kind} energy", where=self.path)
+        return energies[kind]
 
     def _binding(self) -> Binding:
         if self._bound is None:

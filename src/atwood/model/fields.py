@@ -103,6 +103,7 @@ class ParameterSpec(Deferred):
         size: int | None = None,
         integer: bool = False,
         choices: tuple[str, ...] = (),
+        structural: bool = False,
     ) -> None:
         super().__init__(lambda model: getattr(model, self.name))
         self.name = ""
@@ -111,17 +112,13 @@ class ParameterSpec(Deferred):
         self.doc = doc
         self.minimum, self.above, self.maximum = minimum, above, maximum
         self.size, self.integer, self.choices = size, integer, choices
+        self.structural = structural or integer or bool(choices)
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = self.name or name
 
     def __get__(self, instance: Component | None, owner: type) -> Any:
         return self if instance is None else instance._value(self.name)
-
-    @property
-    def is_structural(self) -> bool:
-        """Whether the value shapes the program (a count or a choice) instead of being one of its numbers."""
-        return self.integer or bool(self.choices)
 
     def with_default(self, default: Any) -> ParameterSpec:
         """Return the same declaration with another default."""
@@ -135,6 +132,7 @@ class ParameterSpec(Deferred):
             size=self.size,
             integer=self.integer,
             choices=self.choices,
+            structural=self.structural,
         )
         copy.name = self.name
         return copy
@@ -150,6 +148,8 @@ class ParameterSpec(Deferred):
         if isinstance(value, Deferred):
             self._check_deferred(value, where)
             return value
+        if value is None and self.default is None:
+            return None
         if self.choices:
             if value not in self.choices:
                 raise ParameterError(
@@ -236,13 +236,14 @@ def parameter(
     size: int | None = None,
     integer: bool = False,
     choices: Sequence[str] = (),
+    structural: bool = False,
 ) -> Any:
     """Declare a parameter in the class body of a component.
 
     Parameters
     ----------
     default
-        The value when none is given; without one, the parameter is required.
+        The value when none is given; without one, the parameter is required. None makes it optional.
     unit
         SI unit, checked against the unit of what is given (``Rod(length="30 cm")``).
     doc
@@ -254,9 +255,12 @@ def parameter(
     size
         The number of components, for a parameter that is a vector.
     integer
-        Whether it is a count. Counts and choices shape the mechanism; every other parameter is a number of it.
+        Whether it is a count.
     choices
         The words it can be, for a parameter that is a choice.
+    structural
+        Whether its value shapes the mechanism, as a direction does. Counts and choices always do; every other
+        parameter is a number that can change without anything being derived again.
 
     Raises
     ------
@@ -275,6 +279,7 @@ def parameter(
         size=size,
         integer=integer,
         choices=tuple(choices),
+        structural=structural,
     )
 
 

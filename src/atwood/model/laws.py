@@ -43,6 +43,15 @@ class Law:
     name: str
     options: Any = None
 
+    def holds_in(self, space: str) -> bool:
+        """Return whether the law has a meaning in a space."""
+        return self.options is None or space in getattr(self.options, "spaces", (space,))
+
+    def acts_in(self, mode: str) -> bool:
+        """Return whether the law acts while its component is in a mode."""
+        modes = getattr(self.options, "modes", ())
+        return not modes or mode in modes
+
 
 @dataclass(frozen=True)
 class PointInertia:
@@ -142,6 +151,7 @@ class JointOptions:
     spaces: tuple[str, ...]
     rigid: bool
     reaction_doc: str
+    modes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -151,6 +161,7 @@ class ObservableOptions:
     unit: str
     doc: str
     periodic: bool
+    spaces: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -225,6 +236,7 @@ def joint(
     spaces: Sequence[str] = ("plane",),
     rigid: bool = False,
     reaction: str = "",
+    modes: Sequence[str] = (),
 ) -> Callable[[_F], _F]:
     """Mark a method that returns the `Placement` of connector b seen from connector a, for given joint coordinates.
 
@@ -245,12 +257,16 @@ def joint(
         Whether a and b belong to one body; then there are no coordinates and no constraint.
     reaction
         For a rigid joint: one line of what its force and torque are reported as; empty to report none.
+    modes
+        The modes of the component in which it holds; all when empty.
     """
-    options = JointOptions(a, b, tuple(coordinates), tuple(solves), tuple(spaces), rigid, reaction)
+    options = JointOptions(a, b, tuple(coordinates), tuple(solves), tuple(spaces), rigid, reaction, tuple(modes))
     return lambda function: _mark(function, Law("joint", function.__name__, options))
 
 
-def observable(*, unit: str, doc: str, periodic: bool = False) -> Callable[[_F], _F]:
+def observable(
+    *, unit: str, doc: str, periodic: bool = False, spaces: Sequence[str] = ("line", "plane", "space")
+) -> Callable[[_F], _F]:
     """Mark a method that returns a quantity to report: a scalar or a `Vector`.
 
     Parameters
@@ -261,6 +277,8 @@ def observable(*, unit: str, doc: str, periodic: bool = False) -> Callable[[_F],
         One line of meaning.
     periodic
         Whether it is an angle that comes out within one turn; it is then unwrapped along a run.
+    spaces
+        The spaces in which it has a meaning.
     """
 
     def decorate(function: _F) -> _F:
@@ -271,7 +289,7 @@ def observable(*, unit: str, doc: str, periodic: bool = False) -> Callable[[_F],
             known = self._known_observable(name)
             return function(self) if known is None else known
 
-        return _mark(read, Law("observable", name, ObservableOptions(unit, doc, periodic)))  # type: ignore[return-value]
+        return _mark(read, Law("observable", name, ObservableOptions(unit, doc, periodic, tuple(spaces))))  # type: ignore[return-value]
 
     return decorate
 

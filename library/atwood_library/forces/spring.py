@@ -1,0 +1,34 @@
+"""Spring: a linear line spring."""
+
+from __future__ import annotations
+
+from atwood import Component, Point, Scalar, connector, observable, parameter, potential
+
+
+class Spring(Component):
+    """A massless spring between two points, linear in its extension.
+
+    Potential energy ``1/2 k (d - d0)^2`` with the distance d of its ends (Goldstein, section 1.4). On a line the
+    distance is signed in the order in which the ends start, as in a textbook's row of masses.
+    """
+
+    stiffness: float = parameter(1.0, unit="N/m", minimum=0.0, doc="Force for an extension by one metre.")
+    natural_length: float = parameter(0.0, unit="m", minimum=0.0, doc="Length without force.")
+    a: Point = connector(Point, "One end.")
+    b: Point = connector(Point, "The other end.")
+
+    @potential
+    def elastic_energy(self) -> Scalar:
+        """Return the elastic energy."""
+        extension = self.distance(self.a, self.b) - self.natural_length
+        return 0.5 * self.stiffness * extension * extension
+
+    @observable(unit="m", doc="Distance of the ends.")
+    def length(self) -> Scalar:
+        """Return the length."""
+        return self.distance(self.a, self.b)
+
+    @observable(unit="N", doc="Tension; negative when the spring pushes.")
+    def tension(self) -> Scalar:
+        """Return the tension."""
+        return self.stiffness * (self.distance(self.a, self.b) - self.natural_length)

@@ -1,0 +1,52 @@
+"""Drive: a prescribed displacement between two frames."""
+
+from __future__ import annotations
+
+from atwood import (
+    Component,
+    Frame,
+    Placement,
+    Scalar,
+    Vector,
+    as_vector,
+    connector,
+    constraint,
+    joint,
+    observable,
+    parameter,
+    signal,
+)
+
+
+class Drive(Component):
+    """A drive that moves frame b along an axis of frame a, as a given function of time (a rheonomous constraint).
+
+    It does whatever work is needed; its `force` and `torque` are what it exerts on frame b.
+    """
+
+    axis: tuple[float, float, float] = parameter(
+        (1.0, 0.0, 0.0), size=3, structural=True, doc="Direction of the motion in frame a, a unit vector."
+    )
+    motion: float = signal(0.0, unit="m", doc="Displacement of frame b along the axis, a function of time.")
+    a: Frame = connector(Frame, "The frame that carries the drive.")
+    b: Frame = connector(Frame, "The frame that is moved.")
+
+    @constraint(reaction="force", unit="N", doc="Force exerted on frame b, in world axes.")
+    def track(self) -> Vector:
+        """Return the distance of frame b from where it should be."""
+        return self.b.position - self.a.position - self.a.to_world(as_vector(self.axis) * self.motion)
+
+    @constraint(reaction="torque", unit="N*m", doc="Torque exerted on frame b, counter-clockwise.")
+    def lock(self) -> Scalar:
+        """Return the angle between the frames."""
+        return self.b.angle - self.a.angle
+
+    @joint("a", "b", solves=("track", "lock"), spaces=("line", "plane"))
+    def move(self) -> Placement:
+        """Place b as prescribed."""
+        return Placement(as_vector(self.axis) * self.motion, 0.0, axes="a")
+
+    @observable(unit="m", doc="Prescribed displacement.")
+    def displacement(self) -> Scalar:
+        """Return the prescribed displacement."""
+        return self.motion

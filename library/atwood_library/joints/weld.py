@@ -1,0 +1,24 @@
+"""Weld: a rigid connection of two frames."""
+
+from __future__ import annotations
+
+from atwood import Component, Frame, Placement, as_vector, connector, joint, parameter
+
+
+class Weld(Component):
+    """A rigid connection: frame b keeps its place in frame a. What it joins becomes one body.
+
+    Its `force` and `torque` are what it exerts on frame b and everything that hangs on it.
+    """
+
+    displacement: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0), unit="m", size=3, doc="Position of frame b in the axes of frame a."
+    )
+    angle: float = parameter(0.0, unit="rad", doc="Rotation of frame b from frame a, counter-clockwise.")
+    a: Frame = connector(Frame, "One frame.")
+    b: Frame = connector(Frame, "The other frame.")
+
+    @joint("a", "b", rigid=True, spaces=("line", "plane", "space"), reaction="exerted on frame b")
+    def fixation(self) -> Placement:
+        """Place b in the axes of a."""
+        return Placement(as_vector(self.displacement), self.angle, axes="a")

@@ -1,0 +1,23 @@
+"""Ground: a frame fixed in the world."""
+
+from __future__ import annotations
+
+from atwood import Component, Frame, Placement, as_vector, connector, joint, parameter
+
+
+class Ground(Component):
+    """A frame fixed in the world.
+
+    Its `force` and `torque` are what the ground exerts on everything that is connected to it.
+    """
+
+    position: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0), unit="m", size=3, doc="Position in world axes (x right, y into the page, z up)."
+    )
+    angle: float = parameter(0.0, unit="rad", doc="Rotation in the plane, counter-clockwise.")
+    frame: Frame = connector(Frame, "The fixed frame.")
+
+    @joint("world", "frame", rigid=True, spaces=("line", "plane", "space"), reaction="exerted by the ground")
+    def fixation(self) -> Placement:
+        """Place the frame in the world."""
+        return Placement(as_vector(self.position), self.angle)

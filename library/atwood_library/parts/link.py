@@ -1,0 +1,75 @@
+"""Link: a rigid body in the plane with a frame at each end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from atwood import (
+    BodyInertia,
+    Component,
+    Frame,
+    Placement,
+    Scalar,
+    Vector,
+    connector,
+    inertia,
+    joint,
+    observable,
+    parameter,
+)
+
+
+class Link(Component):
+    """A rigid body with two frames: a at its origin, b at `length` along its x axis.
+
+    Its angle is that of its x axis from the world's, counter-clockwise. Unless said otherwise it is a uniform slender
+    rod, with moment of inertia ``m l^2 / 12`` about its centre (Goldstein, section 5.3).
+    """
+
+    length: float = parameter(1.0, unit="m", above=0.0, doc="Distance from a to b.")
+    mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
+    center: float | None = parameter(
+        None, unit="m", doc="Distance of the centre of mass from a, towards b; half the length if not given."
+    )
+    moment: float | None = parameter(
+        None, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the centre of mass; m l^2/12 if not given."
+    )
+    a: Frame = connector(Frame, "The frame at the origin of the link.")
+    b: Frame = connector(Frame, "The frame at the other end.")
+
+    def center_in_link(self) -> Vector:
+        """Return the centre of mass in the axes of frame a."""
+        return Vector(0.5 * self.length if self.center is None else self.center, 0.0, 0.0)
+
+    @inertia
+    def rigid_body(self) -> Iterable[BodyInertia]:
+        """Return the inertia."""
+        moment = self.mass * self.length * self.length / 12.0 if self.moment is None else self.moment
+        yield BodyInertia(self.a, self.mass, self.center_in_link(), moment)
+
+    @joint("a", "b", rigid=True, spaces=("line", "plane", "space"))
+    def shape(self) -> Placement:
+        """Place b in the axes of a."""
+        return Placement(Vector(self.length, 0.0, 0.0), 0.0, axes="a")
+
+    @observable(unit="rad", doc="Angle of the x axis, counter-clockwise.", spaces=("plane",))
+    def angle(self) -> Scalar:
+        """Return the angle."""
+        return self.a.angle
+
+    @observable(unit="rad/s", doc="Rate of the angle.", spaces=("plane",))
+    def angular_velocity(self) -> Scalar:
+        """Return the rate of the angle; the rotation is about -y."""
+        return -self.a.angular_velocity.y
+
+    @observable(unit="m", doc="Position of the centre of mass in world axes.")
+    def position(self) -> Vector:
+        """Return the position of the centre of mass."""
+        return self.a.position + self.a.to_world(self.center_in_link())
+
+    @observable(unit="m/s", doc="Velocity of the centre of mass in world axes.")
+    def velocity(self) -> Vector:
+        """Return the velocity of the centre of mass."""
+        arm = self.a.to_world(self.center_in_link())
+        omega = self.a.angular_velocity
+        return self.a.velocity + Vector(omega.y * arm.z, 0.0, -omega.y * arm.x)

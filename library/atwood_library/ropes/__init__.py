@@ -1,0 +1,1 @@
+"""Ropes of the library."""

@@ -1,0 +1,337 @@
+"""From forest to equations: placements, linear elimination, derivatives, rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from atwood.errors import DeclarationError, TopologyError, UnsupportedError
+from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, substitute
+from atwood.mechanics.equations import (
+    Constraint,
+    Equations,
+    constraint_levels,
+    force_rows,
+    motion_rows,
+    put_in_place,
+)
+from atwood.mechanics.forces import Site, local_map
+from atwood.mechanics.inertia import Masses, add_masses
+from atwood.mechanics.kinematics import (
+    Kinematics,
+    Placements,
+    body_offsets,
+    differentiate,
+    place,
+    rotate,
+    shapes,
+)
+from atwood.model.component import bind
+from atwood.model.local import LocalConstraint, LocalPart, ParameterTable
+from atwood.model.space import Space
+from atwood.model.vector import Vector, as_vector
+from atwood.topology.bodies import Bodies
+from atwood.topology.forest import Forest
+from atwood.topology.graph import MechanismGraph
+
+__all__ = ["Mechanism", "build_equations", "check_closures", "make_gravity", "resolve_signals"]
+
+_CLOSES = 1e-9
+"""Relative to the extent of the mechanism: how far rigid parts may miss each other and still count as joined."""
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A scene as bodies and joints on local symbols, before a form is chosen.
+
+    Attributes
+    ----------
+    table
+        The parameters.
+    time
+        The symbol of time.
+    space
+        What the scene lives in.
+    gravity
+        Acceleration of free fall, m/s^2, a symbol or zero.
+    locals_, graph, bodies
+        Parts, nodes and bodies.
+    links
+        For each linked input, the output that feeds it.
+    """
+
+    table: ParameterTable
+    time: Expression
+    space: Space
+    gravity: Vector
+    locals_: Mapping[str, LocalPart]
+    graph: MechanismGraph
+    bodies: Bodies
+    links: Mapping[tuple[str, str], tuple[str, str]]
+
+
+def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
+    """Derive the equations of motion of a mechanism in one form.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    forest
+        How its configuration is computed; it says which form it is.
+
+    Raises
+    ------
+    TopologyError
+        If rigid parts contradict each other.
+    UnsupportedError
+        If a law asks for what this version cannot do.
+    """
+    graph, bodies, space = mechanism.table.graph, mechanism.bodies, mechanism.space
+    layouts = {body.index: body_offsets(body, space) for body in bodies.bodies}
+    masses = add_masses(mechanism.graph, bodies, mechanism.locals_, layouts)
+    shape_of = shapes(bodies, {index: one.center for index, one in masses.bodies.items()}, space)
+    site = Site(
+        graph,
+        mechanism.graph,
+        bodies,
+        space,
+        {node: turn for _, turns in layouts.values() for node, turn in turns.items()},
+    )
+    q = tuple(graph.symbol(f"q:{c.name}") for c in forest.coordinates)
+    placements = place(graph, mechanism.graph, bodies, forest, shape_of, mechanism.locals_, q, space)
+    left = _unsolved(mechanism, forest)
+    values = _constraint_values(mechanism, site, placements, left)
+    names, eliminated = list(forest.coordinates), []
+    if forest.form == "reduced":
+        solution = _eliminate(mechanism, masses, forest, q, values)
+        if solution:
+            placements = _substituted(placements, solution)
+            values = [(path, c, substitute([v], solution)[0]) for path, c, v in values if v is not _SOLVED]
+            gone = {symbol for symbol in solution}
+            eliminated = [c.name for c, s in zip(forest.coordinates, q, strict=True) if s in gone]
+            names = [c for c, s in zip(forest.coordinates, q, strict=True) if s not in gone]
+            q = tuple(s for s in q if s not in gone)
+    values = _drop_closed(mechanism, q, values)
+    u = tuple(graph.symbol(f"u:{c.name}") for c in names)
+    a = tuple(graph.symbol(f"a:{c.name}") for c in names)
+    kinematics = differentiate(placements, mechanism.time, q, u, a)
+    signals = resolve_signals(mechanism, site, kinematics)
+    constraints = []
+    for path, local_constraint, value in values:
+        rate, second = constraint_levels(value, mechanism.time, q, u, a)
+        key = (path, local_constraint.law.name, local_constraint.index)
+        multiplier = graph.symbol(f"lambda:{path}.{local_constraint.law.name}[{local_constraint.index}]")
+        constraints.append(
+            Constraint(key, local_constraint.reaction, local_constraint.sign, value, rate, second, multiplier)
+        )
+    chosen = [(path, c, one.multiplier) for (path, c, _), one in zip(values, constraints, strict=True)]
+    return Equations(
+        graph=graph,
+        forest=forest,
+        site=site,
+        locals_=mechanism.locals_,
+        masses=masses,
+        shapes=shape_of,
+        kinematics=kinematics,
+        time=mechanism.time,
+        coordinates=q,
+        speeds=u,
+        accelerations=a,
+        names=tuple(names),
+        rows=tuple(motion_rows(site, mechanism.locals_, masses, kinematics, mechanism.gravity, signals, u)),
+        constraint_rows=tuple(force_rows(site, mechanism.locals_, kinematics, chosen, signals, u)),
+        constraints=tuple(constraints),
+        eliminated=tuple(eliminated),
+    )
+
+
+Values = list[tuple[str, LocalConstraint, Expression]]
+
+
+def _unsolved(mechanism: Mechanism, forest: Forest) -> list[tuple[str, LocalConstraint]]:
+    found = []
+    for path, local in mechanism.locals_.items():
+        for constraint in local.constraints:
+            velocities = [v for c in local.connectors.values() for v in c.velocity]
+            velocities += [c.angular_speed for c in local.connectors.values() if c.angular_speed is not None]
+            where = f"{path}.{constraint.law.name}"
+            if depends_on(constraint.value, velocities):
+                raise UnsupportedError("a constraint on velocities cannot be handled yet", where=where)
+            if depends_on(constraint.value, list(local.signal_symbols.values())):
+                raise UnsupportedError(
+                    "a constraint cannot follow the output of another component",
+                    where=where,
+                    advice="Give the input as a function of time.",
+                )
+            if (path, constraint.law.name, constraint.index) not in forest.solved and not constraint.value.is_zero:
+                found.append((path, constraint))
+    return found
+
+
+def _constraint_values(
+    mechanism: Mechanism, site: Site, placements: Placements, left: Sequence[tuple[str, LocalConstraint]]
+) -> Values:
+    still = Kinematics(placements, placements.positions, {}, placements.angles, {}, {}, {})
+    maps = {path: local_map(site, mechanism.locals_[path], still) for path in {path for path, _ in left}}
+    return [(path, c, put_in_place(c.value, maps[path])) for path, c in left]
+
+
+class _Solved:
+    """Marks a constraint that elimination has used up."""
+
+
+_SOLVED: Expression = _Solved()  # type: ignore[assignment]
+
+
+def _eliminate(
+    mechanism: Mechanism, masses: Masses, forest: Forest, q: tuple[Expression, ...], values: Values
+) -> dict[Expression, Expression]:
+    """Solve linear constraints for one coordinate each; mark them in `values`.
+
+    Coordinates of what has no mass go first, then those that were met last, so that the names that a reader expects
+    stay.
+    """
+    parameters = mechanism.table.values
+    weightless = _weightless(masses, forest)
+    solution: dict[Expression, Expression] = {}
+    for number, (path, constraint, original) in enumerate(values):
+        value = substitute([original], solution)[0]
+        free = [s for s in q if s not in solution]
+        affine = affine_coefficients(value, free, list(parameters))
+        if affine is None:
+            continue
+        coefficients, remainder = affine
+        sizes = [abs(c) for c in evaluate(list(coefficients), parameters)] if coefficients else []
+        largest = max(sizes, default=0.0)
+        if largest == 0.0:
+            continue
+        usable = [i for i, size in enumerate(sizes) if size >= 0.1 * largest]
+        index = max(usable, key=lambda i: (q.index(free[i]) in weightless, i))
+        pivot = coefficients[index]
+        total = remainder
+        for i, coefficient in enumerate(coefficients):
+            if i != index:
+                total = total + coefficient * free[i]
+        expression = -total / pivot
+        solution = {s: substitute([e], {free[index]: expression})[0] for s, e in solution.items()}
+        solution[free[index]] = mechanism.table.graph.convert(expression)
+        values[number] = (path, constraint, _SOLVED)
+    return solution
+
+
+def _weightless(masses: Masses, forest: Forest) -> set[int]:
+    """Return the numbers of the coordinates that only place a body without mass."""
+    spread = {node for one in masses.coupled for node in one.nodes}
+    return {
+        number
+        for one in forest.attachments
+        if one.body not in masses.bodies and one.node not in spread
+        for number in one.coordinates
+    }
+
+
+def _substituted(placements: Placements, solution: Mapping[Expression, Expression]) -> Placements:
+    def all_of(values: Sequence[Expression]) -> tuple[Expression, ...]:
+        return tuple(substitute(list(values), solution))
+
+    return Placements(
+        {i: all_of(p) for i, p in placements.positions.items()},
+        {i: all_of([a])[0] for i, a in placements.angles.items()},
+        {i: all_of(p) for i, p in placements.references.items()},
+        {s: all_of([e])[0] for s, e in placements.joint_coordinates.items()},
+    )
+
+
+def _drop_closed(mechanism: Mechanism, q: tuple[Expression, ...], values: Values) -> Values:
+    """Take out the constraints that no coordinate can change, after checking that they hold."""
+    kept: Values = []
+    parameters = mechanism.table.values
+    for path, constraint, value in values:
+        if value is _SOLVED:
+            continue
+        if depends_on(value, q):
+            kept.append((path, constraint, value))
+            continue
+        for moment in (0.0, 0.3217, 1.7331):
+            (miss,) = evaluate([value], {**parameters, mechanism.time: moment})
+            scale = max([1e-300, *(abs(v) for v in parameters.values())])
+            if not abs(miss) <= _CLOSES * scale:
+                raise TopologyError(
+                    f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
+                    where=f"{path}.{constraint.law.name}",
+                    advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
+                )
+    return kept
+
+
+def check_closures(mechanism: Mechanism) -> None:
+    """Check that rigid joints between parts of one body agree.
+
+    Raises
+    ------
+    TopologyError
+        If they do not: two grounds fight, or rigid parts do not fit together.
+    """
+    bodies, space = mechanism.bodies, mechanism.space
+    for joint in bodies.closures:
+        body = bodies.bodies[bodies.body_of[joint.a]]
+        offsets, turns = body_offsets(body, space)
+        placement = joint.local.placement
+        from_a = placement.displacement
+        if placement.axes == "a" and space.has_rotation:
+            from_a = rotate(from_a, turns[joint.a])
+        gap = offsets[joint.b] - offsets[joint.a] - from_a
+        rotation = 0.0 if placement.rotation is None else placement.rotation
+        graph = mechanism.table.graph
+        misses = [*gap, turns[joint.b] - turns[joint.a] - rotation if space.has_rotation else 0.0]
+        numbers = evaluate([graph.convert(m) for m in misses], mechanism.table.values)
+        scale = max([1.0, *(abs(v) for v in mechanism.table.values.values())])
+        if not all(abs(m) <= _CLOSES * scale for m in numbers):
+            kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
+            raise TopologyError(
+                f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {numbers[3]:g} rad",
+                where=joint.label,
+                advice="Two rigid connections say different things about the same place; remove or change one.",
+            )
+
+
+def resolve_signals(
+    mechanism: Mechanism, site: Site, kinematics: Kinematics
+) -> dict[Expression, Expression]:
+    """Return what each linked input stands for.
+
+    Raises
+    ------
+    DeclarationError
+        If inputs feed each other in a circle, or an output needs what is known only after the forces are.
+    """
+    raw: dict[Expression, Expression] = {}
+    for (path, name), (source, observable) in mechanism.links.items():
+        local = mechanism.locals_[source]
+        law, _, axis = observable.partition(".")
+        value = getattr(bind(local.part.component, local.binding), law)()
+        if isinstance(value, Vector):
+            if axis not in ("x", "y", "z"):
+                raise DeclarationError(
+                    "it is a vector", where=f"{source}.{observable}", advice=f"Connect {observable}.x or {observable}.z."
+                )
+            value = getattr(value, axis)
+        placed = put_in_place(site.graph.convert(value), local_map(site, local, kinematics))
+        raw[mechanism.locals_[path].signal_symbols[name]] = placed
+    for _ in range(len(raw)):
+        pending = [s for s, e in raw.items() if depends_on(e, list(raw))]
+        if not pending:
+            return raw
+        raw = {s: substitute([e], raw)[0] for s, e in raw.items()}
+    if any(depends_on(e, list(raw)) for e in raw.values()):
+        names = ", ".join(f"{path}.{name}" for path, name in mechanism.links)
+        raise DeclarationError(f"inputs and outputs feed each other in a circle: {names}")
+    return raw
+
+
+def make_gravity(table: ParameterTable, value: float) -> Vector:
+    """Return the acceleration of free fall as a vector."""
+    pull = table.scalar("gravity", value)
+    return as_vector((0.0, 0.0, -pull))
+

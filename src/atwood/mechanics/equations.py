@@ -1,0 +1,237 @@
+"""The equations of motion: d'Alembert's principle, as one reverse sweep through the velocity program.
+
+The generalized force on speed u_k is the sum over all nodes and bodies of ``(m a - F) . dv/du_k`` and
+``(J alpha - tau) dw/du_k`` (Goldstein, section 1.4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
+from atwood.mechanics.forces import Forces, Site, constraint_forces, local_map, part_forces
+from atwood.mechanics.inertia import Masses
+from atwood.mechanics.kinematics import BodyShape, Kinematics
+from atwood.model.local import LocalConstraint, LocalPart
+from atwood.model.vector import Vector
+from atwood.topology.forest import Coordinate, Forest
+
+__all__ = ["Constraint", "Equations", "balance_rows", "inertia_forces"]
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A constraint that is not solved by the coordinates.
+
+    Attributes
+    ----------
+    key
+        (part path, law, number within the law).
+    reaction
+        Name of the reaction that its multiplier is reported as.
+    sign
+        The reaction is `sign` times the multiplier.
+    value, rate, second
+        The residual and its first and second time derivatives.
+    multiplier
+        The symbol of the multiplier.
+    """
+
+    key: tuple[str, str, int]
+    reaction: str
+    sign: float
+    value: Expression
+    rate: Expression
+    second: Expression
+    multiplier: Expression
+
+    @property
+    def label(self) -> str:
+        """Path of the constraint, for messages and reports."""
+        return f"{self.key[0]}.{self.key[1]}" + (f"[{self.key[2]}]" if "." in self.reaction else "")
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The equations of motion of one form of a scene, with everything they were made of.
+
+    Attributes
+    ----------
+    graph
+        Where expressions live.
+    forest
+        How the configuration is computed.
+    site
+        Where parts are.
+    locals_
+        What the parts contribute.
+    masses
+        All inertia.
+    shapes
+        Shapes of the bodies.
+    kinematics
+        Positions, velocities, accelerations.
+    time, coordinates, speeds, accelerations
+        The symbols.
+    names
+        Names and units of the coordinates.
+    rows
+        For each speed, inertial less applied generalized force; zero if there are no constraints.
+    constraint_rows
+        For each speed, the generalized force of the constraints; ``rows - constraint_rows = 0`` is the motion.
+    constraints
+        The constraints that are left.
+    eliminated
+        Coordinates that linear constraints gave as functions of the others, by name.
+    """
+
+    graph: Graph
+    forest: Forest
+    site: Site
+    locals_: Mapping[str, LocalPart]
+    masses: Masses
+    shapes: Mapping[int, BodyShape]
+    kinematics: Kinematics
+    time: Expression
+    coordinates: tuple[Expression, ...]
+    speeds: tuple[Expression, ...]
+    accelerations: tuple[Expression, ...]
+    names: tuple[Coordinate, ...]
+    rows: tuple[Expression, ...]
+    constraint_rows: tuple[Expression, ...]
+    constraints: tuple[Constraint, ...]
+    eliminated: tuple[str, ...]
+
+    @property
+    def multipliers(self) -> tuple[Expression, ...]:
+        """The symbols of the multipliers."""
+        return tuple(one.multiplier for one in self.constraints)
+
+
+def inertia_forces(
+    site: Site,
+    masses: Masses,
+    kinematics: Kinematics,
+    gravity: Vector,
+    forces: Forces,
+) -> dict[int, list[Expression]]:
+    """Return ``m (a - g)`` at the centre of mass of each body, and add the inertia of masses spread between nodes.
+
+    Parameters
+    ----------
+    site, masses, kinematics
+        The mechanism.
+    gravity
+        Acceleration of free fall.
+    forces
+        Takes up, with its sign reversed, what acts at nodes and the inertial torques.
+    """
+    pull = site.space.components(gravity)
+    at_centers: dict[int, list[Expression]] = {}
+    for index, one in masses.bodies.items():
+        acceleration = kinematics.reference_accelerations[index]
+        at_centers[index] = [
+            site.graph.convert(one.mass * (a - g)) for a, g in zip(acceleration, pull, strict=True)
+        ]
+        if index in kinematics.angular_accelerations:
+            forces.twist(index, -(one.moment * kinematics.angular_accelerations[index]))
+    for spread in masses.coupled:
+        lifted = [[a - g for a, g in zip(kinematics.accelerations[n], pull, strict=True)] for n in spread.nodes]
+        for i, node in enumerate(spread.nodes):
+            total: list[Scalar] = [0.0] * len(pull)
+            for j in range(len(spread.nodes)):
+                total = [t + spread.masses[i][j] * a for t, a in zip(total, lifted[j], strict=True)]
+            forces.push(node, [-t for t in total])
+    return at_centers
+
+
+def balance_rows(
+    kinematics: Kinematics,
+    at_centers: Mapping[int, Sequence[Expression]],
+    forces: Forces,
+    speeds: Sequence[Expression],
+) -> list[Expression]:
+    """Return, for each speed, the virtual power of inertial less other forces: one reverse sweep.
+
+    Parameters
+    ----------
+    kinematics
+        The velocity program.
+    at_centers
+        Inertial forces at the reference points of bodies.
+    forces
+        Forces on nodes and torques on bodies.
+    speeds
+        The symbols of the speeds.
+    """
+    outputs: list[Expression] = []
+    cotangents: list[Expression] = []
+    for index, inertial in at_centers.items():
+        outputs += kinematics.reference_velocities[index]
+        cotangents += inertial
+    for node, force in forces.on_nodes.items():
+        outputs += kinematics.velocities[node]
+        cotangents += [-f for f in force]
+    for body, torque in forces.on_bodies.items():
+        if body in kinematics.angular_speeds:
+            outputs.append(kinematics.angular_speeds[body])
+            cotangents.append(-torque)
+    kept = [(o, c) for o, c in zip(outputs, cotangents, strict=True) if not c.is_zero and not o.is_zero]
+    if not kept:
+        zero = forces.graph.constant(0.0)
+        return [zero for _ in speeds]
+    return vjp([o for o, _ in kept], [c for _, c in kept], list(speeds))
+
+
+def motion_rows(
+    site: Site,
+    locals_: Mapping[str, LocalPart],
+    masses: Masses,
+    kinematics: Kinematics,
+    gravity: Vector,
+    signals: Mapping[Expression, Expression],
+    speeds: Sequence[Expression],
+) -> list[Expression]:
+    """Return, for each speed, inertial less applied generalized force."""
+    forces = Forces(site.graph)
+    at_centers = inertia_forces(site, masses, kinematics, gravity, forces)
+    for local in locals_.values():
+        part_forces(site, local, {**local_map(site, local, kinematics), **signals}, forces)
+    return balance_rows(kinematics, at_centers, forces, speeds)
+
+
+def force_rows(
+    site: Site,
+    locals_: Mapping[str, LocalPart],
+    kinematics: Kinematics,
+    chosen: Sequence[tuple[str, LocalConstraint, Expression]],
+    signals: Mapping[Expression, Expression],
+    speeds: Sequence[Expression],
+) -> list[Expression]:
+    """Return, for each speed, the generalized force of constraints with the given multipliers."""
+    forces = Forces(site.graph)
+    for path, constraint, multiplier in chosen:
+        local = locals_[path]
+        mapping = {**local_map(site, local, kinematics), **signals}
+        constraint_forces(site, local, constraint.value, multiplier, mapping, forces)
+    return [-row for row in balance_rows(kinematics, {}, forces, speeds)]
+
+
+def constraint_levels(
+    value: Expression,
+    time: Expression,
+    coordinates: Sequence[Expression],
+    speeds: Sequence[Expression],
+    accelerations: Sequence[Expression],
+) -> tuple[Expression, Expression]:
+    """Return the first and second time derivative of a constraint."""
+    first = {time: 1.0, **dict(zip(coordinates, speeds, strict=True))}
+    (rate,) = jvp([value], first)
+    (second,) = jvp([rate], {**first, **dict(zip(speeds, accelerations, strict=True))})
+    return rate, second
+
+
+def put_in_place(value: Expression, mapping: Mapping[Expression, Expression]) -> Expression:
+    """Return an expression of local symbols where the part is."""
+    return substitute([value], mapping)[0]

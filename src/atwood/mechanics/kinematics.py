@@ -1,0 +1,301 @@
+"""Positions, velocities and accelerations of every node, as expressions of the coordinates.
+
+One recursion gives positions and orientations; velocities and accelerations are its forward derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from atwood.expr import Expression, Graph, Scalar, jvp, substitute
+from atwood.model.local import LocalPart
+from atwood.model.space import FIXED_AXES, Space, planar_axes
+from atwood.model.vector import Vector
+from atwood.topology.bodies import Bodies, Body, RigidStep
+from atwood.topology.forest import Attachment, Forest
+from atwood.topology.graph import WORLD, Joint, MechanismGraph
+
+__all__ = ["BodyShape", "Kinematics", "Placements", "differentiate", "place", "shapes"]
+
+Components = tuple[Expression, ...]
+
+
+@dataclass(frozen=True)
+class BodyShape:
+    """Where the nodes of a body are in its own axes, and how they are turned; of parameters only.
+
+    Attributes
+    ----------
+    offsets
+        Position of each node, in the axes of the body.
+    turns
+        Rotation of each node from the body, rad.
+    reference
+        The point that a free body's coordinates are taken at: its centre of mass, or its root.
+    """
+
+    offsets: Mapping[int, Vector]
+    turns: Mapping[int, Scalar]
+    reference: Vector
+
+
+@dataclass(frozen=True)
+class Placements:
+    """Positions and orientations as expressions of coordinates and time.
+
+    Attributes
+    ----------
+    positions
+        Free position components of each node.
+    angles
+        Angle of each body that has an orientation.
+    references
+        Free position components of the reference point of each body.
+    joint_coordinates
+        Value of each joint coordinate symbol of a joint that a body hangs on.
+    """
+
+    positions: Mapping[int, Components]
+    angles: Mapping[int, Expression]
+    references: Mapping[int, Components]
+    joint_coordinates: Mapping[Expression, Expression]
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """Placements with their first and second time derivatives.
+
+    Attributes
+    ----------
+    placements
+        Positions and orientations.
+    velocities, accelerations
+        Of the nodes.
+    angular_speeds, angular_accelerations
+        Of the bodies.
+    reference_velocities, reference_accelerations
+        Of the reference points.
+    """
+
+    placements: Placements
+    velocities: Mapping[int, Components]
+    accelerations: Mapping[int, Components]
+    angular_speeds: Mapping[int, Expression]
+    angular_accelerations: Mapping[int, Expression]
+    reference_velocities: Mapping[int, Components]
+    reference_accelerations: Mapping[int, Components]
+
+
+def shapes(bodies: Bodies, references: Mapping[int, Vector], space: Space) -> dict[int, BodyShape]:
+    """Return the shape of every body.
+
+    Parameters
+    ----------
+    bodies
+        The bodies.
+    references
+        Reference point of each body in its own axes; the root where it is not given.
+    space
+        What the scene lives in.
+    """
+    found = {}
+    for body in bodies.bodies:
+        offsets, turns = _shape(body, space)
+        found[body.index] = BodyShape(offsets, turns, references.get(body.index, offsets[body.root]))
+    return found
+
+
+def body_offsets(body: Body, space: Space) -> tuple[dict[int, Vector], dict[int, Scalar]]:
+    """Return offset and turn of each node in the axes of a body."""
+    return _shape(body, space)
+
+
+def _shape(body: Body, space: Space) -> tuple[dict[int, Vector], dict[int, Scalar]]:
+    offsets: dict[int, Vector] = {body.root: Vector(0.0, 0.0, 0.0)}
+    turns: dict[int, Scalar] = {body.root: 0.0}
+    for step in body.steps:
+        offsets[step.child], turns[step.child] = _rigid_step(step, offsets[step.parent], turns[step.parent], space)
+    return offsets, turns
+
+
+def _rigid_step(step: RigidStep, offset: Vector, turn: Scalar, space: Space) -> tuple[Vector, Scalar]:
+    placement = step.joint.local.placement
+    rotation = 0.0 if placement.rotation is None else placement.rotation
+    child_turn = turn - rotation if step.backwards else turn + rotation
+    turn_of_a = child_turn if step.backwards else turn
+    shift = placement.displacement
+    if placement.axes == "a" and space.has_rotation:
+        shift = rotate(shift, turn_of_a)
+    return (offset - shift if step.backwards else offset + shift), child_turn
+
+
+def rotate(vector: Vector, angle: Scalar) -> Vector:
+    """Return a vector turned by an angle in the plane, counter-clockwise as seen on the page."""
+    if (angle.is_zero if isinstance(angle, Expression) else angle == 0.0):
+        return vector
+    x_axis, y_axis, z_axis = planar_axes(angle)
+    return x_axis * vector.x + y_axis * vector.y + z_axis * vector.z
+
+
+def place(
+    graph: Graph,
+    mechanism: MechanismGraph,
+    bodies: Bodies,
+    forest: Forest,
+    shape_of: Mapping[int, BodyShape],
+    locals_: Mapping[str, LocalPart],
+    coordinates: Sequence[Expression],
+    space: Space,
+) -> Placements:
+    """Compute where every node is, walking the forest from the world outwards.
+
+    Parameters
+    ----------
+    graph
+        Where expressions live.
+    mechanism, bodies, forest, shape_of, locals_, space
+        The mechanism.
+    coordinates
+        The symbols of the forest's coordinates.
+    """
+    angles: dict[int, Expression] = {0: graph.constant(0.0)}
+    for turn in forest.orientations:
+        if turn.coordinate is not None:
+            angles[turn.body] = coordinates[turn.coordinate]
+        elif turn.joint is not None:
+            angles[turn.body] = _locked_angle(graph, turn.joint, turn.body, bodies, shape_of, angles)
+    positions: dict[int, Components] = {}
+    references: dict[int, Components] = {}
+    known: dict[Expression, Expression] = {}
+    world = bodies.bodies[0]
+    _spread(graph, world, shape_of[0], WORLD, (graph.constant(0.0),) * len(space.basis), angles, space, positions)
+    references[0] = positions[WORLD]
+    for attachment in forest.attachments:
+        body, shape = bodies.bodies[attachment.body], shape_of[attachment.body]
+        own = [coordinates[i] for i in attachment.coordinates]
+        if attachment.joint is None:
+            references[body.index] = tuple(own)
+            arm = shape.offsets[body.root] - shape.reference
+            start = _shift(graph, tuple(own), arm, angles.get(body.index), space)
+        else:
+            start = _across_joint(graph, attachment, own, bodies, shape_of, angles, positions, known, space)
+        _spread(graph, body, shape, attachment.node, start, angles, space, positions)
+        if attachment.joint is not None:
+            arm = shape.reference - shape.offsets[attachment.node]
+            references[body.index] = _shift(graph, start, arm, angles.get(body.index), space)
+    return Placements(positions, angles, references, known)
+
+
+def _locked_angle(
+    graph: Graph,
+    joint: Joint,
+    child: int,
+    bodies: Bodies,
+    shape_of: Mapping[int, BodyShape],
+    angles: Mapping[int, Expression],
+) -> Expression:
+    a, b = bodies.body_of[joint.a], bodies.body_of[joint.b]
+    rotation = joint.local.placement.rotation
+    turn_a, turn_b = shape_of[a].turns[joint.a], shape_of[b].turns[joint.b]
+    if child == b:
+        return graph.convert(angles[a] + turn_a + rotation - turn_b)
+    return graph.convert(angles[b] + turn_b - rotation - turn_a)
+
+
+def _shift(
+    graph: Graph, start: Components, arm: Vector, angle: Expression | None, space: Space
+) -> Components:
+    if angle is not None and space.has_rotation:
+        arm = rotate(arm, angle)
+    return tuple(graph.convert(p + d) for p, d in zip(start, space.components(arm), strict=True))
+
+
+def _spread(
+    graph: Graph,
+    body: Body,
+    shape: BodyShape,
+    node: int,
+    start: Components,
+    angles: Mapping[int, Expression],
+    space: Space,
+    positions: dict[int, Components],
+) -> None:
+    """Place all nodes of a body from one of them."""
+    angle = angles.get(body.index)
+    for other in body.nodes:
+        arm = shape.offsets[other] - shape.offsets[node]
+        positions[other] = start if other == node else _shift(graph, start, arm, angle, space)
+
+
+def _across_joint(
+    graph: Graph,
+    attachment: Attachment,
+    own: Sequence[Expression],
+    bodies: Bodies,
+    shape_of: Mapping[int, BodyShape],
+    angles: Mapping[int, Expression],
+    positions: Mapping[int, Components],
+    known: dict[Expression, Expression],
+    space: Space,
+) -> Components:
+    joint = attachment.joint
+    assert joint is not None
+    a, b = bodies.body_of[joint.a], bodies.body_of[joint.b]
+    angle_a = angles[a] + shape_of[a].turns[joint.a] if a in angles else None
+    values = iter(own)
+    for symbol in joint.moves:
+        if symbol in joint.turns:
+            angle_b = angles[b] + shape_of[b].turns[joint.b]
+            known[symbol] = graph.convert(angle_b - angle_a)
+        else:
+            known[symbol] = next(values)
+    placement = joint.local.placement
+    shift = Vector(*substitute([graph.convert(c) for c in placement.displacement], known))
+    if placement.axes == "a" and angle_a is not None and space.has_rotation:
+        shift = rotate(shift, angle_a)
+    step = space.components(shift)
+    start = positions[attachment.parent]
+    if attachment.backwards:
+        return tuple(graph.convert(p - d) for p, d in zip(start, step, strict=True))
+    return tuple(graph.convert(p + d) for p, d in zip(start, step, strict=True))
+
+
+def differentiate(
+    placements: Placements,
+    time: Expression,
+    coordinates: Sequence[Expression],
+    speeds: Sequence[Expression],
+    accelerations: Sequence[Expression],
+) -> Kinematics:
+    """Return the placements with their time derivatives: two forward sweeps over the position program.
+
+    Parameters
+    ----------
+    placements
+        Positions and orientations.
+    time, coordinates, speeds, accelerations
+        The symbols; a coordinate's rate is its speed.
+    """
+    nodes, bodies, references = placements.positions, placements.angles, placements.references
+    flat = [c for p in nodes.values() for c in p] + list(bodies.values()) + [c for p in references.values() for c in p]
+    first = {time: 1.0, **dict(zip(coordinates, speeds, strict=True))}
+    rates = jvp(flat, first)
+    second = jvp(rates, {**first, **dict(zip(speeds, accelerations, strict=True))})
+
+    def split(values: list[Expression]) -> tuple[dict[int, Components], dict[int, Expression], dict[int, Components]]:
+        it = iter(values)
+        return (
+            {i: tuple(next(it) for _ in p) for i, p in nodes.items()},
+            {i: next(it) for i in bodies},
+            {i: tuple(next(it) for _ in p) for i, p in references.items()},
+        )
+
+    v, w, rv = split(rates)
+    a, aw, ra = split(second)
+    return Kinematics(placements, v, a, w, aw, rv, ra)
+
+
+def axes_of(angle: Expression | None) -> tuple[Vector, Vector, Vector]:
+    """Return the axes of a frame at an angle; the world's where nothing turns."""
+    return FIXED_AXES if angle is None else planar_axes(angle)

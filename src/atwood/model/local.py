@@ -1,0 +1,290 @@
+"""Laws on local symbols: what each part contributes, before anyone knows where its connectors are.
+
+Every connector gets symbols of its own for what a law can read. Evaluating a law on them gives an expression that
+says by itself which connectors it depends on, and whose derivatives are the forces at them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from atwood.errors import AtwoodError, DeclarationError
+from atwood.expr import Expression, Graph, Scalar
+from atwood.model.component import Binding, bind
+from atwood.model.connectors import Frame, Motion
+from atwood.model.fields import ParameterSpec
+from atwood.model.flatten import FlatScene, Part
+from atwood.model.laws import BodyInertia, Law, Load, Placement, PointInertia, scalars
+from atwood.model.space import FIXED_AXES, Space, planar_axes
+from atwood.model.vector import Vector
+
+__all__ = ["LocalConstraint", "LocalConnector", "LocalJoint", "LocalPart", "ParameterTable", "localize"]
+
+
+@dataclass
+class ParameterTable:
+    """The parameters of a scene as symbols, with their values; filled while the laws are read."""
+
+    graph: Graph
+    values: dict[Expression, float] = field(default_factory=dict)
+
+    def scalar(self, name: str, value: float, structural: bool = False) -> Scalar:
+        """Return the symbol of a parameter, or the plain number if it shapes the program (exact zero, structural)."""
+        if structural or value == 0.0:
+            return self.graph.constant(float(value))
+        symbol = self.graph.symbol(name)
+        self.values[symbol] = float(value)
+        return symbol
+
+
+@dataclass(frozen=True)
+class LocalConnector:
+    """The symbols that stand for what one connector knows.
+
+    Attributes
+    ----------
+    position, velocity
+        One symbol for each free position component of the space.
+    angle, angular_speed
+        Rotation in the plane and its rate, for a frame; None for a point.
+    """
+
+    position: tuple[Expression, ...]
+    velocity: tuple[Expression, ...]
+    angle: Expression | None
+    angular_speed: Expression | None
+
+
+@dataclass(frozen=True)
+class LocalJoint:
+    """A joint law: its coordinates as symbols, and the placement they give."""
+
+    law: Law
+    coordinates: tuple[Expression, ...]
+    placement: Placement
+
+
+@dataclass(frozen=True)
+class LocalConstraint:
+    """One scalar that must stay zero: its law, its number there, its reaction's name and sign."""
+
+    law: Law
+    index: int
+    value: Expression
+    reaction: str
+    sign: float
+
+
+@dataclass(frozen=True)
+class LocalPart:
+    """What one part contributes, on its local symbols.
+
+    Attributes
+    ----------
+    part
+        The leaf.
+    binding
+        What the laws were evaluated on.
+    connectors
+        Symbols by connector name.
+    joints, point_inertias, body_inertias, potentials, dissipations, loads, constraints
+        What its laws returned.
+    signal_symbols
+        Stand-ins for inputs that are linked to an output.
+    """
+
+    part: Part
+    binding: Binding
+    connectors: Mapping[str, LocalConnector]
+    joints: tuple[LocalJoint, ...]
+    point_inertias: tuple[PointInertia, ...]
+    body_inertias: tuple[BodyInertia, ...]
+    potentials: tuple[Expression, ...]
+    dissipations: tuple[Expression, ...]
+    loads: tuple[Load, ...]
+    constraints: tuple[LocalConstraint, ...]
+    signal_symbols: Mapping[str, Expression]
+
+
+def localize(
+    flat: FlatScene,
+    space: Space,
+    time: Expression,
+    table: ParameterTable,
+    modes: Mapping[str, str],
+    sides: Mapping[tuple[str, str, str], float],
+) -> dict[str, LocalPart]:
+    """Evaluate the laws of every part on its local symbols.
+
+    Parameters
+    ----------
+    flat
+        The scene.
+    space
+        What it lives in.
+    time
+        The symbol of time.
+    table
+        Takes up the parameters.
+    modes
+        Mode of each part that has modes.
+    sides
+        On a line: for (part, connector, connector) the sign of the second's position minus the first's.
+
+    Raises
+    ------
+    AtwoodError
+        If a law cannot be evaluated; it names the part and the law.
+    """
+    return {path: _localize_part(part, flat, space, time, table, modes, sides) for path, part in flat.parts.items()}
+
+
+def _localize_part(
+    part: Part,
+    flat: FlatScene,
+    space: Space,
+    time: Expression,
+    table: ParameterTable,
+    modes: Mapping[str, str],
+    sides: Mapping[tuple[str, str, str], float],
+) -> LocalPart:
+    graph, component = table.graph, part.component
+    values = {name: _parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
+    signal_symbols: dict[str, Expression] = {}
+    for name, given in part.signals.items():
+        values[name] = _signal(part, name, given, flat, time, table, signal_symbols)
+    connectors = {
+        name: _local_connector(f"{part.path}.{name}", isinstance(one, Frame), space, graph)
+        for name, one in component.connectors().items()
+    }
+    binding = Binding(
+        values=values,
+        motions={name: local_motion(symbols, space) for name, symbols in connectors.items()},
+        time=time,
+        space=space.name,
+        line=space.line,
+        sides={(a, b): sign for (path, a, b), sign in sides.items() if path == part.path},
+    )
+    bound = bind(component, binding)
+    mode = modes.get(part.path, component.modes[0] if component.modes else "")
+
+    def laws(kind: Any) -> list[Law]:
+        return [law for law in component.laws(kind) if law.holds_in(space.name) and law.acts_in(mode)]
+
+    def scalar_laws(kind: Any) -> tuple[Expression, ...]:
+        return tuple(graph.convert(_call(part, law, getattr(bound, law.name))) for law in laws(kind))
+
+    inertias = [one for law in laws("inertia") for one in _call(part, law, lambda m=law.name: list(getattr(bound, m)()))]
+    return LocalPart(
+        part=part,
+        binding=binding,
+        connectors=connectors,
+        joints=tuple(_local_joint(part, law, bound, graph) for law in laws("joint")),
+        point_inertias=tuple(one for one in inertias if isinstance(one, PointInertia)),
+        body_inertias=tuple(one for one in inertias if isinstance(one, BodyInertia)),
+        potentials=scalar_laws("potential"),
+        dissipations=scalar_laws("dissipation"),
+        loads=tuple(
+            one for law in laws("force") for one in _call(part, law, lambda m=law.name: list(getattr(bound, m)()))
+        ),
+        constraints=tuple(one for law in laws("constraint") for one in _local_constraints(part, law, bound, graph)),
+        signal_symbols=signal_symbols,
+    )
+
+
+def _parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
+    value, name = part.values[spec.name], f"{part.path}.{spec.name}"
+    if value is None or spec.integer or spec.choices:
+        return value
+    if spec.size is None:
+        return table.scalar(name, value, spec.structural)
+    axes = "xyz" if spec.size == 3 else [str(i) for i in range(spec.size)]
+    made = [table.scalar(f"{name}.{axis}", one, spec.structural) for axis, one in zip(axes, value, strict=True)]
+    return Vector(*made) if spec.size == 3 else tuple(made)
+
+
+def _signal(
+    part: Part,
+    name: str,
+    given: Any,
+    flat: FlatScene,
+    time: Expression,
+    table: ParameterTable,
+    signal_symbols: dict[str, Expression],
+) -> Scalar:
+    path = f"{part.path}.{name}"
+    if (part.path, name) in flat.links:
+        signal_symbols[name] = table.graph.symbol(f"{path}()")
+        return signal_symbols[name]
+    if not callable(given):
+        return table.scalar(path, given)
+    try:
+        return table.graph.convert(given(time))
+    except (TypeError, AtwoodError) as error:
+        raise DeclarationError(
+            f"this function of time cannot be evaluated on an expression ({error})",
+            where=path,
+            advice="Write it in plain arithmetic with Atwood's own functions (atwood.sin, atwood.select, ...).",
+        ) from error
+
+
+def _local_connector(path: str, is_frame: bool, space: Space, graph: Graph) -> LocalConnector:
+    turns = is_frame and space.has_rotation
+    return LocalConnector(
+        position=tuple(graph.symbol(f"{path}.position.{axis}") for axis in space.axis_names),
+        velocity=tuple(graph.symbol(f"{path}.velocity.{axis}") for axis in space.axis_names),
+        angle=graph.symbol(f"{path}.angle") if turns else None,
+        angular_speed=graph.symbol(f"{path}.angular_speed") if turns else None,
+    )
+
+
+def local_motion(symbols: LocalConnector, space: Space) -> Motion:
+    """Return the motion of a connector in terms of its symbols; the plane's rotation is about -y."""
+    turns = symbols.angle is not None
+    return Motion(
+        position=space.vector(symbols.position),
+        velocity=space.vector(symbols.velocity),
+        axes=planar_axes(symbols.angle) if turns else FIXED_AXES,
+        angle=symbols.angle if turns else 0.0,
+        angular_velocity=Vector(0.0, -symbols.angular_speed, 0.0)  # type: ignore[operator]
+        if turns
+        else Vector(0.0, 0.0, 0.0),
+    )
+
+
+def _local_joint(part: Part, law: Law, bound: Any, graph: Graph) -> LocalJoint:
+    coordinates = tuple(graph.symbol(f"{part.path}.{name}") for name in law.options.coordinates)
+    placement = _call(part, law, lambda: getattr(bound, law.name)(*coordinates))
+    if not isinstance(placement, Placement):
+        raise DeclarationError("a joint must return a Placement", where=f"{part.path}.{law.name}")
+    return LocalJoint(law, coordinates, placement)
+
+
+def _local_constraints(part: Part, law: Law, bound: Any, graph: Graph) -> Iterable[LocalConstraint]:
+    values = scalars(_call(part, law, getattr(bound, law.name)))
+    names = law.options.reactions
+    if len(names) == 1 and len(values) == 3:
+        names = tuple(f"{names[0]}.{axis}" for axis in "xyz")
+    if len(names) != len(values):
+        raise DeclarationError(
+            f"it returns {len(values)} scalars and names {len(names)} reactions", where=f"{part.path}.{law.name}"
+        )
+    for index, (value, name) in enumerate(zip(values, names, strict=True)):
+        yield LocalConstraint(law, index, graph.convert(value), name, law.options.sign)
+
+
+def _call(part: Part, law: Law, function: Callable[[], Any]) -> Any:
+    try:
+        return function()
+    except AtwoodError as error:
+        if error.where.startswith(part.path):
+            raise
+        raise type(error)(error.message, where=f"{part.path}.{law.name}", advice=error.advice) from error
+    except (TypeError, ValueError, ArithmeticError, AttributeError) as error:
+        raise DeclarationError(
+            f"the law cannot be evaluated ({type(error).__name__}: {error})",
+            where=f"{part.path}.{law.name}",
+            advice="A law is plain arithmetic with Atwood's functions, on self's parameters and connectors.",
+        ) from error

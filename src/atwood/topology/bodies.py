@@ -1,0 +1,195 @@
+"""Bodies: nodes that are rigidly joined, and which of them need an orientation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from atwood.expr import Expression, Scalar, depends_on
+from atwood.model.local import LocalConstraint, LocalPart
+from atwood.topology.graph import WORLD, Joint, MechanismGraph
+
+__all__ = ["Bodies", "Body", "RigidStep", "find_bodies", "is_zero"]
+
+
+@dataclass(frozen=True)
+class RigidStep:
+    """A rigid joint walked from one node of a body to another; backwards from b to a."""
+
+    joint: Joint
+    parent: int
+    child: int
+    backwards: bool
+
+
+@dataclass(frozen=True)
+class Body:
+    """Nodes that move as one.
+
+    Attributes
+    ----------
+    index
+        Its number; 0 is what is fixed in the world.
+    name
+        Path of its leading part, or of its first connector.
+    root
+        The node that its own axes belong to.
+    nodes
+        All its nodes.
+    steps
+        How every node is reached from the root through rigid joints.
+    """
+
+    index: int
+    name: str
+    root: int
+    nodes: tuple[int, ...]
+    steps: tuple[RigidStep, ...]
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it is part of the world."""
+        return self.index == 0
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """All bodies of a scene.
+
+    Attributes
+    ----------
+    bodies
+        By index; the first is fixed in the world.
+    body_of
+        Body of each node.
+    closures
+        Rigid joints between nodes of one body that are already rigidly joined.
+    oriented
+        Bodies whose orientation something depends on.
+    idle
+        Constraints, as (part, law, number), that only say how a body without need of an orientation is turned.
+    """
+
+    bodies: tuple[Body, ...]
+    body_of: Mapping[int, int]
+    closures: tuple[Joint, ...]
+    oriented: frozenset[int]
+    idle: frozenset[tuple[str, str, int]]
+
+
+def is_zero(value: Scalar) -> bool:
+    """Return whether a number or expression is zero by structure."""
+    return value.is_zero if isinstance(value, Expression) else value == 0.0
+
+
+def find_bodies(graph: MechanismGraph, locals_: Mapping[str, LocalPart]) -> Bodies:
+    """Merge what is rigidly joined, and find out which bodies need an orientation."""
+    rigid: dict[int, list[RigidStep]] = {node.index: [] for node in graph.nodes}
+    for joint in graph.joints:
+        if joint.is_rigid:
+            rigid[joint.a].append(RigidStep(joint, joint.a, joint.b, False))
+            rigid[joint.b].append(RigidStep(joint, joint.b, joint.a, True))
+    bodies: list[Body] = []
+    body_of: dict[int, int] = {}
+    used: set[int] = set()
+    for node in graph.nodes:
+        if node.index in body_of:
+            continue
+        steps: list[RigidStep] = []
+        members = [node.index]
+        body_of[node.index] = len(bodies)
+        for current in members:  # grows while it is walked
+            for step in rigid[current]:
+                if step.child not in body_of:
+                    body_of[step.child] = len(bodies)
+                    members.append(step.child)
+                    steps.append(step)
+                    used.add(id(step.joint))
+        name = "world" if node.index == WORLD else _lead(members, graph, locals_)
+        bodies.append(Body(len(bodies), name, node.index, tuple(members), tuple(steps)))
+    closures = tuple(joint for joint in graph.joints if joint.is_rigid and id(joint) not in used)
+    oriented, idle = _orientations(bodies, body_of, graph, locals_)
+    return Bodies(tuple(bodies), body_of, closures, oriented, idle)
+
+
+def _lead(members: list[int], graph: MechanismGraph, locals_: Mapping[str, LocalPart]) -> str:
+    """Return the name of a body: its first rigid body, else its first mass, else its first connector."""
+    paths = list(dict.fromkeys(path for index in members for path, _ in graph.nodes[index].members))
+    for path in paths:
+        if locals_[path].body_inertias:
+            return path
+    single = [path for path in paths if any(len(one.points) == 1 for one in locals_[path].point_inertias)]
+    for path in single:
+        if not all(is_zero(one.masses[0][0]) for one in locals_[path].point_inertias):
+            return path
+    return single[0] if single else graph.nodes[members[0]].name
+
+
+def _orientations(
+    bodies: list[Body], body_of: Mapping[int, int], graph: MechanismGraph, locals_: Mapping[str, LocalPart]
+) -> tuple[frozenset[int], frozenset[tuple[str, str, int]]]:
+    needed: set[int] = set()
+    locks: list[tuple[tuple[str, str, int], set[int]]] = []
+    for path, local in locals_.items():
+        def body(name: str, path: str = path) -> int:
+            return body_of[graph.node_of[(path, name)]]
+
+        for one in local.body_inertias:
+            if not (is_zero(one.moment) and all(is_zero(c) for c in one.center_of_mass)):
+                needed.add(body(one.frame.name))
+        plain: list[Scalar] = [*local.potentials, *local.dissipations]
+        for load in local.loads:
+            plain += list(load.force)
+            if any(not is_zero(c) for c in load.torque):
+                needed.add(body(load.at.name))
+        for name in _angles_read(local, plain):
+            needed.add(body(name))
+        for constraint in local.constraints:
+            turned = {body(name) for name in _angles_read(local, [constraint.value])} - {0}
+            if reads_position(local, constraint):
+                needed |= turned
+            else:
+                locks.append(((path, constraint.law.name, constraint.index), turned))
+    for one_body in bodies:
+        if any(not all(is_zero(c) for c in step.joint.local.placement.displacement) for step in one_body.steps):
+            needed.add(one_body.index)
+    return _peel(needed, locks)
+
+
+def _peel(
+    needed: set[int], locks: list[tuple[tuple[str, str, int], set[int]]]
+) -> tuple[frozenset[int], frozenset[tuple[str, str, int]]]:
+    """Drop, one after another, locks at whose end hangs a body that needs no orientation."""
+    left = [(key, turned) for key, turned in locks if turned]
+    idle: set[tuple[str, str, int]] = set()
+    while True:
+        counts: dict[int, int] = {}
+        for _, turned in left:
+            for body in turned:
+                counts[body] = counts.get(body, 0) + 1
+        loose = [
+            (key, turned) for key, turned in left if any(body not in needed and counts[body] == 1 for body in turned)
+        ]
+        if not loose:
+            break
+        idle.add(loose[0][0])
+        left.remove(loose[0])
+    for _, turned in left:
+        needed |= turned
+    return frozenset(needed - {0}), frozenset(idle)
+
+
+def _angles_read(local: LocalPart, values: list[Scalar]) -> list[str]:
+    found = []
+    for name, symbols in local.connectors.items():
+        if symbols.angle is None or symbols.angular_speed is None:
+            continue
+        wanted = [symbols.angle, symbols.angular_speed]
+        if any(isinstance(value, Expression) and depends_on(value, wanted) for value in values):
+            found.append(name)
+    return found
+
+
+def reads_position(local: LocalPart, constraint: LocalConstraint) -> bool:
+    """Return whether a constraint depends on a position, and not on orientations alone."""
+    return any(depends_on(constraint.value, list(symbols.position)) for symbols in local.connectors.values())

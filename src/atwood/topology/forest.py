@@ -1,0 +1,313 @@
+"""The forest: how positions and orientations are computed, one body after another.
+
+In the reduced form, bodies hang on joints wherever these save coordinates; the joints that are left over close the
+loops. In the dae form every body is on its own, and every joint is a constraint. Nobody chooses where a loop is cut:
+bodies are attached greedily, the cheapest way first, and a body waits while a cheaper way to attach it may turn up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import networkx as nx
+
+from atwood.errors import DeclarationError
+from atwood.model.local import LocalPart
+from atwood.model.space import Space
+from atwood.topology.bodies import Bodies, reads_position
+from atwood.topology.graph import Joint, MechanismGraph
+
+__all__ = ["Attachment", "Coordinate", "Forest", "OrientationStep", "grow_forest"]
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A coordinate of the mechanism.
+
+    Attributes
+    ----------
+    name
+        Its path, such as ``rod1.angle``.
+    unit
+        ``"m"`` or ``"rad"``.
+    """
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """How a body gets its position.
+
+    Attributes
+    ----------
+    body
+        The body.
+    joint
+        The joint it hangs on; None if it is free, with coordinates of its own.
+    node
+        The node of the body that the joint, or the coordinates, place.
+    parent
+        The node on the other side of the joint.
+    backwards
+        Whether the joint is walked from b to a.
+    coordinates
+        Numbers of the coordinates that are used, in the forest's list.
+    """
+
+    body: int
+    joint: Joint | None
+    node: int
+    parent: int
+    backwards: bool
+    coordinates: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class OrientationStep:
+    """How a body gets its orientation: from a coordinate, or from another body through a joint that locks.
+
+    Attributes
+    ----------
+    body
+        The body.
+    coordinate
+        Number of the coordinate; None if it is locked to another body.
+    joint
+        The joint that locks it.
+    parent
+        The other body.
+    """
+
+    body: int
+    coordinate: int | None
+    joint: Joint | None = None
+    parent: int = 0
+
+
+@dataclass(frozen=True)
+class Forest:
+    """How the configuration is computed.
+
+    Attributes
+    ----------
+    form
+        ``"reduced"`` or ``"dae"``.
+    coordinates
+        The coordinates, in the order in which they are met.
+    attachments
+        The bodies, in an order in which they can be placed.
+    orientations
+        The bodies that have an orientation, in an order in which it can be computed.
+    solved
+        Constraints, as (part, law, number), that hold whatever the coordinates are.
+    loops
+        How many independent loops the joints make.
+    cuts
+        Joints that no body hangs on.
+    """
+
+    form: Literal["reduced", "dae"]
+    coordinates: tuple[Coordinate, ...]
+    attachments: tuple[Attachment, ...]
+    orientations: tuple[OrientationStep, ...]
+    solved: frozenset[tuple[str, str, int]]
+    loops: int
+    cuts: tuple[Joint, ...]
+
+
+def grow_forest(
+    form: Literal["reduced", "dae"],
+    graph: MechanismGraph,
+    bodies: Bodies,
+    locals_: Mapping[str, LocalPart],
+    space: Space,
+) -> Forest:
+    """Decide how every body is placed and turned.
+
+    Parameters
+    ----------
+    form
+        Whether joints place bodies (reduced) or stay constraints (dae).
+    graph, bodies, locals_, space
+        The mechanism.
+    """
+    grower = _Grower(graph, bodies, locals_, space)
+    joints = [joint for joint in graph.joints if not joint.is_rigid and _between(joint, bodies)]
+    if form == "reduced":
+        grower.attach_by_joints(joints)
+    grower.attach_free()
+    locked = grower.turn(joints, use_locks=form == "reduced")
+    solved = set(bodies.idle)
+    hung = {id(one.joint) for one in grower.attachments if one.joint is not None}
+    for joint in joints:
+        local = locals_[joint.part]
+        for constraint in local.constraints:
+            if constraint.law.name not in joint.local.law.options.solves:
+                continue
+            by_position = reads_position(local, constraint)
+            if (id(joint) in hung if by_position else id(joint) in locked):
+                solved.add((joint.part, constraint.law.name, constraint.index))
+    cycles: nx.MultiGraph[int] = nx.MultiGraph()
+    cycles.add_nodes_from(range(len(bodies.bodies)))
+    cycles.add_edges_from((bodies.body_of[j.a], bodies.body_of[j.b]) for j in joints)
+    loops = cycles.number_of_edges() - cycles.number_of_nodes() + nx.number_connected_components(cycles)
+    cuts = tuple(joint for joint in joints if id(joint) not in hung) if form == "reduced" else ()
+    return Forest(
+        form,
+        tuple(grower.coordinates),
+        tuple(grower.attachments),
+        tuple(grower.orientations),
+        frozenset(solved),
+        loops,
+        cuts,
+    )
+
+
+def _between(joint: Joint, bodies: Bodies) -> bool:
+    return bodies.body_of[joint.a] != bodies.body_of[joint.b]
+
+
+class _Grower:
+    """Collects attachments, orientations and coordinates while a forest grows."""
+
+    def __init__(
+        self, graph: MechanismGraph, bodies: Bodies, locals_: Mapping[str, LocalPart], space: Space
+    ) -> None:
+        self.graph, self.bodies, self.locals, self.space = graph, bodies, locals_, space
+        self.coordinates: list[Coordinate] = []
+        self.attachments: list[Attachment] = []
+        self.orientations: list[OrientationStep] = []
+        self.placed: dict[int, int] = {0: 0}  # body -> depth
+
+    def attach_by_joints(self, joints: list[Joint]) -> None:
+        """Hang bodies on joints, the cheapest way first."""
+        at: dict[int, list[tuple[Joint, bool]]] = {}
+        for joint in joints:
+            at.setdefault(self.bodies.body_of[joint.a], []).append((joint, False))
+            at.setdefault(self.bodies.body_of[joint.b], []).append((joint, True))
+        dimension = len(self.space.basis)
+        cheapest = {body: min(len(j.moves) for j, _ in around) for body, around in at.items()}
+        frontier = [entry for entry in at.get(0, [])]
+        waiting = [body.index for body in self.bodies.bodies if not body.is_fixed]
+        while True:
+            best: tuple[tuple[int, int, int], Joint, bool] | None = None
+            open_ends = []
+            for order, (joint, backwards) in enumerate(frontier):
+                parent, child = self._ends(joint, backwards)
+                if child in self.placed or not self._usable(joint):
+                    continue
+                open_ends.append((joint, backwards))
+                cost = len(joint.moves)
+                key = (cost - cheapest[child], self.placed[parent], order)
+                if cost <= dimension and (best is None or key < best[0]):
+                    best = (key, joint, backwards)
+            frontier = open_ends
+            if best is not None:
+                self._hang(best[1], best[2])
+                frontier += at[self._ends(best[1], best[2])[1]]
+                continue
+            rest = [body for body in waiting if body not in self.placed and body in at]
+            if not rest:
+                return
+            self._free(rest[0])
+            frontier += at[rest[0]]
+
+    def _ends(self, joint: Joint, backwards: bool) -> tuple[int, int]:
+        a, b = self.bodies.body_of[joint.a], self.bodies.body_of[joint.b]
+        return (b, a) if backwards else (a, b)
+
+    def _usable(self, joint: Joint) -> bool:
+        """Return whether a displacement in the axes of a can be computed."""
+        if joint.local.placement.axes == "world" or not self.space.has_rotation:
+            return True
+        body = self.bodies.body_of[joint.a]
+        return body == 0 or body in self.bodies.oriented
+
+    def _hang(self, joint: Joint, backwards: bool) -> None:
+        parent, child = self._ends(joint, backwards)
+        numbers = []
+        for symbol in joint.moves:
+            if symbol in joint.turns:
+                continue
+            unit = _unit_of(self.locals[joint.part], symbol.name)
+            numbers.append(len(self.coordinates))
+            self.coordinates.append(Coordinate(symbol.name, unit))
+        node, other = (joint.a, joint.b) if backwards else (joint.b, joint.a)
+        self.attachments.append(Attachment(child, joint, node, other, backwards, tuple(numbers)))
+        self.placed[child] = self.placed[parent] + 1
+
+    def attach_free(self) -> None:
+        """Give every body that is left coordinates of its own."""
+        for body in self.bodies.bodies:
+            if body.index not in self.placed:
+                self._free(body.index)
+
+    def _free(self, index: int) -> None:
+        body = self.bodies.bodies[index]
+        numbers = []
+        for axis in self._axis_labels():
+            numbers.append(len(self.coordinates))
+            self.coordinates.append(Coordinate(f"{body.name}.position.{axis}", "m"))
+        self.attachments.append(Attachment(index, None, body.root, 0, False, tuple(numbers)))
+        self.placed[index] = 1
+
+    def _axis_labels(self) -> tuple[str, ...]:
+        if self.space.name == "line" and len(self.space.reported_axes) == 1:
+            return ("xyz"[self.space.reported_axes[0]],)
+        return self.space.axis_names
+
+    def turn(self, joints: list[Joint], use_locks: bool) -> set[int]:
+        """Give orientations to the bodies that need one; return which joints' locks hold by construction."""
+        if not self.space.has_rotation:
+            return {id(joint) for joint in joints if joint.locks}
+        known = {0}
+        locked: set[int] = set()
+        lock_joints = [joint for joint in joints if joint.locks]
+
+        def spread(wanted: frozenset[int] | None) -> None:
+            progress = True
+            while progress:
+                progress = False
+                for joint in lock_joints:
+                    a, b = self.bodies.body_of[joint.a], self.bodies.body_of[joint.b]
+                    if (a in known) == (b in known):
+                        continue
+                    child, parent = (b, a) if a in known else (a, b)
+                    if wanted is not None and child not in wanted:
+                        continue
+                    known.add(child)
+                    locked.add(id(joint))
+                    self.orientations.append(OrientationStep(child, None, joint, parent))
+                    progress = True
+
+        oriented = self.bodies.oriented
+        if use_locks:
+            spread(oriented)
+        for index in self._order_of_angles():
+            if index in oriented and index not in known:
+                self.orientations.append(OrientationStep(index, len(self.coordinates)))
+                self.coordinates.append(Coordinate(f"{self.bodies.bodies[index].name}.angle", "rad"))
+                known.add(index)
+                if use_locks:
+                    spread(oriented)
+        # Bodies that need no orientation still have one for those who ask, where a lock tells it.
+        spread(None)
+        return locked
+
+    def _order_of_angles(self) -> list[int]:
+        return [one.body for one in self.attachments]
+
+
+def _unit_of(local: LocalPart, path: str) -> str:
+    """Return the unit of a joint coordinate: it is an observable of its part."""
+    name = path.rpartition(".")[2]
+    for law in local.part.component.laws("observable"):
+        if law.name == name:
+            return str(law.options.unit)
+    raise DeclarationError(
+        f"the joint coordinate {name!r} is not an observable of the part", where=local.part.path
+    )

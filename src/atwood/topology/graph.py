@@ -1,0 +1,179 @@
+"""The graph of what the user said: nodes where connectors meet, and joints between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import networkx as nx
+
+from atwood.errors import ConnectError, DeclarationError, suggestion
+from atwood.expr import Expression, depends_on
+from atwood.model.connectors import Frame
+from atwood.model.flatten import FlatScene
+from atwood.model.local import LocalJoint, LocalPart
+
+__all__ = ["WORLD", "Joint", "MechanismGraph", "Node", "build_graph"]
+
+WORLD = 0
+"""Index of the node that is the world itself."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """Connectors that meet: they share a position and, the frames among them, an orientation.
+
+    Attributes
+    ----------
+    index
+        Its number; 0 is the world.
+    name
+        Path of its first connector.
+    members
+        Its connectors as (part path, connector name).
+    has_frame
+        Whether one of them is a frame.
+    """
+
+    index: int
+    name: str
+    members: tuple[tuple[str, str], ...]
+    has_frame: bool
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint law between two nodes.
+
+    Attributes
+    ----------
+    part
+        Path of the part that declares it.
+    a, b
+        The nodes it joins.
+    local
+        The law on local symbols.
+    moves
+        Its coordinates that shift b against a.
+    turns
+        Its coordinates that turn b against a.
+    """
+
+    part: str
+    a: int
+    b: int
+    local: LocalJoint
+    moves: tuple[Expression, ...]
+    turns: tuple[Expression, ...]
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether both nodes belong to one body."""
+        return bool(self.local.law.options.rigid)
+
+    @property
+    def locks(self) -> bool:
+        """Whether it prescribes the rotation of b against a, as a constant or a function of time."""
+        return self.local.placement.rotation is not None and not self.turns
+
+    @property
+    def label(self) -> str:
+        """The path of the joint law, for messages."""
+        return f"{self.part}.{self.local.law.name}"
+
+
+@dataclass(frozen=True)
+class MechanismGraph:
+    """The scene as the user said it.
+
+    Attributes
+    ----------
+    nodes
+        By index; the first is the world.
+    node_of
+        Node of each connector (part path, connector name).
+    joints
+        All joint laws.
+    network
+        The same as a networkx multigraph: nodes by index, an edge with its ``joint`` for each joint.
+    """
+
+    nodes: tuple[Node, ...]
+    node_of: Mapping[tuple[str, str], int]
+    joints: tuple[Joint, ...]
+    network: nx.MultiGraph[int]
+
+
+def build_graph(flat: FlatScene, locals_: Mapping[str, LocalPart]) -> MechanismGraph:
+    """Return who meets whom.
+
+    Parameters
+    ----------
+    flat
+        The scene as leaves and connections.
+    locals_
+        What each part contributes, on local symbols.
+
+    Raises
+    ------
+    ConnectError
+        If a connection names a connector that does not exist.
+    """
+    nodes, node_of = _nodes(flat)
+    joints = tuple(
+        _joint(path, local, joint, node_of) for path, local in locals_.items() for joint in local.joints
+    )
+    network: nx.MultiGraph[int] = nx.MultiGraph()
+    network.add_nodes_from((node.index, {"name": node.name}) for node in nodes)
+    network.add_edges_from((joint.a, joint.b, {"joint": joint}) for joint in joints)
+    return MechanismGraph(nodes, node_of, joints, network)
+
+
+def _nodes(flat: FlatScene) -> tuple[tuple[Node, ...], dict[tuple[str, str], int]]:
+    owners: dict[str, tuple[str, str]] = {}
+    frames: set[str] = set()
+    meeting: nx.Graph[str] = nx.Graph()
+    for path, part in flat.parts.items():
+        for name, one in part.component.connectors().items():
+            full = f"{path}.{name}"
+            owners[full] = (path, name)
+            meeting.add_node(full)
+            if isinstance(one, Frame):
+                frames.add(full)
+    for a, b in flat.connections:
+        for end in (a, b):
+            # A connector of a nested model is no leaf's: it only passes the connection on.
+            if end not in owners and end.rpartition(".")[0] in flat.parts:
+                raise ConnectError("there is no such connector", where=end, advice=suggestion(end, owners))
+        meeting.add_edge(a, b)
+    nodes = [Node(WORLD, "world", (), True)]
+    node_of: dict[tuple[str, str], int] = {}
+    order = {name: i for i, name in enumerate(owners)}
+    groups = [[name for name in group if name in owners] for group in nx.connected_components(meeting)]
+    for group in sorted((sorted(g, key=order.__getitem__) for g in groups if g), key=lambda g: order[g[0]]):
+        node = Node(len(nodes), group[0], tuple(owners[name] for name in group), any(n in frames for n in group))
+        nodes.append(node)
+        node_of.update({owners[name]: node.index for name in group})
+    return tuple(nodes), node_of
+
+
+def _joint(path: str, local: LocalPart, joint: LocalJoint, node_of: Mapping[tuple[str, str], int]) -> Joint:
+    options, placement = joint.law.options, joint.placement
+    ends = []
+    for name in (options.a, options.b):
+        if name != "world" and (path, name) not in node_of:
+            raise DeclarationError(
+                f"the joint names a connector {name!r} that does not exist", where=f"{path}.{joint.law.name}"
+            )
+        ends.append(WORLD if name == "world" else node_of[(path, name)])
+    if ends[0] == ends[1]:
+        raise ConnectError(
+            f"its connectors {options.a!r} and {options.b!r} are joined to each other",
+            where=path,
+            advice="Connect them to different parts.",
+        )
+    shifts = list(placement.displacement)
+    moves = tuple(q for q in joint.coordinates if any(isinstance(s, Expression) and depends_on(s, [q]) for s in shifts))
+    rotation = placement.rotation
+    turns = tuple(q for q in joint.coordinates if isinstance(rotation, Expression) and depends_on(rotation, [q]))
+    return Joint(path, ends[0], ends[1], joint, moves, turns)
