@@ -31,12 +31,14 @@ def add(a: Expression, b: Expression) -> Expression:
         if b.operation == "constant":
             return graph.constant(a.payload + b.payload)
         return _shift(a.payload, b)
-    if b.operation == "neg":
-        if a.operation == "neg":
-            return negate(add(a.arguments[0], b.arguments[0]))
-        return subtract(a, b.arguments[0])
-    if a.operation == "neg":
-        return subtract(b, a.arguments[0])
+    if a.operation == "neg" and b.operation == "neg":
+        return negate(add(a.arguments[0], b.arguments[0]))
+    opposite = _opposite(b)
+    if opposite is not None:
+        return subtract(a, opposite)
+    opposite = _opposite(a)
+    if opposite is not None:
+        return subtract(b, opposite)
     merged = _merge(a, b, 1.0)
     if merged is not None:
         return merged
@@ -52,9 +54,13 @@ def subtract(a: Expression, b: Expression) -> Expression:
         return graph.zero
     if a.operation == "constant":
         return _shift_minus(a.payload, b)
-    if b.operation == "neg":
-        return add(a, b.arguments[0])
+    opposite = _opposite(b)
+    if opposite is not None:
+        return add(a, opposite)
     if a.operation == "neg":
+        opposite = negate(b)
+        if opposite.operation != "neg":
+            return subtract(opposite, a.arguments[0])
         return negate(add(a.arguments[0], b))
     merged = _merge(a, b, -1.0)
     return graph.node("sub", (a, b)) if merged is None else merged

@@ -290,11 +290,10 @@ def _solve_samples(size: int, entries: Sequence[Any], right: Sequence[Any]) -> S
 
 _LIMITS = {"inf": math.inf, "nan": math.nan}
 _MATH = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "atan2", "pow")
-_NUMPY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power"} | {
-    name: name
-    for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "sinh", "cosh", "tanh", "absolute", "sign", "where")
-    + ("logical_and", "logical_or", "logical_not")
-}
+_SAME_IN_NUMPY = ("sqrt", "sin", "cos", "tan", "exp", "log", "sinh", "cosh", "tanh", "absolute", "sign", "where")
+_LOGICAL = ("logical_and", "logical_or", "logical_not")
+_NUMPY = {name: name for name in (*_SAME_IN_NUMPY, *_LOGICAL)}
+_NUMPY |= {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power"}
 _NAMESPACES: dict[Flavour, dict[str, Any]] = {
     "fast": _LIMITS
     | {name: getattr(math, name) for name in _MATH}
