@@ -9,6 +9,7 @@ from atwood.expr.analysis import (
     live,
     substitute,
 )
+from atwood.expr.collect import collect
 from atwood.expr.derivatives import SparseMatrix, jacobian, jvp, vjp
 from atwood.expr.functions import (
     Scalar,
@@ -54,6 +55,7 @@ __all__ = [
     "asin",
     "atan",
     "atan2",
+    "collect",
     "cos",
     "cosh",
     "count_operations",

@@ -94,6 +94,8 @@ def _candidates(
         expansion = expand(rows, angles, parameters, limit)
     except TooLargeError:
         return
+    if sum(map(len, expansion.rows)) > 2 * lowest:
+        return
     for normal_form in _normal_forms(expansion, limit):
         terms = sum(len(polynomial) for polynomial in normal_form)
         if terms > 10 * limit or terms - len(rows) >= lowest:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from heapq import heappop, heappush
 from typing import TypeAlias
 
 from atwood.expr import algebra
@@ -137,19 +138,23 @@ def share_products(emitter: Emitter, rows: Sequence[Sequence[Term]]) -> list[lis
     terms = [list(term.factors) for row in rows for term in row]
     where: dict[tuple[Factor, Factor], set[int]] = {}
 
+    queue: list[tuple[int, tuple[Factor, Factor]]] = []
+
     def record(position: int, present: bool) -> None:
         for pair in _pairs(terms[position]):
             if present:
                 where.setdefault(pair, set()).add(position)
             else:
                 where[pair].discard(position)
+            if len(where[pair]) > 1:
+                heappush(queue, (-len(where[pair]), pair))
 
     for position in range(len(terms)):
         record(position, True)
-    while True:
-        best = min(where, key=lambda pair: (-len(where[pair]), pair), default=None)
-        if best is None or len(where[best]) < 2:
-            break
+    while queue:
+        count, best = heappop(queue)
+        if len(where[best]) != -count:
+            continue  # an entry from before the count changed
         product = emitter.factor(_PRODUCT, _product(emitter, best))
         for position in sorted(where[best]):
             record(position, False)
