@@ -29,11 +29,14 @@ class Forces:
         Force components by node, N.
     on_bodies
         Torque by body, counter-clockwise, N m.
+    at_nodes
+        The same torques by the node at which they act.
     """
 
     graph: Graph
     on_nodes: dict[int, list[Expression]] = field(default_factory=dict)
     on_bodies: dict[int, Expression] = field(default_factory=dict)
+    at_nodes: dict[int, Expression] = field(default_factory=dict)
 
     def push(self, node: int, components: Sequence[Scalar]) -> None:
         """Add a force on a node."""
@@ -41,10 +44,12 @@ class Forces:
         new = [self.graph.convert(c) for c in components]
         self.on_nodes[node] = new if held is None else [a + b for a, b in zip(held, new, strict=True)]
 
-    def twist(self, body: int, torque: Scalar) -> None:
-        """Add a torque on a body."""
+    def twist(self, body: int, torque: Scalar, node: int | None = None) -> None:
+        """Add a torque on a body, at a node of it."""
         new = self.graph.convert(torque)
         self.on_bodies[body] = self.on_bodies[body] + new if body in self.on_bodies else new
+        if node is not None:
+            self.at_nodes[node] = self.at_nodes[node] + new if node in self.at_nodes else new
 
 
 @dataclass(frozen=True)
@@ -103,7 +108,7 @@ def part_forces(site: Site, local: LocalPart, mapping: Mapping[Expression, Expre
             body = site.body(path, load.at.name)
             if site.space.has_rotation and body not in site.bodies.oriented and body != 0:
                 raise TopologyError("it puts a torque on something that cannot turn", where=path)
-            forces.twist(body, substitute([torque], mapping)[0])
+            forces.twist(body, substitute([torque], mapping)[0], site.node(path, load.at.name))
 
 
 def _add_gradient(
@@ -150,7 +155,7 @@ def _push_mapped(
     if not all(slope.is_zero for slope in slopes):
         forces.push(site.node(path, name), substitute(slopes, mapping))
     if turning is not None and not turning.is_zero:
-        forces.twist(site.body(path, name), substitute([turning], mapping)[0])
+        forces.twist(site.body(path, name), substitute([turning], mapping)[0], site.node(path, name))
 
 
 def constraint_forces(

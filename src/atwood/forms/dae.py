@@ -1,0 +1,75 @@
+"""The dae form: constraints stay, with one Lagrange multiplier each (Lagrange's equations of the first kind)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+from atwood.errors import UsageError, suggestion
+from atwood.expr import Expression, substitute
+from atwood.forms.program import FormProgram, Level, make_form_program, rate_symbols
+from atwood.mechanics.equations import Equations
+
+__all__ = ["LEVELS", "dae_form", "keep_constraints"]
+
+LEVELS: tuple[Level, ...] = ("ggl", "index1", "index1-projected")
+
+
+def dae_form(name: str, equations: Equations, parameters: Collection[Expression], level: str) -> FormProgram:
+    """Return the dae form of a scene at a level.
+
+    ``ggl``, the stabilised index-2 form of Gear, Gupta and Leimkuhler (J. Comput. Appl. Math. 12, 1985), holds
+    position and velocity constraints, with a second set of multipliers that shifts positions onto the constraints.
+    ``index1`` holds the constraints' second derivative and drifts; ``index1-projected`` is the same, with what comes
+    out of it projected.
+
+    Parameters
+    ----------
+    name
+        Named in messages.
+    equations
+        Equations in maximal coordinates.
+    parameters
+        The symbols of parameters.
+    level
+        ``"ggl"``, ``"index1"`` or ``"index1-projected"``.
+
+    Raises
+    ------
+    UsageError
+        If there is no such level.
+    """
+    if level not in LEVELS:
+        raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
+    rates = rate_symbols(equations)
+    n, multipliers = len(rates), equations.multipliers
+    kinematic: list[Expression] = [r - u for r, u in zip(rates, equations.speeds, strict=True)]
+    dynamic = [r - f for r, f in zip(equations.rows, equations.constraint_rows, strict=True)]
+    if not multipliers:
+        return make_form_program(name, "dae", "ggl", equations, parameters, kinematic + dynamic)
+    if level == "ggl":
+        extra = tuple(equations.graph.symbol(f"mu:{m.name}") for m in multipliers)
+        shift = substitute(list(equations.constraint_rows), dict(zip(multipliers, extra, strict=True)))
+        kinematic = [k + s for k, s in zip(kinematic, shift, strict=True)]
+        held = [one.value for one in equations.constraints] + [one.rate for one in equations.constraints]
+    else:
+        extra = ()
+        held = [one.second for one in equations.constraints]
+    chosen: Level = "ggl" if level == "ggl" else ("index1" if level == "index1" else "index1-projected")
+    algebraic = range(2 * n, 2 * n + len(multipliers) + len(extra))
+    return make_form_program(
+        name, "dae", chosen, equations, parameters, kinematic + dynamic + held, multipliers, extra, tuple(algebraic)
+    )
+
+
+def keep_constraints(equations: Equations, kept: Sequence[int]) -> Equations:
+    """Return the equations with some of their constraints only; the multipliers of the others are zero."""
+    chosen = set(kept)
+    gone = {one.multiplier: 0.0 for i, one in enumerate(equations.constraints) if i not in chosen}
+    if not gone:
+        return equations
+    return replace(
+        equations,
+        constraints=tuple(one for i, one in enumerate(equations.constraints) if i in chosen),
+        constraint_rows=tuple(substitute(list(equations.constraint_rows), gone)),
+    )

@@ -1,0 +1,87 @@
+"""The reduced form: generalized coordinates (Lagrange's equations of the second kind).
+
+Loops that could not be eliminated stay as ``g(q) = 0`` with dependent coordinates among the unknowns. The equations
+of motion are projected on the null space of the constraints, in which the dependent speeds follow from the
+independent ones; so there are no multipliers, and the index is 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import networkx as nx
+
+from atwood.expr import Expression, jacobian, solve
+from atwood.forms.program import FormProgram, make_form_program, rate_symbols
+from atwood.mechanics.equations import Equations
+
+__all__ = ["reduced_form"]
+
+
+def reduced_form(
+    name: str,
+    equations: Equations,
+    parameters: Collection[Expression],
+    rows: Sequence[Expression],
+    dependent: Sequence[int] = (),
+) -> FormProgram:
+    """Return the reduced form of a scene.
+
+    Parameters
+    ----------
+    name
+        Named in messages.
+    equations
+        Equations in the coordinates of the forest.
+    parameters
+        The symbols of parameters.
+    rows
+        The equations' rows, perhaps rewritten.
+    dependent
+        With loops: one coordinate for each constraint, chosen so that the constraints can be solved for them.
+    """
+    rates = rate_symbols(equations)
+    n = len(rates)
+    kinematic = [r - u for r, u in zip(rates, equations.speeds, strict=True)]
+    if not equations.constraints:
+        return make_form_program(name, "reduced", "", equations, parameters, [*kinematic, *rows])
+    chosen = sorted(dependent)
+    independent = [i for i in range(n) if i not in set(chosen)]
+    projected = _project(equations, rows, chosen, independent)
+    residual = [
+        *(kinematic[i] for i in independent),
+        *(one.value for one in equations.constraints),
+        *projected,
+        *(one.rate for one in equations.constraints),
+    ]
+    algebraic = [*chosen, *(n + i for i in chosen)]
+    return make_form_program(
+        name, "reduced", "", equations, parameters, residual, algebraic=algebraic, independent=independent
+    )
+
+
+def _project(
+    equations: Equations, rows: Sequence[Expression], dependent: Sequence[int], independent: Sequence[int]
+) -> list[Expression]:
+    """Return ``r_i - G_i^T G_d^-T r_d``, solving separately for loops that share nothing."""
+    slope = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
+    entry = {(r, c): e for r, c, e in zip(slope.rows, slope.columns, slope.entries, strict=True)}
+    sharing: nx.Graph[tuple[str, int]] = nx.Graph()
+    sharing.add_nodes_from(("constraint", r) for r in range(len(equations.constraints)))
+    sharing.add_edges_from((("constraint", r), ("speed", c)) for r, c in entry if c in set(dependent))
+    weights: dict[int, Expression] = {}
+    for group in nx.connected_components(sharing):
+        constraints = sorted(i for kind, i in group if kind == "constraint")
+        speeds = sorted(i for kind, i in group if kind == "speed")
+        zero = equations.graph.constant(0.0)
+        matrix = [[entry.get((r, c), zero) for r in constraints] for c in speeds]
+        found = solve(matrix, [rows[c] for c in speeds])
+        weights.update(zip(constraints, found, strict=True))
+    projected = []
+    for i in independent:
+        total = rows[i]
+        for r, weight in sorted(weights.items()):
+            if (r, i) in entry:
+                total = total - entry[r, i] * weight
+        projected.append(total)
+    return projected

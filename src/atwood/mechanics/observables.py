@@ -1,0 +1,284 @@
+"""What can be read of a scene: every quantity of every component, by its path, as an expression of the state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from atwood.errors import DeclarationError
+from atwood.expr import Expression, Scalar, substitute
+from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.equations import Equations
+from atwood.mechanics.forces import local_map
+from atwood.model.component import Binding, bind
+from atwood.model.connectors import Frame, Motion
+from atwood.model.local import LocalPart
+from atwood.model.space import FIXED_AXES, planar_axes
+from atwood.model.vector import Vector
+
+__all__ = ["Observable", "Reaction", "energies", "list_reactions", "observe"]
+
+
+@dataclass(frozen=True)
+class Observable:
+    """A scalar quantity of a component.
+
+    Attributes
+    ----------
+    path
+        Its dotted path, such as ``rod1.tension``.
+    unit
+        SI unit.
+    doc
+        One line of meaning.
+    periodic
+        Whether it comes out within one turn and must be unwrapped.
+    value
+        The expression, of time, coordinates, speeds, accelerations and reactions.
+    """
+
+    path: str
+    unit: str
+    doc: str
+    periodic: bool
+    value: Expression
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """A reaction that a component reports.
+
+    Attributes
+    ----------
+    path
+        Its dotted path.
+    unit, doc
+        Unit and meaning.
+    symbol
+        What stands for it in the expressions of observables.
+    key
+        The constraint it belongs to, as (part, law, number); for a rigid joint, (part, law, -1).
+    sign
+        It is `sign` times the multiplier of that constraint.
+    axis
+        For a rigid joint: 0, 1, 2 for a force component, 3 for the torque; -1 otherwise.
+    """
+
+    path: str
+    unit: str
+    doc: str
+    symbol: Expression
+    key: tuple[str, str, int]
+    sign: float
+    axis: int = -1
+
+
+def list_reactions(mechanism: Mechanism) -> tuple[Reaction, ...]:
+    """Return every reaction that the components report, in the order of declaration."""
+    graph, found = mechanism.table.graph, []
+    reported = {f".{'xyz'[i]}" for i in mechanism.space.reported_axes}
+    for path, local in mechanism.locals_.items():
+        for law in local.part.component.laws("constraint"):
+            if not law.holds_in(mechanism.space.name):
+                continue
+            options = law.options
+            names = options.reactions
+            present = [c for c in local.constraints if c.law.name == law.name]
+            if len(names) == 1 and len(present) == 3:
+                names = tuple(f"{names[0]}.{axis}" for axis in "xyz")
+            for index, name in enumerate(names):
+                if any(name.endswith(f".{axis}") for axis in "xyz") and name[-2:] not in reported:
+                    continue
+                full = f"{path}.{name}"
+                symbol = graph.symbol(f"reaction:{full}")
+                found.append(Reaction(full, options.unit, options.doc, symbol, (path, law.name, index), options.sign))
+        for joint in local.joints:
+            options = joint.law.options
+            if not (options.rigid and options.reaction_doc):
+                continue
+            for axis in mechanism.space.reported_axes:
+                full, doc = f"{path}.force.{'xyz'[axis]}", f"Force {options.reaction_doc}, in world axes."
+                symbol = graph.symbol(f"reaction:{full}")
+                found.append(Reaction(full, "N", doc, symbol, (path, joint.law.name, -1), 1.0, axis))
+            if mechanism.space.name == "plane":
+                full, doc = f"{path}.torque", f"Torque {options.reaction_doc}, counter-clockwise."
+                symbol = graph.symbol(f"reaction:{full}")
+                found.append(Reaction(full, "N*m", doc, symbol, (path, joint.law.name, -1), 1.0, 3))
+    return tuple(found)
+
+
+def observe(mechanism: Mechanism, equations: Equations, reactions: Sequence[Reaction]) -> dict[str, Observable]:
+    """Return every observable of every component, by path.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    equations
+        Its equations in one form.
+    reactions
+        What `list_reactions` gave.
+    """
+    found: dict[str, Observable] = {}
+    parts = {path: part_energies(mechanism, equations, path) for path in mechanism.locals_}
+    signals = resolve_signals(mechanism, equations.site, equations.kinematics)
+    for path, local in mechanism.locals_.items():
+        own = {r.path[len(path) + 1 :]: r.symbol for r in reactions if r.key[0] == path}
+        bound = bind(local.part.component, _binding(mechanism, equations, local, own, parts, signals))
+        for law in local.part.component.laws("observable"):
+            if not law.holds_in(mechanism.space.name):
+                continue
+            try:
+                value = getattr(bound, law.name)()
+            except DeclarationError:
+                continue  # it asks for an orientation that nothing determines
+            options = law.options
+            _take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic)
+        kinetic, potential = parts[path]
+        if not kinetic.is_zero or local.part.component.laws("inertia"):
+            _take(mechanism, found, f"{path}.kinetic_energy", kinetic, "J", "Kinetic energy.", False)
+        if not potential.is_zero or local.potentials:
+            _take(mechanism, found, f"{path}.potential_energy", potential, "J", "Potential energy.", False)
+    for reaction in reactions:
+        found[reaction.path] = Observable(reaction.path, reaction.unit, reaction.doc, False, reaction.symbol)
+    return found
+
+
+def _take(
+    mechanism: Mechanism, found: dict[str, Observable], path: str, value: Scalar | Vector, unit: str, doc: str, periodic: bool
+) -> None:
+    graph = mechanism.table.graph
+    if isinstance(value, Vector):
+        for axis in mechanism.space.reported_axes:
+            name = f"{path}.{'xyz'[axis]}"
+            found[name] = Observable(name, unit, doc, periodic, graph.convert(value[axis]))
+    else:
+        expression = graph.convert(value)
+        # A joint coordinate needs no unwrapping: it counts its turns by itself.
+        found[path] = Observable(path, unit, doc, periodic and not expression.is_symbol, expression)
+
+
+def bindings_of(
+    mechanism: Mechanism,
+    equations: Equations,
+    local: LocalPart,
+    reactions: Sequence[Reaction],
+    signals: Mapping[Expression, Expression],
+) -> Binding:
+    """Return what the laws of a part read when they may read everything, energies around it excepted."""
+    path = local.part.path
+    own = {r.path[len(path) + 1 :]: r.symbol for r in reactions if r.key[0] == path}
+    return _binding(mechanism, equations, local, own, {}, signals)
+
+
+def _binding(
+    mechanism: Mechanism,
+    equations: Equations,
+    local: LocalPart,
+    reactions: Mapping[str, Expression],
+    parts: Mapping[str, tuple[Expression, Expression]],
+    signals: Mapping[Expression, Expression],
+) -> Binding:
+    path, site, kinematics, space = local.part.path, equations.site, equations.kinematics, mechanism.space
+    motions = {}
+    for name, one in local.part.component.connectors().items():
+        node = site.node(path, name)
+        body = site.bodies.body_of[node]
+        motion = Motion(
+            position=space.vector(kinematics.placements.positions[node]),
+            velocity=space.vector(kinematics.velocities[node]),
+            acceleration=space.vector(kinematics.accelerations[node]),
+        )
+        if isinstance(one, Frame):
+            motion = _turned(mechanism, equations, motion, node, body)
+        motions[name] = motion
+    values = dict(local.binding.values)
+    for name, symbol in local.signal_symbols.items():
+        values[name] = signals[symbol]
+    known = {
+        symbol.name[len(path) + 1 :]: value
+        for symbol, value in kinematics.placements.joint_coordinates.items()
+        if symbol.name.startswith(f"{path}.") and "." not in symbol.name[len(path) + 1 :]
+    }
+    owner = local.part.component._parent
+    inside = f"{owner.path}." if owner is not None and owner.path else ""
+    around = [energy for other, energy in parts.items() if other.startswith(inside)]
+    return Binding(
+        values=values,
+        motions=motions,
+        time=mechanism.time,
+        space=space.name,
+        line=space.line,
+        sides=local.binding.sides,
+        known=known,
+        reactions=reactions,
+        energies={"kinetic": _sum([k for k, _ in around]), "potential": _sum([v for _, v in around])} if around else {},
+    )
+
+
+def _turned(mechanism: Mechanism, equations: Equations, motion: Motion, node: int, body: int) -> Motion:
+    kinematics = equations.kinematics
+    if not mechanism.space.has_rotation:
+        still = Vector(0.0, 0.0, 0.0)
+        return Motion(motion.position, motion.velocity, motion.acceleration, FIXED_AXES, 0.0, still, still)
+    if body not in kinematics.placements.angles:
+        return motion
+    angle = kinematics.placements.angles[body] + equations.site.node_turns[node]
+    return Motion(
+        motion.position,
+        motion.velocity,
+        motion.acceleration,
+        planar_axes(angle),
+        angle,
+        Vector(0.0, -kinematics.angular_speeds[body], 0.0),
+        Vector(0.0, -kinematics.angular_accelerations[body], 0.0),
+    )
+
+
+def part_energies(mechanism: Mechanism, equations: Equations, path: str) -> tuple[Expression, Expression]:
+    """Return kinetic and potential energy of one part, its weight included."""
+    graph, local, kinematics = mechanism.table.graph, mechanism.locals_[path], equations.kinematics
+    site, space = equations.site, mechanism.space
+    mapping = local_map(site, local, kinematics)
+    kinetic: Scalar = graph.constant(0.0)
+    potential: Scalar = graph.constant(0.0)
+    pull = space.components(mechanism.gravity)
+    for one in local.point_inertias:
+        nodes = [site.node(path, p.name) for p in one.points]
+        for i, a in enumerate(nodes):
+            for j, b in enumerate(nodes):
+                for k, g in enumerate(pull):
+                    va, vb = kinematics.velocities[a][k], kinematics.velocities[b][k]
+                    kinetic = kinetic + 0.5 * (one.masses[i][j] * (va * vb))
+                    potential = potential - one.masses[i][j] * (g * kinematics.placements.positions[a][k])
+    for body in local.body_inertias:
+        node = site.node(path, body.frame.name)
+        index = site.bodies.body_of[node]
+        angle = kinematics.placements.angles.get(index)
+        axes = FIXED_AXES if angle is None else planar_axes(angle + site.node_turns[node])
+        c = body.center_of_mass
+        arm = space.components(axes[0] * c.x + axes[1] * c.y + axes[2] * c.z)
+        speed = kinematics.angular_speeds.get(index, graph.constant(0.0))
+        # In the plane the centre moves with the frame plus w x arm, w counter-clockwise.
+        swing = (-speed * arm[1], speed * arm[0]) if space.name == "plane" else (0.0,) * len(pull)
+        for k, g in enumerate(pull):
+            v = kinematics.velocities[node][k] + swing[k]
+            kinetic = kinetic + 0.5 * (body.mass * (v * v))
+            potential = potential - body.mass * (g * (kinematics.placements.positions[node][k] + arm[k]))
+        kinetic = kinetic + 0.5 * (body.moment * (speed * speed))
+    for value in local.potentials:
+        potential = potential + substitute([value], mapping)[0]
+    return graph.convert(kinetic), graph.convert(potential)
+
+
+def energies(mechanism: Mechanism, equations: Equations) -> tuple[Expression, Expression]:
+    """Return kinetic and potential energy of the scene."""
+    parts = [part_energies(mechanism, equations, path) for path in mechanism.locals_]
+    return _sum([k for k, _ in parts]), _sum([v for _, v in parts])
+
+
+def _sum(values: Sequence[Expression]) -> Expression:
+    total = values[0]
+    for value in values[1:]:
+        total = total + value
+    return total

@@ -1,0 +1,43 @@
+"""Power of everything that is no potential: loads, dampers, and potentials that change with time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from atwood.expr import Expression, jvp, substitute
+from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.equations import Equations
+from atwood.mechanics.forces import Forces, local_map, part_forces
+
+__all__ = ["applied_power"]
+
+
+def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
+    """Return the power, W, that loads, dampers and time-dependent potentials put into the scene.
+
+    Constraints that move with time (drives) are left out: their power is minus their multiplier times the explicit
+    time derivative of the constraint.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    equations
+        Its equations in one form.
+    """
+    graph, kinematics = equations.graph, equations.kinematics
+    signals = resolve_signals(mechanism, equations.site, kinematics)
+    forces = Forces(graph)
+    total = graph.constant(0.0)
+    for local in mechanism.locals_.values():
+        mapping = {**local_map(equations.site, local, kinematics), **signals}
+        part_forces(equations.site, replace(local, potentials=()), mapping, forces)
+        for slope in jvp(list(local.potentials), {mechanism.time: 1.0}) if local.potentials else ():
+            total = total + substitute([slope], mapping)[0]
+    for node, force in forces.on_nodes.items():
+        for f, v in zip(force, kinematics.velocities[node], strict=True):
+            total = total + f * v
+    for body, torque in forces.on_bodies.items():
+        if body in kinematics.angular_speeds:
+            total = total + torque * kinematics.angular_speeds[body]
+    return total

@@ -1,0 +1,67 @@
+"""Events of components as expressions of the state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from atwood.expr import Expression
+from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.equations import Equations
+from atwood.mechanics.observables import Reaction, bindings_of
+from atwood.model.component import bind
+
+__all__ = ["Watch", "list_watches"]
+
+
+@dataclass(frozen=True)
+class Watch:
+    """A zero crossing that is watched in the present mode.
+
+    Attributes
+    ----------
+    part, law
+        Where it is declared.
+    value
+        The expression, of time, coordinates, speeds, accelerations and reactions.
+    direction
+        +1, -1 or 0.
+    target
+        The mode it leads to, or ``"stop"``.
+    message
+        What has happened, in words.
+    impact
+        Whether velocities jump.
+    """
+
+    part: str
+    law: str
+    value: Expression
+    direction: int
+    target: str
+    message: str
+    impact: bool
+
+
+def list_watches(
+    mechanism: Mechanism, equations: Equations, reactions: Sequence[Reaction], modes: Mapping[str, str]
+) -> tuple[Watch, ...]:
+    """Return what is watched in the present modes; what is constant can never cross zero and is left out."""
+    found = []
+    signals = resolve_signals(mechanism, equations.site, equations.kinematics)
+    for path, local in mechanism.locals_.items():
+        component = local.part.component
+        mode = modes.get(path, "")
+        laws = [law for law in component.laws("event") if law.acts_in(mode)]
+        if not laws:
+            continue
+        bound = bind(component, bindings_of(mechanism, equations, local, reactions, signals))
+        for law in laws:
+            value = mechanism.table.graph.convert(getattr(bound, law.name)())
+            if value.is_constant or value in mechanism.table.values:
+                continue
+            target = local.part.values.get(law.options.target, law.options.target)
+            found.append(
+                Watch(path, law.name, value, law.options.direction, target, law.options.message, law.options.impact)
+            )
+    return tuple(found)

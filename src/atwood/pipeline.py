@@ -1,0 +1,193 @@
+"""The compiler: from a declared scene to a result, one step after another.
+
+    declare -> flatten -> graph -> forest -> kinematics -> form -> program -> kernel -> start -> solve -> result
+
+Each step takes frozen values and gives frozen values. `assemble` goes as far as the form and makes programs when they
+are asked for; `simulate` goes all the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.expr import Graph
+from atwood.forms.assembly import Assembly
+from atwood.forms.dae import LEVELS
+from atwood.mechanics.build import Mechanism, check_closures, make_gravity
+from atwood.mechanics.kinematics import body_offsets
+from atwood.model.composite import Model
+from atwood.model.flatten import FlatScene, flatten
+from atwood.model.local import LocalPart, ParameterTable, localize
+from atwood.model.space import make_space
+from atwood.result.result import Result
+from atwood.solve.run import RunOptions, run
+from atwood.solve.start import find_start
+from atwood.topology.bodies import find_bodies
+from atwood.topology.graph import build_graph
+from atwood.topology.sides import find_sides
+
+__all__ = ["Assembly", "assemble", "assemble_flat", "simulate"]
+
+FORMS = ("reduced", "dae")
+
+
+def assemble(scene: Model, *, form: str = "reduced", level: str = "ggl", name: str | None = None) -> Assembly:
+    """Assemble a scene in one form.
+
+    Parameters
+    ----------
+    scene
+        The scene, or a model to be simulated with the usual settings.
+    form
+        ``"reduced"``: constraints are eliminated, the unknowns are generalized coordinates. ``"dae"``: constraints
+        stay, with Lagrange multipliers.
+    level
+        Of the dae form: ``"ggl"``, ``"index1-projected"`` or ``"index1"``.
+    name
+        What to call the scene.
+
+    Returns
+    -------
+    Assembly
+        The mechanism and its equations, worked out when asked for.
+
+    Raises
+    ------
+    AtwoodError
+        If the scene is not sound; the error names the part.
+    """
+    return assemble_flat(flatten(scene, name), form=form, level=level)
+
+
+def assemble_flat(
+    flat: FlatScene, *, form: str = "reduced", level: str = "ggl", modes: Mapping[str, str] | None = None
+) -> Assembly:
+    """Assemble a scene that has been taken apart into leaves.
+
+    Parameters
+    ----------
+    flat
+        The scene.
+    form, level
+        See `assemble`.
+    modes
+        Mode of each part that has modes; the usual one where it is not given.
+    """
+    if form not in FORMS:
+        raise UsageError(f"there is no form {form!r}", advice=suggestion(form, FORMS))
+    if level not in LEVELS:
+        raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
+    all_modes = {path: part.component.modes[0] for path, part in flat.parts.items() if part.component.modes}
+    all_modes.update(modes or {})
+    mechanism = read_mechanism(flat, all_modes)
+    chosen: Any = form
+    return Assembly(flat, mechanism, chosen, level if form == "dae" else "", all_modes)
+
+
+def read_mechanism(flat: FlatScene, modes: Mapping[str, str]) -> Mechanism:
+    """Read the laws of all parts and find nodes, joints and bodies.
+
+    Parameters
+    ----------
+    flat
+        The scene.
+    modes
+        Mode of each part that has modes.
+
+    Raises
+    ------
+    TopologyError
+        If rigid parts contradict each other.
+    """
+    graph = Graph()
+    time = graph.symbol("t")
+    space = make_space(flat.space, flat.line_axis)
+    table = ParameterTable(graph)
+    locals_: Mapping[str, LocalPart] = localize(flat, space, time, table, modes, None)
+    network = build_graph(flat, locals_)
+    bodies = find_bodies(network, locals_)
+    if space.name == "line":
+        offsets = {body.index: body_offsets(body, space)[0] for body in bodies.bodies}
+        sides = find_sides(flat, network, bodies, locals_, offsets, table.values, space)
+        locals_ = localize(flat, space, time, table, modes, sides)
+        network = build_graph(flat, locals_)
+        bodies = find_bodies(network, locals_)
+    if space.name == "space" and bodies.oriented:
+        body = bodies.bodies[min(bodies.oriented)]
+        raise UnsupportedError(
+            "rigid bodies in space are not available yet",
+            where=body.name,
+            advice="Use points, rods, ropes and springs in space, or the plane.",
+        )
+    gravity = make_gravity(table, flat.gravity)
+    mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links)
+    check_closures(mechanism)
+    return mechanism
+
+
+def simulate(
+    scene: Model | Assembly,
+    *,
+    form: str = "reduced",
+    level: str = "ggl",
+    t_end: float | None = None,
+    rtol: float = 1e-8,
+    outputs: Any = 201,
+    max_steps: int | None = None,
+    max_seconds: float | None = None,
+    max_step: float | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> Result:
+    """Simulate a scene from its start to its end.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it, which then says the form.
+    form, level
+        See `assemble`.
+    t_end
+        Time of the end, s; the scene's own if not given.
+    rtol
+        Relative tolerance of the solver; absolute tolerances are this share of the scene's own sizes.
+    outputs
+        Number of output times, evenly spread over the run, or the times themselves, s.
+    max_steps, max_seconds
+        Limits; a run that meets one returns what it has, and says so in its status.
+    max_step
+        The largest step, s.
+    progress
+        Called with the time reached, s.
+
+    Returns
+    -------
+    Result
+        The motion, and everything that follows from it.
+
+    Raises
+    ------
+    StartError
+        If the start is not consistent.
+    UsageError
+        If the end is not after the start.
+    SolveError
+        If the solver fails.
+    """
+    assembly = scene if isinstance(scene, Assembly) else assemble(scene, form=form, level=level)
+    flat = assembly.flat
+    options = RunOptions(
+        t_end=flat.t_end if t_end is None else float(t_end),
+        relative_tolerance=rtol,
+        outputs=outputs,
+        max_steps=max_steps,
+        max_seconds=max_seconds,
+        progress=progress,
+        max_step=max_step,
+    )
+
+    def reassemble(modes: Mapping[str, str]) -> Assembly:
+        return assemble_flat(flat, form=assembly.form, level=assembly.level or "ggl", modes=modes)
+
+    return Result(run(assembly, find_start(assembly), options, reassemble))

@@ -1,0 +1,273 @@
+"""Results: trajectories by component path, computed from the states when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import ResultError, suggestion
+from atwood.expr import depends_on
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.power import applied_power
+from atwood.result.angles import unwrap
+from atwood.result.energy import EnergyLedger, make_ledger
+from atwood.solve.driver import Statistics
+from atwood.solve.modes import Happening
+from atwood.solve.reactions import ReactionSolver
+from atwood.solve.run import Run, Segment
+
+__all__ = ["Result"]
+
+FloatArray = NDArray[np.float64]
+
+
+class Result:
+    """The motion of a scene, and every quantity of every component along it.
+
+    ``result["bob2.position.x"]`` is the quantity at the output times; ``result["bob2"]`` gives all quantities of a
+    component. Forces are worked out after the run, and only if asked for.
+
+    Parameters
+    ----------
+    run
+        What the solver gave.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self.run = run
+        self._cache: dict[str, FloatArray] = {}
+
+    # -- what it is of --------------------------------------------------------------------------------------------
+
+    @property
+    def assembly(self) -> Assembly:
+        """The scene as it was assembled at the start."""
+        return self.run.segments[0].assembly
+
+    @property
+    def form(self) -> str:
+        """``"reduced"`` or ``"dae"``."""
+        return self.assembly.form
+
+    @property
+    def level(self) -> str:
+        """Level of the dae form; empty for the reduced form."""
+        return self.run.segments[0].plan.program.level
+
+    @property
+    def status(self) -> str:
+        """``"finished"``, ``"stopped"``, ``"step_limit"``, ``"time_limit"`` or ``"interrupted"``."""
+        return self.run.status
+
+    @property
+    def message(self) -> str:
+        """Why the run ended, in words; empty if it went to its end."""
+        return self.run.message
+
+    @property
+    def happenings(self) -> tuple[Happening, ...]:
+        """Events on the way, in order."""
+        return self.run.happenings
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the solver did."""
+        return self.run.statistics
+
+    # -- quantities -----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """Output times, s."""
+        return self._all_time[self._shown]
+
+    @cached_property
+    def _all_time(self) -> FloatArray:
+        return np.concatenate([segment.time for segment in self.run.segments])
+
+    @cached_property
+    def _shown(self) -> NDArray[np.bool_]:
+        return np.concatenate([segment.shown for segment in self.run.segments])
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of all quantities."""
+        return tuple(self.assembly.observables)
+
+    def unit(self, path: str) -> str:
+        """Return the SI unit of a quantity."""
+        return self.assembly.find_observables([self._known(path)])[0].unit
+
+    def describe(self, path: str) -> str:
+        """Return one line of meaning of a quantity."""
+        return self.assembly.find_observables([self._known(path)])[0].doc
+
+    def __contains__(self, path: str) -> bool:
+        return path in self.assembly.observables
+
+    def __getitem__(self, path: str) -> FloatArray | dict[str, FloatArray]:
+        """Return a quantity at the output times, or all quantities below a path.
+
+        Raises
+        ------
+        ResultError
+            If there is nothing at this path.
+        """
+        if path in self:
+            return self.samples(path)[self._shown]
+        below = [one for one in self.paths if one.startswith(f"{path}.")]
+        self._known(below[0] if below else path)
+        cut = len(path) + 1
+        return {one[cut:]: self.samples(one)[self._shown] for one in below}
+
+    def array(self, path: str) -> FloatArray:
+        """Return a quantity at the output times, shape (times,).
+
+        Raises
+        ------
+        ResultError
+            If there is no such quantity.
+        """
+        return self.samples(self._known(path))[self._shown]
+
+    def table(self, paths: Iterable[str] | None = None) -> dict[str, FloatArray]:
+        """Return quantities at the output times by path; all when no paths are given."""
+        wanted = tuple(self.paths if paths is None else (self._known(path) for path in paths))
+        self._fill(wanted)
+        return {path: self._cache[path][self._shown] for path in wanted}
+
+    def at(self, index: int) -> dict[str, float]:
+        """Return all quantities at one output time, by its number; -1 for the end."""
+        return {path: float(values[index]) for path, values in self.table().items()}
+
+    def samples(self, path: str) -> FloatArray:
+        """Return a quantity at all samples of the run, outputs and others."""
+        if path not in self._cache:
+            self._fill((path,))
+        return self._cache[path]
+
+    def _known(self, path: str) -> str:
+        if path not in self:
+            raise ResultError("there is no such quantity", where=path, advice=suggestion(path, self.paths))
+        return path
+
+    def _fill(self, paths: tuple[str, ...]) -> None:
+        """Compute quantities that are not there yet, all in one pass."""
+        missing = tuple(path for path in paths if path not in self._cache)
+        if not missing:
+            return
+        pieces = [self._evaluate(segment, missing) for segment in self.run.segments]
+        for i, path in enumerate(missing):
+            self._cache[path] = np.concatenate([piece[i] for piece in pieces])
+        observables = self.assembly.observables
+        guesses = {**self.assembly.flat.guess, **self.assembly.flat.start}
+        for path in missing:
+            if observables[path].periodic:
+                self._cache[path] = unwrap(self._cache[path], guesses.get(path))
+
+    def _evaluate(self, segment: Segment, paths: tuple[str, ...]) -> FloatArray:
+        assembly = segment.assembly
+        observables = assembly.find_observables(paths)
+        symbols = [one.symbol for one in assembly.reactions]
+        reading = [depends_on(one.value, symbols) for one in observables]
+        accelerating = [depends_on(one.value, assembly.equations.accelerations) for one in observables]
+        reactions = np.zeros((len(symbols), len(segment.time)))
+        accelerations = np.zeros_like(segment.speeds)
+        if any(reading):
+            reactions, _ = self._reactions(segment)
+        if any(accelerating) and segment.speeds.size:
+            kept = np.asarray(segment.plan.finding.kept, dtype=np.intp)
+            solver = self._solver(segment)
+            accelerations = solver.own_accelerations(segment.time, segment.coordinates, segment.speeds, kept)
+        kernel = assembly.kernel(assembly.observer(paths), vectorized=True)
+        values: FloatArray = kernel(
+            segment.time[None, :], segment.coordinates, segment.speeds, accelerations, reactions
+        )[0]
+        return values
+
+    @cached_property
+    def _solvers(self) -> dict[int, ReactionSolver]:
+        return {}
+
+    @cached_property
+    def _reaction_cache(self) -> dict[int, tuple[FloatArray, FloatArray]]:
+        return {}
+
+    def _solver(self, segment: Segment) -> ReactionSolver:
+        if id(segment) not in self._solvers:
+            self._solvers[id(segment)] = ReactionSolver(
+                segment.assembly, float(segment.time[0]), segment.coordinates[:, 0], segment.speeds[:, 0]
+            )
+        return self._solvers[id(segment)]
+
+    def _reactions(self, segment: Segment) -> tuple[FloatArray, FloatArray]:
+        if id(segment) not in self._reaction_cache:
+            self._reaction_cache[id(segment)] = self._solver(segment).at(
+                segment.time, segment.coordinates, segment.speeds
+            )
+        return self._reaction_cache[id(segment)]
+
+    # -- how good it is -------------------------------------------------------------------------------------------
+
+    @cached_property
+    def energy(self) -> EnergyLedger:
+        """Kinetic and potential energy, work, and how well they balance."""
+        kinetic, potential, power = [], [], []
+        for segment in self.run.segments:
+            assembly = segment.assembly
+            state = (segment.time[None, :], segment.coordinates, segment.speeds)
+            idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
+            energies = assembly.kernel(assembly.energy_program, vectorized=True)(*state, *idle)[0]
+            kinetic.append(energies[0])
+            potential.append(energies[1])
+            power.append(self._power(segment, state, idle))
+        return make_ledger(
+            [segment.time for segment in self.run.segments], kinetic, potential, power, self._shown
+        )
+
+    def _power(
+        self, segment: Segment, state: tuple[FloatArray, ...], idle: tuple[FloatArray, ...]
+    ) -> FloatArray | None:
+        """Return the power that is put into the scene, or None if nothing can."""
+        assembly = segment.assembly
+        applied = applied_power(assembly.mechanism, assembly.equations)
+        moving = [one for one in assembly.maximal.constraints if depends_on(one.value, [assembly.mechanism.time])]
+        if applied.is_zero and not moving:
+            return None
+        total = np.zeros(len(segment.time))
+        if not applied.is_zero:
+            program = assembly.state_program("power", [applied])
+            total = total + assembly.kernel(program, vectorized=True)(*state, *idle)[0][0]
+        if moving:
+            total = total + self._reactions(segment)[1]
+        return total
+
+    @cached_property
+    def constraint_max(self) -> dict[str, float]:
+        """By how much constraints are missed at most, relative to the scene's sizes.
+
+        ``position`` and ``velocity`` of what the result holds, ``held_position`` and ``held_velocity`` of what the
+        solver held before projection.
+        """
+        found = {"position": 0.0, "velocity": 0.0, "held_position": 0.0, "held_velocity": 0.0}
+        for segment in self.run.segments:
+            plan = segment.plan
+            if not plan.balance.constraints:
+                continue
+            speed = 1.0 / plan.scales.time
+            for i in np.flatnonzero(segment.shown):
+                q, u = segment.coordinates[:, i], segment.speeds[:, i]
+                position, velocity = plan.balance.misses(float(segment.time[i]), q, u, plan.sizes)
+                found["position"] = max(found["position"], position)
+                found["velocity"] = max(found["velocity"], velocity / speed)
+            found["held_position"] = max(found["held_position"], float(np.max(segment.held[0])))
+            found["held_velocity"] = max(found["held_velocity"], float(np.max(segment.held[1])) / speed)
+        return found
+
+    @property
+    def multipliers(self) -> Mapping[str, FloatArray]:
+        """Every reaction of every component at the output times, by path."""
+        return self.table([one.path for one in self.assembly.reactions])

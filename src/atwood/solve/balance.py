@@ -1,0 +1,193 @@
+"""Numbers from the balance of forces: accelerations and multipliers, projection, rank."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import SolveError
+from atwood.forms.program import BalanceProgram
+from atwood.kernels import BoundKernel
+
+__all__ = ["Balance", "BalanceValues"]
+
+FloatArray = NDArray[np.float64]
+
+_RANK = 1e-9
+"""Relative size below which a direction counts as lost."""
+
+
+@dataclass(frozen=True)
+class BalanceValues:
+    """The balance ``M a + bias = G^T lambda``, ``G a + gamma = 0`` at one state."""
+
+    mass: FloatArray
+    bias: FloatArray
+    value: FloatArray
+    rate: FloatArray
+    gamma: FloatArray
+    slope: FloatArray
+    drift: FloatArray
+
+
+class Balance:
+    """The balance of forces of one form with its parameters.
+
+    Parameters
+    ----------
+    program
+        The program.
+    kernel
+        The same, ready to run on one state.
+    """
+
+    def __init__(self, program: BalanceProgram, kernel: BoundKernel) -> None:
+        self.program, self.kernel = program, kernel
+
+    @property
+    def constraints(self) -> int:
+        """Number of constraints."""
+        return self.program.constraints
+
+    def at(self, t: float, q: FloatArray, u: FloatArray) -> BalanceValues:
+        """Return the balance at a state."""
+        p = self.program
+        mass, bias, value, rate, gamma, slope, drift = self.kernel([t], q, u)
+        matrix = np.zeros((p.size, p.size))
+        matrix[p.mass_rows, p.mass_columns] = mass
+        jacobian = np.zeros((p.constraints, p.size))
+        if p.constraints:
+            jacobian[p.slope_rows, p.slope_columns] = slope
+        parts = (np.asarray(x, dtype=float) for x in (bias, value, rate, gamma))
+        b, v, r, g = parts
+        return BalanceValues(matrix, b, v, r, g, jacobian, np.asarray(drift, dtype=float))
+
+    def accelerate(
+        self, t: float, q: FloatArray, u: FloatArray, kept: NDArray[np.intp] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return accelerations and multipliers.
+
+        Parameters
+        ----------
+        t, q, u
+            A state that fulfils the constraints.
+        kept
+            Constraints that are independent; the multipliers of all are then those of least size.
+
+        Raises
+        ------
+        SolveError
+            If the forces do not determine the accelerations.
+        """
+        return solve_balance(self.at(t, q, u), kept, t)
+
+    def project(
+        self, t: float, q: FloatArray, u: FloatArray, scales: FloatArray, iterations: int = 12
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the nearest state that fulfils the constraints on position and velocity.
+
+        Parameters
+        ----------
+        t, q, u
+            A state near the constraints.
+        scales
+            Size of each coordinate; nearness is measured in these.
+        iterations
+            The largest number of Newton steps.
+        """
+        if not self.constraints:
+            return q, u
+        q = q.copy()
+        still = np.zeros_like(u)
+        last = np.inf
+        for _ in range(iterations):
+            now = self.at(t, q, still)
+            rows = row_scales(now.slope, scales)
+            miss = float(np.max(np.abs(now.value / rows)))
+            if miss == 0.0 or (miss < 1e-11 and miss >= 0.5 * last):
+                break
+            last = miss
+            q -= scales * least_norm(now.slope * scales / rows[:, None], now.value / rows)
+        now = self.at(t, q, u)
+        rows = row_scales(now.slope, scales)
+        for _ in range(2):  # the second pass takes out the rounding of the first
+            rate = now.slope @ u + now.drift
+            u = u - scales * least_norm(now.slope * scales / rows[:, None], rate / rows)
+        return q, u
+
+    def misses(self, t: float, q: FloatArray, u: FloatArray, scales: FloatArray) -> tuple[float, float]:
+        """Return by how much a state misses the constraints on position and on velocity, relative to the scales."""
+        if not self.constraints:
+            return 0.0, 0.0
+        now = self.at(t, q, u)
+        rows = row_scales(now.slope, scales)
+        return float(np.max(np.abs(now.value / rows))), float(np.max(np.abs(now.rate / rows)))
+
+
+def solve_balance(
+    now: BalanceValues, kept: NDArray[np.intp] | None, t: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return accelerations and multipliers of a balance; see `Balance.accelerate`."""
+    n = len(now.bias)
+    slope = now.slope if kept is None else now.slope[kept]
+    gamma = now.gamma if kept is None else now.gamma[kept]
+    m = len(gamma)
+    matrix = np.zeros((n + m, n + m))
+    matrix[:n, :n] = now.mass
+    matrix[:n, n:] = -slope.T
+    matrix[n:, :n] = slope
+    right = np.concatenate([-now.bias, -gamma])
+    # Scaling to rows and columns of like size, so that singular means singular.
+    size = np.sqrt(np.maximum(np.max(np.abs(matrix), axis=1), np.max(np.abs(matrix), axis=0))) if n + m else right
+    size[size == 0.0] = 1.0
+    try:
+        solution = np.linalg.solve(matrix / size[:, None] / size, right / size) / size
+    except np.linalg.LinAlgError:
+        raise _undetermined(t) from None
+    if not np.all(np.isfinite(solution)):
+        raise _undetermined(t)
+    accelerations, multipliers = solution[:n], solution[n:]
+    if kept is not None and len(kept) < len(now.gamma):
+        multipliers = np.linalg.lstsq(now.slope.T, now.mass @ accelerations + now.bias, rcond=None)[0]
+    return accelerations, multipliers
+
+
+def _undetermined(t: float) -> SolveError:
+    return SolveError(
+        f"at t = {t:.6g} the forces do not determine the accelerations",
+        advice="Something without mass is free to move here, or the mechanism is in a singular position.",
+    )
+
+
+def row_scales(slope: FloatArray, scales: FloatArray) -> FloatArray:
+    """Return the size of each constraint: how much it changes when a coordinate changes by its scale."""
+    rows: FloatArray = np.max(np.abs(slope * scales), axis=1)
+    rows[rows == 0.0] = 1.0
+    return rows
+
+
+def least_norm(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the shortest solution of a linear system, or the best where there is none."""
+    solution: FloatArray = np.linalg.lstsq(matrix, right, rcond=_RANK)[0]
+    return solution
+
+
+def independent_rows(matrix: FloatArray, tolerance: float = 1e-7) -> list[int]:
+    """Return the numbers of rows that depend on none before them (modified Gram-Schmidt, twice for safety)."""
+    kept: list[int] = []
+    basis: list[FloatArray] = []
+    for i, row in enumerate(matrix):
+        size = float(np.linalg.norm(row))
+        if size == 0.0:
+            continue
+        left = row / size
+        for _ in range(2):
+            for direction in basis:
+                left = left - (left @ direction) * direction
+        rest = float(np.linalg.norm(left))
+        if rest > tolerance:
+            kept.append(i)
+            basis.append(left / rest)
+    return kept

@@ -1,0 +1,214 @@
+"""Events and modes: what is watched, and how a state is taken into another mode.
+
+An event maps (mode, q, u) to (mode, q, u). States pass between modes through maximal coordinates, which both share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.expr import depends_on
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.watches import Watch, list_watches
+from atwood.solve.balance import Balance, least_norm
+from atwood.solve.reactions import ReactionSolver, maximal_state
+from atwood.solve.scales import coordinate_scales
+
+__all__ = ["EventProbe", "Happening", "enter_mode"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Happening:
+    """An event that has happened.
+
+    Attributes
+    ----------
+    time
+        s.
+    part, law
+        Whose event it is.
+    message
+        What has happened, in words.
+    target
+        The mode it led to, or ``"stop"``.
+    impact
+        Whether velocities jumped.
+    """
+
+    time: float
+    part: str
+    law: str
+    message: str
+    target: str
+    impact: bool
+
+    def describe(self) -> str:
+        """Return what happened, where and when."""
+        return f"at t = {self.time:.9g} s, {self.part}: {self.message}"
+
+
+class EventProbe:
+    """The events of one mode as a function of the solver's state.
+
+    Parameters
+    ----------
+    assembly
+        The scene in its mode.
+    t, q, u
+        The state at the start of the mode.
+    """
+
+    def __init__(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> None:
+        self.assembly = assembly
+        self.watches: tuple[Watch, ...] = list_watches(
+            assembly.mechanism, assembly.equations, assembly.reactions, assembly.modes
+        )
+        symbols = [one.symbol for one in assembly.reactions]
+        self.needs_reactions = any(depends_on(one.value, symbols) for one in self.watches)
+        self.reactions = ReactionSolver(assembly, t, q, u) if self.needs_reactions else None
+        self.kernel = (
+            assembly.kernel(assembly.state_program("events", [one.value for one in self.watches]))
+            if self.watches
+            else None
+        )
+
+    @property
+    def directions(self) -> tuple[int, ...]:
+        """Direction of each event."""
+        return tuple(one.direction for one in self.watches)
+
+    def values(self, t: float, q: FloatArray, u: FloatArray) -> Sequence[float]:
+        """Return the value of each event at a state."""
+        assert self.kernel is not None
+        reactions: Any = [0.0] * len(self.assembly.reactions)
+        if self.reactions is not None:
+            found, _ = self.reactions.at(np.array([t]), q[:, None], u[:, None])
+            reactions = found[:, 0]
+        values: Sequence[float] = self.kernel([t], q, u, np.zeros_like(u), reactions)[0]
+        return values
+
+    def function(self) -> Callable[[float, FloatArray, FloatArray], Sequence[float]] | None:
+        """Return the events as a function of the solver's vector; None if nothing is watched."""
+        if not self.watches:
+            return None
+        n = len(self.assembly.equations.coordinates)
+        return lambda t, y, yp: self.values(t, y[:n], y[n : 2 * n])
+
+    def broken_at_start(self, t: float, q: FloatArray, u: FloatArray) -> Happening | None:
+        """Return the first event whose one-sided bound does not hold from the outset."""
+        if not self.watches:
+            return None
+        values = np.asarray(self.values(t, q, u))
+        rounding = 1e-9 * float(np.max(np.abs(values), initial=1e-300))
+        for watch, value in zip(self.watches, values, strict=True):
+            if watch.direction * value > rounding:
+                return self._happening(t, watch)
+        return None
+
+    def name(self, t: float, events: Sequence[int]) -> Happening:
+        """Return what happened when the driver reports an event."""
+        watch = next(one for one, sign in zip(self.watches, events, strict=True) if sign)
+        return self._happening(t, watch)
+
+    def _happening(self, t: float, watch: Watch) -> Happening:
+        return Happening(t, watch.part, watch.law, watch.message, watch.target, watch.impact)
+
+
+def enter_mode(
+    recorder: Any,
+    assembly: Assembly,
+    happening: Happening,
+    reassemble: Callable[[Mapping[str, str]], Assembly],
+    length: float,
+) -> tuple[Assembly, FloatArray, FloatArray]:
+    """Return the scene in the mode that an event leads to, with its state.
+
+    Parameters
+    ----------
+    recorder
+        Holds the last state before the event.
+    assembly
+        The scene before the event.
+    happening
+        The event.
+    reassemble
+        Gives the scene in other modes.
+    length
+        Extent of the scene, m.
+    """
+    t, q, u = recorder.time[-1], recorder.q[-1], recorder.u[-1]
+    big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
+    after = reassemble({**assembly.modes, happening.part: happening.target})
+    sizes = coordinate_scales(after.maximal, length)
+    program = after.balance("dae")
+    balance = Balance(program, after.kernel(program.program))
+    if happening.impact:
+        big_q, _ = balance.project(t, big_q, big_u, sizes)
+        big_u = _plastic_impact(balance, t, big_q, big_u)
+    if after.form == "dae":
+        return after, big_q, big_u
+    return after, *_to_reduced(assembly, after, t, (q, u), (big_q, big_u), length)
+
+
+def _plastic_impact(balance: Balance, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+    """Return the velocities after an impact: the nearest admissible ones in the metric of the masses.
+
+    Impulses act along the constraints only: ``M (u+ - u-) = G^T Lambda``, ``G u+ + g_t = 0``.
+    """
+    now = balance.at(t, q, u)
+    n, m = len(u), len(now.gamma)
+    matrix = np.block([[now.mass, -now.slope.T], [now.slope, np.zeros((m, m))]])
+    right = np.concatenate([now.mass @ u, -now.drift])
+    solution: FloatArray = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+    return solution[:n]
+
+
+def _to_reduced(
+    before: Assembly,
+    after: Assembly,
+    t: float,
+    own: tuple[FloatArray, FloatArray],
+    maximal: tuple[FloatArray, FloatArray],
+    length: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Find the generalized coordinates of a mode that give the same maximal coordinates and speeds."""
+    from atwood.expr import InputGroup, OutputGroup, Program, jacobian
+
+    equations, to_maximal = after.reduced, after.to_maximal
+    positions = list(to_maximal.outputs[0].expressions)
+    slope = jacobian(positions, list(equations.coordinates))
+    groups = (
+        InputGroup("t", (equations.time,)),
+        InputGroup("q", equations.coordinates),
+    )
+    outputs = (OutputGroup("values", tuple(positions)), OutputGroup("slopes", tuple(slope.entries)))
+    kernel = after.kernel(Program("change of mode", groups, after.parameters, outputs))
+    names = tuple(c.name for c in equations.names)
+    known = [name for name in names if name in before.observables]
+    q = np.zeros(len(names))
+    if known:
+        read = before.kernel(before.observer(tuple(known)))
+        idle = [0.0] * len(before.reactions)
+        values = read([t], *own, np.zeros_like(own[1]), idle)[0]
+        for name, value in zip(known, values, strict=True):
+            q[names.index(name)] = value
+    scales = coordinate_scales(after.maximal, length)
+    matrix = np.zeros((len(positions), len(names)))
+    for _ in range(30):
+        now, entries = kernel([t], q)
+        matrix[slope.rows, slope.columns] = entries
+        miss = (maximal[0] - np.asarray(now)) / scales
+        step = least_norm(matrix / scales[:, None], miss)
+        q = q + step
+        if float(np.max(np.abs(step), initial=0.0)) < 1e-14 * max(1.0, float(np.max(np.abs(q), initial=0.0))):
+            break
+    still = after.kernel(to_maximal)([t], q, np.zeros_like(q))[1]
+    u = least_norm(matrix / scales[:, None], (maximal[1] - np.asarray(still)) / scales)
+    return q, u

@@ -1,0 +1,221 @@
+"""From an assembled scene and its start to the problem that a driver solves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import StartError
+from atwood.forms.assembly import Assembly
+from atwood.forms.program import FormProgram
+from atwood.kernels import BoundKernel
+from atwood.solve.balance import Balance, solve_balance
+from atwood.solve.driver import ImplicitProblem
+from atwood.solve.rank import RankFinding, choose_dependent, dependence, find_rank
+from atwood.solve.scales import Scales, coordinate_scales, find_scales
+
+__all__ = ["Plan", "make_plan", "pack_state"]
+
+FloatArray = NDArray[np.float64]
+
+_POOR = 0.3
+"""Below this share of the best, dependent coordinates are chosen anew."""
+
+
+@dataclass
+class Plan:
+    """What a run of one mode needs.
+
+    Attributes
+    ----------
+    assembly
+        The scene.
+    balance
+        The balance of forces in the coordinates of the form.
+    finding
+        Which of its constraints are independent.
+    scales, sizes
+        Sizes of the scene, and of each coordinate.
+    program
+        The form's programs at present; with loops in the reduced form they change with the dependent coordinates.
+    dependent
+        The dependent coordinates at present.
+    switches
+        How often they changed.
+    """
+
+    assembly: Assembly
+    balance: Balance
+    finding: RankFinding
+    scales: Scales
+    sizes: FloatArray
+    program: FormProgram
+    dependent: tuple[int, ...]
+    switches: int = 0
+    _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
+
+    @property
+    def kept(self) -> NDArray[np.intp] | None:
+        """Numbers of the independent constraints; None if all are."""
+        if not self.finding.redundant:
+            return None
+        return np.asarray(self.finding.kept, dtype=np.intp)
+
+    @property
+    def is_projected(self) -> bool:
+        """Whether outputs are projected onto the constraints; plain index 1 shows its drift instead."""
+        return self.balance.constraints > 0 and self.program.level != "index1"
+
+    def kernels(self) -> tuple[BoundKernel, BoundKernel]:
+        """Return residual and Jacobian at present."""
+        if self._kernels is None:
+            assembly, program = self.assembly, self.program
+            self._kernels = (assembly.kernel(program.residual), assembly.kernel(program.jacobian))
+        return self._kernels
+
+    def review_dependent(self, t: float, q: FloatArray) -> bool:
+        """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
+        if not self.dependent:
+            return False
+        now = self.balance.at(t, q, np.zeros_like(q))
+        slope = now.slope[list(self.finding.kept)]
+        better = choose_dependent(slope, self.sizes)
+        present = dependence(slope, self.sizes, self.dependent)
+        if better == self.dependent or present >= _POOR * dependence(slope, self.sizes, better):
+            return False
+        self.dependent = better
+        self.program = self.assembly.form_program(_kept_or_none(self.finding), better)
+        self._kernels = None
+        self.switches += 1
+        return True
+
+    def problem(
+        self,
+        events: Callable[[float, FloatArray, FloatArray], Sequence[float]] | None = None,
+        directions: tuple[int, ...] = (),
+    ) -> ImplicitProblem:
+        """Return the problem for a driver; its functions follow changes of the dependent coordinates."""
+        size = self.program.size
+
+        def residual(t: float, y: FloatArray, yp: FloatArray) -> Sequence[float]:
+            values: Sequence[float] = self.kernels()[0]([t], y, yp)[0]
+            return values
+
+        def jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> Sequence[float]:
+            values: Sequence[float] = self.kernels()[1]([t], y, yp, [cj])[0]
+            return values
+
+        def full_jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> FloatArray:
+            full = np.zeros(size * size)
+            full[self.program.columns * size + self.program.rows] = self.kernels()[1]([t], y, yp, [cj])[0]
+            return full
+
+        everywhere = (np.tile(np.arange(size), size), np.repeat(np.arange(size), size))
+        return ImplicitProblem(
+            size=size,
+            residual=residual,
+            jacobian=full_jacobian if self.dependent else jacobian,
+            pattern=everywhere if self.dependent else (self.program.rows, self.program.columns),
+            algebraic=self.program.algebraic,
+            events=events,
+            event_count=len(directions),
+            event_directions=directions,
+        )
+
+    def tolerances(self, relative: float) -> FloatArray:
+        """Return the absolute tolerance of each unknown; multipliers are kept out of the error test."""
+        n, program = self.program.coordinates, self.program
+        speeds = self.sizes / self.scales.time
+        loose = 1e3 * max(self.scales.force, 1.0)
+        return np.concatenate(
+            [
+                relative * self.sizes[:n],
+                relative * speeds[:n],
+                np.full(program.multipliers + program.extra, loose),
+            ]
+        )
+
+
+def _kept_or_none(finding: RankFinding) -> tuple[int, ...] | None:
+    return finding.kept if finding.redundant else None
+
+
+def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
+    """Prepare a run from a consistent state in the coordinates of the form.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    t, q, u
+        The state.
+    length
+        Extent of the scene, m.
+    span
+        Length of the run, s.
+
+    Raises
+    ------
+    StartError
+        If the forces do not determine the accelerations.
+    """
+    equations = assembly.equations
+    balance_program = assembly.balance(assembly.form)
+    balance = Balance(balance_program, assembly.kernel(balance_program.program))
+    sizes = coordinate_scales(equations, length)
+    finding = find_rank(balance, t, q, sizes)
+    now = balance.at(t, q, u)
+    slope = now.slope[list(finding.kept)] if finding.kept else now.slope[:0]
+    _check_inertia(assembly, now.mass, slope, sizes)
+    dependent = choose_dependent(slope, sizes) if assembly.form == "reduced" else ()
+    program = assembly.form_program(_kept_or_none(finding), dependent)
+    kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
+    accelerations, _ = solve_balance(now, kept, t)
+    scales = find_scales(assembly, length, u, accelerations, sizes, span)
+    return Plan(assembly, balance, finding, scales, sizes, program, dependent)
+
+
+def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, sizes: FloatArray) -> None:
+    """Refuse a direction in which something can move without inertia."""
+    n = mass.shape[0]
+    if n == 0:
+        return
+    scaled = mass * sizes[:, None] * sizes[None, :]
+    if slope.shape[0]:
+        _, values, directions = np.linalg.svd(slope * sizes)
+        rank = int(np.sum(values > 1e-9 * values[0]))
+        free = directions[rank:]
+    else:
+        free = np.eye(n)
+    if not len(free):
+        return
+    values, vectors = np.linalg.eigh(free @ scaled @ free.T)
+    if values[0] > 1e-14 * max(values[-1], 1e-300):
+        return
+    moving = np.abs(vectors[:, 0] @ free)
+    names = [c.name for c, size in zip(assembly.equations.names, moving, strict=True) if size > 0.1 * np.max(moving)]
+    raise StartError(
+        f"something without inertia is free to move along {', '.join(names)}: a force would accelerate it without bound",
+        where=names[0].rpartition(".")[0],
+        advice="Give it a mass, or hold it with a joint.",
+    )
+
+
+def pack_state(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return consistent y and y' from a state that fulfils the constraints."""
+    accelerations, multipliers = solve_balance(plan.balance.at(t, q, u), plan.kept, t)
+    if plan.assembly.form == "dae":
+        if plan.kept is not None:
+            # The solver knows the multipliers of the kept constraints only.
+            now = plan.balance.at(t, q, u)
+            force = now.mass @ accelerations + now.bias
+            multipliers = np.linalg.lstsq(now.slope[plan.kept].T, force, rcond=None)[0]
+        tail = [multipliers, np.zeros(plan.program.extra)]
+    else:
+        tail = []
+    y = np.concatenate([q, u, *tail])
+    yp = np.concatenate([u, accelerations, *(np.zeros_like(x) for x in tail)])
+    return y, yp

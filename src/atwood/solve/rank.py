@@ -1,0 +1,118 @@
+"""Which constraints are independent: a numeric question, asked at the start and at admissible positions nearby.
+
+A rank that drops everywhere means a redundant design; one that drops at the start alone means a singular position,
+which must not be taken for additional freedom.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.solve.balance import Balance, independent_rows, row_scales
+
+__all__ = ["RankFinding", "find_rank"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RankFinding:
+    """What the constraints of a form determine.
+
+    Attributes
+    ----------
+    kept
+        Numbers of constraints that are independent.
+    redundant
+        Numbers of constraints that follow from the others, everywhere.
+    rank
+        Number of independent constraints.
+    rank_at_start
+        The same at the start position alone.
+    """
+
+    kept: tuple[int, ...]
+    redundant: tuple[int, ...]
+    rank: int
+    rank_at_start: int
+
+    @property
+    def starts_singular(self) -> bool:
+        """Whether the start is a singular position."""
+        return self.rank_at_start < self.rank
+
+
+def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> RankFinding:
+    """Find the rank of the constraints.
+
+    Parameters
+    ----------
+    balance
+        The balance of forces of the form.
+    t, q
+        Time and position of the start.
+    scales
+        Size of each coordinate.
+    """
+    count = balance.constraints
+    if count == 0:
+        return RankFinding((), (), 0, 0)
+    still = np.zeros_like(q)
+
+    def scaled(position: FloatArray) -> FloatArray:
+        slope = balance.at(t, position, still).slope * scales
+        return slope / row_scales(slope, np.ones_like(scales))[:, None]
+
+    at_start = independent_rows(scaled(q))
+    best = at_start
+    random = np.random.default_rng(20240229)
+    matrix = scaled(q)
+    _, sizes, directions = np.linalg.svd(matrix)
+    rank = int(np.sum(sizes > 1e-7 * sizes[0]))
+    admissible = directions[rank:]
+    for step in (1e-2, 3e-2, 3e-2):
+        if not len(admissible):
+            break
+        along = random.standard_normal(len(admissible)) @ admissible
+        moved = q + step * scales * along / np.linalg.norm(along)
+        nearby, _ = balance.project(t, moved, still, scales)
+        if max(balance.misses(t, nearby, still, scales)[:1]) > 1e-9:
+            continue
+        found = independent_rows(scaled(nearby))
+        if len(found) > len(best):
+            best = found
+    redundant = tuple(i for i in range(count) if i not in set(best))
+    return RankFinding(tuple(best), redundant, len(best), len(at_start))
+
+
+def choose_dependent(slope: FloatArray, scales: FloatArray) -> tuple[int, ...]:
+    """Return the coordinates that the constraints determine best: pivoted elimination, largest entry first.
+
+    Parameters
+    ----------
+    slope
+        Derivatives of independent constraints.
+    scales
+        Size of each coordinate.
+    """
+    from scipy.linalg import qr
+
+    if slope.shape[0] == 0:
+        return ()
+    rows = row_scales(slope, scales)
+    _, _, pivots = qr(slope * scales / rows[:, None], pivoting=True, mode="economic")
+    return tuple(sorted(int(p) for p in pivots[: slope.shape[0]]))
+
+
+def dependence(slope: FloatArray, scales: FloatArray, dependent: tuple[int, ...]) -> float:
+    """Return how well constraints can be solved for given coordinates: 1 at best, 0 when they cannot."""
+    if not dependent:
+        return 1.0
+    rows = row_scales(slope, scales)
+    scaled = slope * scales / rows[:, None]
+    smallest = np.linalg.svd(scaled[:, list(dependent)], compute_uv=False)[-1]
+    largest = np.linalg.svd(scaled, compute_uv=False)[-1]
+    return float(smallest / largest) if largest > 0.0 else 0.0

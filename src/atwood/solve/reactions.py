@@ -1,0 +1,136 @@
+"""Accelerations and reactions along a run, for many states at once.
+
+Reactions come from the balance of forces in maximal coordinates, where every joint is a constraint, at the positions
+and velocities of either form.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import SolveError
+from atwood.forms.assembly import Assembly, FormName
+from atwood.mechanics.release import release_program
+from atwood.solve.balance import Balance
+from atwood.solve.rank import find_rank
+from atwood.solve.scales import coordinate_scales, scene_length
+
+__all__ = ["ReactionSolver", "accelerations_and_multipliers", "maximal_state"]
+
+FloatArray = NDArray[np.float64]
+
+_CHUNK = 4_000_000
+"""Numbers in the matrices that are solved at once."""
+
+
+def maximal_state(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return maximal coordinates and speeds, each of shape (number, samples), from those of the form."""
+    if assembly.form == "dae":
+        return q, u
+    big_q, big_u = assembly.kernel(assembly.to_maximal, vectorized=True)(t[None, :], q, u)
+    return big_q, big_u
+
+
+def accelerations_and_multipliers(
+    assembly: Assembly, form: FormName, t: FloatArray, q: FloatArray, u: FloatArray, kept: NDArray[np.intp]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Solve the balance of forces for many states.
+
+    Parameters
+    ----------
+    assembly, form
+        The scene and the coordinates that the states are in.
+    t, q, u
+        States, of shape (samples,) and (number, samples).
+    kept
+        Numbers of independent constraints.
+
+    Returns
+    -------
+    accelerations, multipliers, drift
+        Of shape (number, samples); drift is the constraints' explicit time derivative. With redundant constraints the
+        multipliers are those of least size.
+    """
+    program = assembly.balance(form)
+    n, m, samples = program.size, program.constraints, len(t)
+    mass, bias, _, _, gamma, slope, drift = assembly.kernel(program.program, vectorized=True)(t[None, :], q, u)
+    found_a, found_l = np.zeros((n, samples)), np.zeros((m, samples))
+    size = n + len(kept)
+    step = max(1, _CHUNK // max(1, size * size))
+    for first in range(0, samples, step):
+        part = slice(first, min(first + step, samples))
+        count = part.stop - part.start
+        full_mass = np.zeros((count, n, n))
+        full_mass[:, program.mass_rows, program.mass_columns] = mass[:, part].T
+        full_slope = np.zeros((count, m, n))
+        full_slope[:, program.slope_rows, program.slope_columns] = slope[:, part].T
+        matrix = np.zeros((count, size, size))
+        matrix[:, :n, :n] = full_mass
+        matrix[:, :n, n:] = -np.swapaxes(full_slope[:, kept], 1, 2)
+        matrix[:, n:, :n] = full_slope[:, kept]
+        right = -np.concatenate([bias[:, part].T, gamma[kept][:, part].T], axis=1)
+        scale = np.sqrt(np.maximum(np.abs(matrix).max(axis=1), np.abs(matrix).max(axis=2))) if size else right
+        scale[scale == 0.0] = 1.0
+        try:
+            solution = np.linalg.solve(matrix / scale[:, :, None] / scale[:, None, :], (right / scale)[..., None])
+        except np.linalg.LinAlgError:
+            raise SolveError(
+                "the forces do not determine the accelerations somewhere along the run",
+                advice="The mechanism passes a singular position exactly, or something without mass is free.",
+            ) from None
+        solved = solution[..., 0] / scale
+        found_a[:, part] = solved[:, :n].T
+        if len(kept) == m:
+            found_l[:, part] = solved[:, n:].T
+        else:
+            force = np.einsum("sij,sj->si", full_mass, solved[:, :n]) + bias[:, part].T
+            pseudo = np.linalg.pinv(np.swapaxes(full_slope, 1, 2), rcond=1e-9)
+            found_l[:, part] = np.einsum("sij,sj->si", pseudo, force).T
+    return found_a, found_l, np.asarray(drift)
+
+
+class ReactionSolver:
+    """Reactions of one assembled mode.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    t, q, u
+        A state in the coordinates of the form, at which the rank of the constraints is decided.
+    """
+
+    def __init__(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> None:
+        self.assembly = assembly
+        big_q, _ = maximal_state(assembly, np.array([t]), q[:, None], u[:, None])
+        program = assembly.balance("dae")
+        balance = Balance(program, assembly.kernel(program.program))
+        sizes = coordinate_scales(assembly.maximal, scene_length(assembly))
+        self.finding = find_rank(balance, t, big_q[:, 0], sizes)
+        self.kept = np.asarray(self.finding.kept, dtype=np.intp)
+        self._of_constraint = {one.key: i for i, one in enumerate(assembly.maximal.constraints)}
+        self._release = release_program(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.parameters)
+
+    def at(self, t: FloatArray, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return all reactions, of shape (number, samples), and the power of constraints that move with time."""
+        assembly = self.assembly
+        big_q, big_u = maximal_state(assembly, t, q, u)
+        a, multipliers, drift = accelerations_and_multipliers(assembly, "dae", t, big_q, big_u, self.kept)
+        values = np.zeros((len(assembly.reactions), len(t)))
+        released = None
+        if self._release is not None:
+            kernel = assembly.kernel(self._release.program, vectorized=True)
+            (released,) = kernel(t[None, :], big_q, big_u, a, multipliers)
+        for i, reaction in enumerate(assembly.reactions):
+            if reaction.axis >= 0:
+                if released is not None and reaction.path in self._release.rows:  # type: ignore[union-attr]
+                    values[i] = released[self._release.rows[reaction.path]]  # type: ignore[union-attr]
+            elif reaction.key in self._of_constraint:
+                values[i] = reaction.sign * multipliers[self._of_constraint[reaction.key]]
+        power = -np.sum(multipliers * drift, axis=0) if len(multipliers) else np.zeros(len(t))
+        return values, power
+
+    def own_accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, kept: NDArray[np.intp]) -> FloatArray:
+        """Return the accelerations of the form's coordinates."""
+        return accelerations_and_multipliers(self.assembly, self.assembly.form, t, q, u, kept)[0]

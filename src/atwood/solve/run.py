@@ -1,0 +1,354 @@
+"""Runs: from start to end through all modes, with projected outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import SolveError, UsageError
+from atwood.forms.assembly import Assembly
+from atwood.solve.driver import Advance, Budget, Session, SolverOptions, Statistics, Status
+from atwood.solve.modes import EventProbe, Happening, enter_mode
+from atwood.solve.problem import Plan, make_plan, pack_state
+from atwood.solve.start import Start
+
+__all__ = ["Run", "RunOptions", "Segment", "run"]
+
+FloatArray = NDArray[np.float64]
+
+_SAMPLES = 400
+"""A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it."""
+
+_CHATTER = 50
+"""So many changes of mode without time passing end a run."""
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run is made.
+
+    Attributes
+    ----------
+    t_end
+        Time of the end, s.
+    relative_tolerance
+        Error allowed in a step; absolute tolerances are this share of the scene's sizes.
+    outputs
+        Number of output times, evenly spread, or the times themselves.
+    max_steps, max_seconds
+        Limits of the run.
+    progress
+        Called with the time reached.
+    max_order, max_step
+        Limits for the method.
+    """
+
+    t_end: float
+    relative_tolerance: float = 1e-8
+    outputs: int | FloatArray = 201
+    max_steps: int | None = None
+    max_seconds: float | None = None
+    progress: Callable[[float], object] | None = None
+    max_order: int = 5
+    max_step: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A stretch of a run in one mode.
+
+    Attributes
+    ----------
+    plan
+        What it was run with.
+    time
+        Sample times, shape (samples,).
+    coordinates, speeds
+        Of the form, projected where the form has constraints; shape (number, samples).
+    shown
+        Which samples are outputs.
+    held
+        By how much the solver's own states missed the constraints on position and velocity, shape (2, samples).
+    """
+
+    plan: Plan
+    time: FloatArray
+    coordinates: FloatArray
+    speeds: FloatArray
+    shown: NDArray[np.bool_]
+    held: FloatArray
+
+    @property
+    def assembly(self) -> Assembly:
+        """The scene in this mode."""
+        return self.plan.assembly
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What a run produced.
+
+    Attributes
+    ----------
+    segments
+        The stretches between changes of mode.
+    happenings
+        Events, in order.
+    statistics
+        What the solver did.
+    status
+        ``"finished"``, ``"stopped"`` by an event, or ``"step_limit"``, ``"time_limit"``, ``"interrupted"``,
+        ``"failed"``.
+    message
+        Why it ended, in words.
+    start
+        The start.
+    options
+        What was asked for.
+    """
+
+    segments: tuple[Segment, ...]
+    happenings: tuple[Happening, ...]
+    statistics: Statistics
+    status: str
+    message: str
+    start: Start
+    options: RunOptions
+
+
+@dataclass
+class _Recorder:
+    """Takes up samples of a segment."""
+
+    plan: Plan
+    time: list[float] = field(default_factory=list)
+    q: list[FloatArray] = field(default_factory=list)
+    u: list[FloatArray] = field(default_factory=list)
+    shown: list[bool] = field(default_factory=list)
+    held: list[tuple[float, float]] = field(default_factory=list)
+
+    def take(self, t: float, y: FloatArray, shown: bool) -> tuple[FloatArray, FloatArray]:
+        """Record a state of the solver, projected; return what was recorded."""
+        plan = self.plan
+        n = plan.program.coordinates
+        q, u = y[:n].copy(), y[n : 2 * n].copy()
+        self.held.append(plan.balance.misses(t, q, u, plan.sizes))
+        if plan.is_projected:
+            q, u = plan.balance.project(t, q, u, plan.sizes)
+        if self.time and self.time[-1] == t:  # an output time that is also an event: keep the state after it
+            for held in (self.time, self.q, self.u, self.shown, self.held):
+                held.pop(-2 if held is self.held else -1)  # type: ignore[attr-defined]
+        self.time.append(t)
+        self.q.append(q)
+        self.u.append(u)
+        self.shown.append(shown)
+        return q, u
+
+    def segment(self) -> Segment:
+        """Return what was recorded."""
+        return Segment(
+            self.plan,
+            np.array(self.time),
+            np.array(self.q).T.reshape(self.plan.program.coordinates, len(self.time)),
+            np.array(self.u).T.reshape(self.plan.program.coordinates, len(self.time)),
+            np.array(self.shown),
+            np.array(self.held).T,
+        )
+
+
+def run(
+    assembly: Assembly,
+    start: Start,
+    options: RunOptions,
+    reassemble: Callable[[Mapping[str, str]], Assembly],
+) -> Run:
+    """Run a scene from its start to its end.
+
+    Parameters
+    ----------
+    assembly, start
+        The scene and its start.
+    options
+        How.
+    reassemble
+        Gives the scene in other modes.
+
+    Raises
+    ------
+    UsageError
+        If the end is not after the start.
+    SolveError
+        If the solver fails; what came before is in its `run` attribute.
+    """
+    t = start.time
+    if not options.t_end > t or not np.isfinite(options.t_end):
+        raise UsageError(
+            f"the end, t = {options.t_end:g}, is not after the start, t = {t:g}", advice="Give a later t_end."
+        )
+    times, shown = _sample_times(t, options)
+    q, u = _own_state(assembly, start)
+    segments: list[Segment] = []
+    happenings: list[Happening] = []
+    statistics = Statistics()
+    recent = 0
+    while True:
+        plan = make_plan(assembly, t, q, u, start.length, options.t_end - start.time)
+        probe = EventProbe(assembly, t, q, u)
+        recorder = _Recorder(plan)
+        left = times > t
+        outcome = _run_mode(plan, probe, recorder, t, q, u, times[left], shown[left], bool(shown[~left][-1]), options, statistics)
+        segments.append(recorder.segment())
+        statistics = statistics + outcome.statistics
+        status, message = outcome.status, outcome.message
+        recent = recent + 1 if outcome.t - t < 1e-9 * (options.t_end - start.time) else 0
+        t = outcome.t
+        if outcome.happening is None:
+            break
+        happenings.append(outcome.happening)
+        if outcome.happening.target == "stop":
+            status, message = "stopped", outcome.happening.describe()
+            break
+        if recent > _CHATTER:
+            status, message = "failed", f"{outcome.happening.part} changes its mode endlessly at t = {t:.9g}"
+            break
+        assembly, q, u = enter_mode(recorder, assembly, outcome.happening, reassemble, start.length)
+        if t >= options.t_end:
+            status, message = "finished", ""
+            break
+    made = Run(tuple(segments), tuple(happenings), statistics, status, message, start, options)
+    if status == "failed":
+        error = SolveError(message, where=assembly.flat.name, advice="Look at what came before: the error's `run`.")
+        error.run = made  # type: ignore[attr-defined]
+        raise error
+    return made
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    t: float
+    status: str
+    message: str
+    happening: Happening | None
+    statistics: Statistics
+
+
+def _run_mode(
+    plan: Plan,
+    probe: EventProbe,
+    recorder: _Recorder,
+    t: float,
+    q: FloatArray,
+    u: FloatArray,
+    times: FloatArray,
+    shown: NDArray[np.bool_],
+    first_shown: bool,
+    options: RunOptions,
+    spent: Statistics,
+) -> _Outcome:
+    """Integrate in one mode until the end, an event or a limit."""
+    n = plan.program.coordinates
+    if n == 0:
+        for moment, show in zip([t, *times], [first_shown, *shown], strict=True):
+            recorder.take(moment, np.zeros(0), show)
+        return _Outcome(float(times[-1]), "finished", "", None, Statistics())
+    y, yp = pack_state(plan, t, q, u)
+    recorder.take(t, y, first_shown)
+    already = probe.broken_at_start(t, q, u)
+    if already is not None:
+        return _Outcome(t, "event", "", already, Statistics())
+    session = _open(plan, probe, options, t, y, yp, spent)
+    for moment, show in zip(times, shown, strict=True):
+        advance = session.advance(float(moment))
+        if advance.status is Status.FAILED and plan.review_dependent(advance.t, advance.y[:n]):
+            _restart(plan, session, advance)
+            advance = session.advance(float(moment))
+        if advance.status is Status.REACHED:
+            q, u = recorder.take(advance.t, advance.y, show)
+            plan.review_dependent(advance.t, q)
+            _repair(plan, recorder, session, advance, q, u, options)
+        elif advance.status is Status.EVENT:
+            q, u = recorder.take(advance.t, advance.y, True)
+            happening = probe.name(advance.t, advance.events)
+            return _Outcome(advance.t, "event", "", happening, session.statistics)
+        else:
+            if not recorder.time or advance.t > recorder.time[-1]:
+                recorder.take(advance.t, advance.y, True)
+            return _Outcome(advance.t, advance.status.value, advance.message, None, session.statistics)
+        if options.progress is not None:
+            options.progress(float(moment))
+    return _Outcome(float(times[-1]), "finished", "", None, session.statistics)
+
+
+def _open(
+    plan: Plan, probe: EventProbe, options: RunOptions, t: float, y: FloatArray, yp: FloatArray, spent: Statistics
+) -> Session:
+    from atwood.solve.ida_sundae import open_session
+
+    settings = SolverOptions(
+        relative_tolerance=options.relative_tolerance,
+        absolute_tolerances=plan.tolerances(options.relative_tolerance),
+        max_step=options.max_step,
+        max_order=options.max_order,
+        horizon=options.t_end - t if options.t_end > t else 1.0,
+    )
+    budget = Budget(
+        max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
+        wall_seconds=None if options.max_seconds is None else max(0.0, options.max_seconds - spent.seconds),
+    )
+    problem = plan.problem(probe.function(), probe.directions)
+    return open_session(problem, settings, t, y, yp, budget)
+
+
+def _restart(plan: Plan, session: Session, advance: Advance) -> None:
+    n = plan.program.coordinates
+    q, u = plan.balance.project(advance.t, advance.y[:n].copy(), advance.y[n : 2 * n].copy(), plan.sizes)
+    session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
+
+
+def _repair(
+    plan: Plan,
+    recorder: _Recorder,
+    session: Session,
+    advance: Advance,
+    q: FloatArray,
+    u: FloatArray,
+    options: RunOptions,
+) -> None:
+    """At index 1 with projection: go on from the projected state once the drift outgrows the error of the steps."""
+    if plan.program.level == "index1-projected" and max(recorder.held[-1]) > 100.0 * options.relative_tolerance:
+        session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
+
+
+def _own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
+    """Return the start in the coordinates of the form."""
+    if assembly.form == "reduced":
+        return start.coordinates, start.speeds
+    kernel = assembly.kernel(assembly.to_maximal)
+    q, u = kernel([start.time], start.coordinates, start.speeds)
+    return np.asarray(q, dtype=float), np.asarray(u, dtype=float)
+
+
+def _sample_times(t: float, options: RunOptions) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return all sample times with the start, and which of them are outputs."""
+    if isinstance(options.outputs, (int, np.integer)):
+        if options.outputs < 2:
+            raise UsageError("there must be at least two outputs, the start and the end")
+        asked = np.linspace(t, options.t_end, int(options.outputs))
+    else:
+        asked = np.asarray(options.outputs, dtype=float)
+        if asked.ndim != 1 or not len(asked) or not np.all(np.isfinite(asked)) or np.any(np.diff(asked) <= 0.0):
+            raise UsageError("output times must be finite and rise")
+        if asked[0] < t or asked[-1] > options.t_end:
+            raise UsageError(f"output times must lie between {t:g} and {options.t_end:g}")
+    filling = np.linspace(t, options.t_end, _SAMPLES + 1)
+    near = 1e-9 * (options.t_end - t)
+    filling = filling[np.min(np.abs(filling[:, None] - asked[None, :]), axis=1) > near]
+    times = np.concatenate([asked, filling])
+    shown = np.concatenate([np.ones(len(asked), dtype=bool), np.zeros(len(filling), dtype=bool)])
+    order = np.argsort(times)
+    return times[order], shown[order]
+
+

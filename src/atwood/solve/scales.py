@@ -1,0 +1,95 @@
+"""Sizes of a scene: what counts as small for each coordinate, speed and force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.expr import evaluate
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.equations import Equations
+
+__all__ = ["Scales", "coordinate_scales", "find_scales", "scene_length"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Sizes of a scene.
+
+    Attributes
+    ----------
+    length
+        Extent of the scene, m.
+    time
+        Time in which something happens, s.
+    force
+        Size of a force, N.
+    """
+
+    length: float
+    time: float
+    force: float
+
+
+def scene_length(assembly: Assembly) -> float:
+    """Return the extent of a scene from its parameters that are lengths; 1 m if it has none."""
+    sizes = [0.0]
+    for part in assembly.flat.parts.values():
+        for name, spec in part.component.parameter_specs().items():
+            value = part.values[name]
+            if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
+                sizes += [abs(v) for v in (value if isinstance(value, tuple) else (value,))]
+    for path, value in assembly.flat.start.items():
+        observable = assembly.start_observables.get(path)
+        if observable is not None and observable.unit == "m":
+            sizes.append(abs(value))
+    return max(sizes) or 1.0
+
+
+def coordinate_scales(equations: Equations, length: float) -> FloatArray:
+    """Return the size of each coordinate: the extent for a length, one radian for an angle."""
+    return np.array([length if one.unit == "m" else 1.0 for one in equations.names])
+
+
+def find_scales(
+    assembly: Assembly,
+    length: float,
+    speeds: FloatArray,
+    accelerations: FloatArray,
+    sizes: FloatArray,
+    span: float,
+) -> Scales:
+    """Return the sizes of a scene from its start.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    length
+        Its extent.
+    speeds, accelerations
+        At the start, of generalized coordinates.
+    sizes
+        Size of each of these coordinates.
+    span
+        Length of the run, s.
+    """
+    times = [span]
+    with np.errstate(divide="ignore"):
+        times += (sizes / np.abs(speeds)).tolist()
+        times += np.sqrt(sizes / np.abs(accelerations)).tolist()
+    parameters = assembly.mechanism.table.values
+    gravity = next((v for s, v in parameters.items() if s.name == "gravity"), 0.0)
+    if gravity:
+        times.append(float(np.sqrt(length / abs(gravity))))
+    time = min(t for t in times if t > 0.0)
+    masses = assembly.equations.masses
+    graph = assembly.mechanism.table.graph
+    total = sum(
+        evaluate([graph.convert(one.mass) for one in masses.bodies.values()], parameters), 0.0
+    ) + sum(evaluate([graph.convert(m) for one in masses.coupled for row in one.masses for m in row], parameters), 0.0)
+    return Scales(length, time, (total or 1.0) * length / time**2)

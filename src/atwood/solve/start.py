@@ -1,0 +1,288 @@
+"""Consistent start values, from what the user fixes and guesses.
+
+Positions first: Newton's method finds the configuration nearest to the guesses that fulfils the constraints and
+everything that is fixed. Then speeds, a linear problem of the same kind. Accelerations and multipliers follow from the
+balance of forces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import StartError, suggestion
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian
+from atwood.forms.assembly import Assembly
+from atwood.kernels import compile_program
+from atwood.mechanics.equations import Equations
+from atwood.mechanics.observables import Observable
+from atwood.solve.balance import independent_rows, least_norm, row_scales
+from atwood.solve.scales import coordinate_scales, scene_length
+
+__all__ = ["Start", "find_start"]
+
+FloatArray = NDArray[np.float64]
+
+_MET = 1e-11
+"""Relative to the scene's sizes: how well a start condition must be met."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """A consistent start in generalized coordinates.
+
+    Attributes
+    ----------
+    time
+        s.
+    coordinates, speeds
+        Of the reduced form.
+    length
+        Extent of the scene, m.
+    free_coordinates, free_speeds
+        Paths of the coordinates and speeds that nothing fixed: they kept their guess as far as they could.
+    repeated
+        Paths of fixed values that follow from the others.
+    """
+
+    time: float
+    coordinates: FloatArray
+    speeds: FloatArray
+    length: float
+    free_coordinates: tuple[str, ...]
+    free_speeds: tuple[str, ...]
+    repeated: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Target:
+    path: str
+    value: float
+    observable: Observable
+    scale: float
+
+
+@dataclass(frozen=True)
+class _Level:
+    """Targets of one level, position or velocity, split into what is fixed and what is guessed."""
+
+    fixed: list[_Target]
+    guessed: list[_Target]
+
+
+def find_start(assembly: Assembly) -> Start:
+    """Find a consistent start.
+
+    Parameters
+    ----------
+    assembly
+        The scene, with its start values and guesses.
+
+    Raises
+    ------
+    StartError
+        If a start value names no quantity, or they contradict each other or the constraints.
+    """
+    equations, length = assembly.reduced, scene_length(assembly)
+    positions, speeds = _sort_targets(assembly, equations, length)
+    scales = coordinate_scales(equations, length)
+    t = assembly.flat.t_start
+    q, free_q, repeated_q = _solve_positions(assembly, equations, positions, scales, t)
+    u, free_u, repeated_u = _solve_speeds(assembly, equations, speeds, scales, t, q)
+    return Start(t, q, u, length, free_q, free_u, (*repeated_q, *repeated_u))
+
+
+def _sort_targets(assembly: Assembly, equations: Equations, length: float) -> tuple[_Level, _Level]:
+    observables = assembly.start_observables
+    late = [*equations.accelerations, *(r.symbol for r in assembly.reactions)]
+    levels = (_Level([], []), _Level([], []))
+    for is_fixed, given in ((True, assembly.flat.start), (False, assembly.flat.guess)):
+        for path, value in given.items():
+            if path not in observables:
+                raise StartError(
+                    "there is no such quantity to start with", where=path, advice=suggestion(path, list(observables))
+                )
+            one = observables[path]
+            if depends_on(one.value, late):
+                raise StartError(
+                    "it follows from positions and speeds and cannot be chosen at the start",
+                    where=path,
+                    advice="Give coordinates, positions and velocities.",
+                )
+            scale = length if one.unit.startswith("m") else 1.0
+            level = levels[1] if depends_on(one.value, equations.speeds) else levels[0]
+            (level.fixed if is_fixed else level.guessed).append(_Target(path, value, one, scale))
+    return levels
+
+
+class _System:
+    """Values and derivatives of targets and constraints with respect to coordinates or speeds."""
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        equations: Equations,
+        targets: Sequence[_Target],
+        constraints: Sequence[Expression],
+        unknowns: Sequence[Expression],
+    ) -> None:
+        expressions = [*constraints, *(one.observable.value for one in targets)]
+        entries = jacobian(expressions, list(unknowns)) if expressions else None
+        groups = (
+            InputGroup("t", (equations.time,)),
+            InputGroup("q", equations.coordinates),
+            InputGroup("u", equations.speeds),
+        )
+        outputs = (
+            OutputGroup("values", tuple(expressions)),
+            OutputGroup("slopes", tuple(entries.entries) if entries else ()),
+        )
+        program = Program(f"{assembly.flat.name} start", groups, assembly.parameters, outputs)
+        self.kernel = compile_program(program).bind(assembly.parameter_values)
+        self.rows = entries.rows if entries else ()
+        self.columns = entries.columns if entries else ()
+        self.shape = (len(expressions), len(unknowns))
+        self.targets, self.constraints = targets, len(constraints)
+
+    def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what is missing in each equation, and the derivatives."""
+        values, slopes = self.kernel([t], q, u)
+        matrix = np.zeros(self.shape)
+        matrix[self.rows, self.columns] = slopes
+        missing = np.asarray(values, dtype=float)
+        for i, target in enumerate(self.targets, start=self.constraints):
+            missing[i] -= target.value
+            if target.observable.periodic:
+                missing[i] = np.remainder(missing[i] + np.pi, 2.0 * np.pi) - np.pi
+        return missing, matrix
+
+
+def _newton(
+    system: _System, scales: FloatArray, t: float, q: FloatArray, iterations: int = 60
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Move to the nearest configuration that fulfils a system; return it with what is missing, scaled."""
+    still = np.zeros_like(q)
+    missing, matrix = system.at(t, q, still)
+    rows = row_scales(matrix, scales)
+    for _ in range(iterations):
+        size = float(np.max(np.abs(missing / rows), initial=0.0))
+        if size < 1e-15:
+            break
+        step = scales * least_norm(matrix * scales / rows[:, None], missing / rows)
+        longest = float(np.max(np.abs(step / scales), initial=0.0))
+        step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
+        for _ in range(8):
+            trial = q - step
+            new_missing, new_matrix = system.at(t, trial, still)
+            if float(np.max(np.abs(new_missing / rows))) < size or longest < 1e-9:
+                break
+            step *= 0.5
+        if float(np.max(np.abs(new_missing / rows))) >= size and size < _MET:
+            break
+        q, missing, matrix = trial, new_missing, new_matrix
+        rows = row_scales(matrix, scales)
+    return q, missing / rows, matrix * scales / rows[:, None]
+
+
+def _solve_positions(
+    assembly: Assembly, equations: Equations, level: _Level, scales: FloatArray, t: float
+) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
+    constraints = [one.value for one in equations.constraints]
+    q = np.zeros(len(equations.coordinates))
+    by_symbol = {symbol: i for i, symbol in enumerate(equations.coordinates)}
+    rough = [*level.guessed, *level.fixed]
+    for target in rough:  # what is said of a coordinate itself needs no iteration
+        if target.observable.value in by_symbol:
+            q[by_symbol[target.observable.value]] = target.value
+    if any(target.observable.value not in by_symbol for target in rough):
+        q, _, _ = _newton(_System(assembly, equations, rough, [], equations.coordinates), scales, t, q, iterations=20)
+    system = _System(assembly, equations, level.fixed, constraints, equations.coordinates)
+    q, missing, matrix = _newton(system, scales, t, q)
+    if missing.size and not float(np.max(np.abs(missing))) <= _MET:
+        _explain_positions(assembly, equations, level, scales, t, q, missing)
+    return q, *_counted(equations, level.fixed, len(constraints), matrix)
+
+
+def _explain_positions(
+    assembly: Assembly,
+    equations: Equations,
+    level: _Level,
+    scales: FloatArray,
+    t: float,
+    q: FloatArray,
+    missing: FloatArray,
+) -> None:
+    """Raise the error that says whether a loop cannot close or the start contradicts itself."""
+    constraints = [one.value for one in equations.constraints]
+    if constraints:
+        _, alone, _ = _newton(_System(assembly, equations, [], constraints, equations.coordinates), scales, t, q)
+        if not float(np.max(np.abs(alone))) <= _MET:
+            worst = int(np.argmax(np.abs(alone)))
+            one = equations.constraints[worst]
+            involved = sorted({c.key[0] for c in equations.constraints})
+            raise StartError(
+                f"the loop cannot close here: the nearest position found misses by {np.max(np.abs(alone)):.3g} "
+                f"of the scene's size (constraints of {', '.join(involved)})",
+                where=one.key[0],
+                advice="Check the lengths of the loop, or guess a start nearer to a position in which it closes.",
+            )
+    _raise_contradiction(level.fixed, missing[len(constraints) :], equations)
+
+
+def _raise_contradiction(fixed: Sequence[_Target], missing: FloatArray, equations: Equations) -> None:
+    failing = [f"{target.path} = {target.value:g}" for target, miss in zip(fixed, missing, strict=True) if abs(miss) > _MET]
+    names = failing or [f"{target.path} = {target.value:g}" for target in fixed]
+    where = next((t.path for t, m in zip(fixed, missing, strict=True) if abs(m) > _MET), fixed[0].path if fixed else "")
+    raise StartError(
+        f"the start values contradict each other or the constraints: {', '.join(names)} cannot all hold",
+        where=where,
+        advice=f"The mechanism has {len(equations.coordinates) - len(equations.constraints)} free coordinates; "
+        "fix fewer values, or give some as guesses.",
+    )
+
+
+def _solve_speeds(
+    assembly: Assembly, equations: Equations, level: _Level, scales: FloatArray, t: float, q: FloatArray
+) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
+    rates = [one.rate for one in equations.constraints]
+    u = np.zeros(len(equations.speeds))
+    if level.guessed:
+        rough = _System(assembly, equations, level.guessed, [], equations.speeds)
+        missing, matrix = rough.at(t, q, u)
+        u = u - scales * least_norm(matrix * scales, missing)
+    system = _System(assembly, equations, level.fixed, rates, equations.speeds)
+    for _ in range(3):  # linear: the second pass takes out rounding
+        missing, matrix = system.at(t, q, u)
+        if not missing.size:
+            break
+        rows = row_scales(matrix, scales)
+        u = u - scales * least_norm(matrix * scales / rows[:, None], missing / rows)
+    missing, matrix = system.at(t, q, u)
+    if missing.size:
+        rows = row_scales(matrix, scales)
+        speed = max([1e-300, *(abs(x.value) / s for x, s in zip(level.fixed, rows[len(rates) :], strict=True))])
+        if not float(np.max(np.abs(missing / rows))) <= 1e-9 * max(speed, float(np.max(np.abs(u / scales), initial=0.0))):
+            _raise_contradiction(level.fixed, (missing / rows)[len(rates) :] / speed, equations)
+        matrix = matrix * scales / rows[:, None]
+    return u, *_counted(equations, level.fixed, len(rates), matrix)
+
+
+def _counted(
+    equations: Equations, fixed: Sequence[_Target], constraints: int, matrix: FloatArray
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return which coordinates nothing determines, and which fixed values repeat others."""
+    names = [c.name for c in equations.names]
+    if not matrix.size:
+        return tuple(names), ()
+    kept = independent_rows(matrix)
+    repeated = tuple(t.path for i, t in enumerate(fixed, start=constraints) if i not in kept)
+    _, sizes, directions = np.linalg.svd(matrix)
+    rank = int(np.sum(sizes > 1e-9 * max(sizes[0], 1e-300))) if sizes.size else 0
+    open_directions = directions[rank:]
+    free = tuple(n for i, n in enumerate(names) if open_directions.size and np.max(np.abs(open_directions[:, i])) > 1e-6)
+    return free, repeated
+
+
