@@ -22,6 +22,8 @@ from atwood_library.sensors.energy_sensor import EnergySensor
 from atwood_library.sensors.force_sensor import ForceSensor
 from atwood_library.sensors.position_sensor import PositionSensor
 from atwood_library.sensors.relative_position_sensor import RelativePositionSensor
+from atwood_library.sources.ramp import Ramp
+from atwood_library.sources.sine import Sine
 
 __all__ = [
     "Damper",
@@ -36,10 +38,12 @@ __all__ = [
     "PointMass",
     "PositionSensor",
     "Pulley",
+    "Ramp",
     "RelativePositionSensor",
     "Rod",
     "Rope",
     "RotaryDrive",
+    "Sine",
     "Slider",
     "Spring",
     "Torque",

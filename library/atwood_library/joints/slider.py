@@ -25,7 +25,10 @@ class Slider(Component):
     """
 
     axis: tuple[float, float, float] = parameter(
-        (1.0, 0.0, 0.0), size=3, structural=True, doc="Direction of the guide in frame a, a unit vector in its x-z plane."
+        (1.0, 0.0, 0.0),
+        size=3,
+        structural=True,
+        doc="Direction of the guide in frame a, a unit vector in its x-z plane.",
     )
     a: Frame = connector(Frame, "The frame that carries the guide.")
     b: Frame = connector(Frame, "The frame that slides.")

@@ -53,7 +53,11 @@ class Mass1D(Component):
     def guide(self) -> Scalar:
         """Return the distance from the line; nothing on a line, where it cannot leave."""
         axis = self.direction()
-        return dot(self.flange.position - as_vector(self.origin), Vector(-axis.z, 0.0, axis.x)) if not self.on_a_line else 0.0
+        return (
+            dot(self.flange.position - as_vector(self.origin), Vector(-axis.z, 0.0, axis.x))
+            if not self.on_a_line
+            else 0.0
+        )
 
     @joint("world", "flange", coordinates=("displacement",), solves=("guide",), spaces=("line", "plane"))
     def slide(self, displacement: Scalar) -> Placement:

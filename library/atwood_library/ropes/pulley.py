@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from atwood import Component, Groove, Placement, Point, PointInertia, Vector, connector, inertia, joint, observable, parameter
+from atwood import (
+    Component,
+    Groove,
+    Placement,
+    Point,
+    PointInertia,
+    Vector,
+    connector,
+    inertia,
+    joint,
+    observable,
+    parameter,
+)
 
 
 class Pulley(Component):

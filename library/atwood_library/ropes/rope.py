@@ -18,7 +18,9 @@ class Rope(Component):
 
     pulleys: int = parameter(0, minimum=0, integer=True, doc="How many pulleys it passes.")
     length: float = parameter(1.0, unit="m", above=0.0, doc="Length from a to b.")
-    when_slack: str = parameter("stop", choices=("stop", "slack"), doc="What happens when the tension becomes negative.")
+    when_slack: str = parameter(
+        "stop", choices=("stop", "slack"), doc="What happens when the tension becomes negative."
+    )
     a: Point = connector(Point, "One end.")
     over: Sequence[Groove] = connector(Groove, "The pulleys it passes, in order from a to b.", count="pulleys")
     b: Point = connector(Point, "The other end.")
@@ -26,7 +28,7 @@ class Rope(Component):
     def spans(self) -> list[Scalar]:
         """Return the lengths of the straight pieces, from a to b."""
         stops = [self.a, *self.over, self.b]
-        return [self.distance(p, q) for p, q in zip(stops, stops[1:], strict=False)]
+        return [self.distance(p, q, side=None) for p, q in zip(stops, stops[1:], strict=False)]
 
     @constraint(reaction="tension", unit="N", sign=-1.0, modes=("taut",), doc="Tension; zero when slack.")
     def fixed_length(self) -> Scalar:

@@ -308,6 +308,8 @@ def resolve_signals(
     """
     raw: dict[Expression, Expression] = {}
     for (path, name), (source, observable) in mechanism.links.items():
+        if name not in mechanism.locals_[path].signal_symbols:
+            continue  # a function of time, which is in place already
         local = mechanism.locals_[source]
         law, _, axis = observable.partition(".")
         value = getattr(bind(local.part.component, local.binding), law)()

@@ -135,9 +135,10 @@ def observe(mechanism: Mechanism, equations: Equations, reactions: Sequence[Reac
             options = law.options
             _take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic)
         kinetic, potential = parts[path]
-        if not kinetic.is_zero or local.part.component.laws("inertia"):
+        has_inertia = bool(local.part.component.laws("inertia"))
+        if has_inertia:
             _take(mechanism, found, f"{path}.kinetic_energy", kinetic, "J", "Kinetic energy.", False)
-        if not potential.is_zero or local.potentials:
+        if has_inertia or local.potentials:
             _take(mechanism, found, f"{path}.potential_energy", potential, "J", "Potential energy.", False)
     for reaction in reactions:
         found[reaction.path] = Observable(reaction.path, reaction.unit, reaction.doc, False, reaction.symbol)

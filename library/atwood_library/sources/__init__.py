@@ -1,0 +1,1 @@
+"""Sources of the library: functions of time that drive inputs."""
