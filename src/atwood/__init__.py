@@ -1,11 +1,174 @@
-"""Atwood: mechanics from parts."""
+"""Atwood: mechanics from parts.
 
-from atwood.expr import *  # noqa
+Everything that is needed to write components, models and scenes is here, and so are the functions that assemble and
+run them; those are loaded when they are first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from atwood.errors import (
+    AtwoodError,
+    ConnectError,
+    DeclarationError,
+    KernelEvaluationError,
+    ParameterError,
+    ResultError,
+    SolveError,
+    StartError,
+    TopologyError,
+    UnsupportedError,
+    UsageError,
+)
+from atwood.expr.functions import (
+    Scalar,
+    absolute,
+    acos,
+    asin,
+    atan,
+    atan2,
+    cos,
+    cosh,
+    exp,
+    external,
+    hypot,
+    log,
+    maximum,
+    minimum,
+    select,
+    sign,
+    sin,
+    sinh,
+    sqrt,
+    tan,
+    tanh,
+)
+from atwood.expr.functions import solve as solve_linear  # `atwood.solve` is the package of solvers
+from atwood.expr.graph import Expression
+from atwood.expr.operations import ExternalFunction
 from atwood.model.component import Component
 from atwood.model.composite import Model, connect
 from atwood.model.connectors import Connector, Frame, Groove, Point, connector
 from atwood.model.fields import parameter, signal
-from atwood.model.laws import *  # noqa
-from atwood.model.laws import Load, force
+from atwood.model.laws import (
+    BodyInertia,
+    Load,
+    Placement,
+    PointInertia,
+    constraint,
+    dissipation,
+    event,
+    force,
+    inertia,
+    joint,
+    observable,
+    potential,
+)
 from atwood.model.scene import Scene
 from atwood.model.vector import Vector, as_vector, cross, dot, norm
+
+if TYPE_CHECKING:
+    from atwood.model.store import from_data, load_scene, save_scene, to_data
+
+    __version__: str
+
+__all__ = [
+    "AtwoodError",
+    "BodyInertia",
+    "Component",
+    "ConnectError",
+    "Connector",
+    "DeclarationError",
+    "Expression",
+    "ExternalFunction",
+    "Frame",
+    "Groove",
+    "KernelEvaluationError",
+    "Load",
+    "Model",
+    "ParameterError",
+    "Placement",
+    "Point",
+    "PointInertia",
+    "ResultError",
+    "Scalar",
+    "Scene",
+    "SolveError",
+    "StartError",
+    "TopologyError",
+    "UnsupportedError",
+    "UsageError",
+    "Vector",
+    "__version__",
+    "absolute",
+    "acos",
+    "as_vector",
+    "asin",
+    "atan",
+    "atan2",
+    "connect",
+    "connector",
+    "constraint",
+    "cos",
+    "cosh",
+    "cross",
+    "dissipation",
+    "dot",
+    "event",
+    "exp",
+    "external",
+    "force",
+    "from_data",
+    "hypot",
+    "inertia",
+    "joint",
+    "load_scene",
+    "log",
+    "maximum",
+    "minimum",
+    "norm",
+    "observable",
+    "parameter",
+    "potential",
+    "save_scene",
+    "select",
+    "sign",
+    "signal",
+    "sin",
+    "sinh",
+    "solve_linear",
+    "sqrt",
+    "tan",
+    "tanh",
+    "to_data",
+]
+
+_LATER = {
+    "from_data": "atwood.model.store",
+    "load_scene": "atwood.model.store",
+    "save_scene": "atwood.model.store",
+    "to_data": "atwood.model.store",
+}
+"""Names whose modules are imported when they are first used; each also stands in `__all__` and above."""
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            found: Any = version("atwood")
+        except PackageNotFoundError:  # a checkout that is not installed
+            found = "0+unknown"
+    elif name in _LATER:
+        found = getattr(importlib.import_module(_LATER[name]), name)
+    else:
+        raise AttributeError(f"module 'atwood' has no attribute {name!r}")
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from atwood import Component, Groove, Point, Scalar, connector, constraint, dot, event, minimum, observable, parameter
 
@@ -28,7 +29,7 @@ class Rope(Component):
     def spans(self) -> list[Scalar]:
         """Return the lengths of the straight pieces, from a to b."""
         stops = [self.a, *self.over, self.b]
-        return [self.distance(p, q, side=None) for p, q in zip(stops, stops[1:], strict=False)]
+        return [self.distance(p, q, side=None) for p, q in pairwise(stops)]
 
     @constraint(reaction="tension", unit="N", sign=-1.0, modes=("taut",), doc="Tension; zero when slack.")
     def fixed_length(self) -> Scalar:

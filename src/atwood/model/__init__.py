@@ -1,0 +1,1 @@
+"""Declaring: parameters, connectors, laws, components, models and scenes."""

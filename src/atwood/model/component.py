@@ -4,57 +4,20 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self, dataclass_transform
 
 from atwood.errors import DeclarationError, ParameterError, UsageError, suggestion
 from atwood.expr import Scalar
-from atwood.model.connectors import Connector, ConnectorSpec, InputRef, Motion, OutputRef, connector
-from atwood.model.fields import MISSING, Deferred, ParameterSpec, SignalSpec, parameter, signal
+from atwood.model.binding import Binding
+from atwood.model.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
+from atwood.model.fields import MISSING, Deferred, Field, ParameterSpec, SignalSpec
 from atwood.model.laws import Kind, Law
 from atwood.model.vector import Vector, dot, norm
 
 __all__ = ["Binding", "Component", "bind"]
 
 
-@dataclass(frozen=True)
-class Binding:
-    """What the laws of a component are evaluated on: floats, expressions or sympy terms.
-
-    Attributes
-    ----------
-    values
-        Parameters and signals by name.
-    motions
-        What each connector knows, by name.
-    time
-        The time.
-    space
-        ``"line"``, ``"plane"`` or ``"space"``.
-    line
-        Unit vector of the line, for a scene on a line.
-    sides
-        On a line: +1 or -1 for a pair of connector names, the sign of the second's position minus the first's.
-    known
-        Observables that are known without their formula, such as a joint coordinate.
-    reactions
-        Reactions by name.
-    energies
-        ``"kinetic"`` and ``"potential"`` energy of the model that the component is placed in.
-    """
-
-    values: Mapping[str, Any]
-    motions: Mapping[str, Motion] = field(default_factory=dict)
-    time: Scalar = 0.0
-    space: str = "plane"
-    line: Vector | None = None
-    sides: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    known: Mapping[str, Any] = field(default_factory=dict)
-    reactions: Mapping[str, Any] = field(default_factory=dict)
-    energies: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass_transform(kw_only_default=True, field_specifiers=(parameter, signal, connector))
+@dataclass_transform(kw_only_default=True, field_specifiers=(connector,))
 class Component:
     """A part: it has parameters, connectors and laws, and sees neither the graph nor the solver.
 
@@ -85,38 +48,40 @@ class Component:
     _parent: Component | None
     _name: str
     _settings: dict[str, Any]
-    _changed: set[str]
-    _bound: Binding | None
+    _token: object
+    _bound: Binding | None = None
+    _declared: str = ""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        cls._parameters = dict(cls._parameters)
-        cls._signals = dict(cls._signals)
-        cls._connectors = dict(cls._connectors)
-        cls._laws = dict(cls._laws)
+        _merge_inherited(cls)
         for name, value in list(vars(cls).items()):
+            law = getattr(value, "_atwood_law", None)
+            if isinstance(value, (Field, ConnectorSpec)) or isinstance(law, Law):
+                _check_field_name(cls, name, value)
             if isinstance(value, ParameterSpec):
-                cls._parameters[name] = value
+                cls._parameters[name] = _with_checked_default(value, cls)
             elif isinstance(value, SignalSpec):
-                cls._signals[name] = value
+                cls._signals[name] = _with_checked_default(value, cls)
             elif isinstance(value, ConnectorSpec):
                 cls._connectors[name] = value
-            elif isinstance(getattr(value, "_atwood_law", None), Law):
-                cls._laws[name] = value._atwood_law
+            elif isinstance(law, Law):
+                cls._laws[name] = law
             elif name in cls._parameters:
-                changed = cls._parameters[name].with_default(value)
-                changed.default = changed.check(value, f"{cls.__name__}.{name}")
+                changed = _with_checked_default(cls._parameters[name].with_default(value), cls)
                 cls._parameters[name] = changed
                 setattr(cls, name, changed)
+            elif name in cls._signals:
+                replaced = _with_checked_default(cls._signals[name].with_default(value), cls)
+                cls._signals[name] = replaced
+                setattr(cls, name, replaced)
 
     def __init__(self, **values: Any) -> None:
-        object.__setattr__(self, "_parent", None)
-        object.__setattr__(self, "_name", "")
-        object.__setattr__(self, "_settings", {})
-        object.__setattr__(self, "_bound", None)
-        object.__setattr__(self, "_changed", set())
-        self._check_names(values)
-        self._settings.update({name: self._checked(name, value) for name, value in values.items()})
+        self._start_as({}, None, "")
+        for name in values:
+            if name not in self._parameters and name not in self._signals:
+                raise self._unknown(name)
+        object.__setattr__(self, "_settings", {name: self._checked(name, value) for name, value in values.items()})
         for name, spec in self._parameters.items():
             if spec.default is MISSING and name not in self._settings:
                 raise ParameterError(
@@ -125,15 +90,26 @@ class Component:
                     advice=f"{name} is: {spec.doc} Unit {spec.unit.text}.",
                 )
 
+    def _start_as(self, settings: dict[str, Any], parent: Component | None, name: str) -> None:
+        """Give the object its bare state."""
+        object.__setattr__(self, "_parent", parent)
+        object.__setattr__(self, "_name", name)
+        object.__setattr__(self, "_settings", settings)
+        object.__setattr__(self, "_token", object())
+
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in self._parameters and name not in self._signals:
-            raise ParameterError(
-                f"it has no parameter {name!r}",
-                where=self.path or type(self).__name__,
-                advice=suggestion(name, [*self._parameters, *self._signals]),
-            )
-        self._settings[name] = self._checked(name, value)
-        self._changed.add(name)
+            raise self._unknown(name)
+        before = self._settings
+        object.__setattr__(self, "_settings", {**before, name: self._checked(name, value)})
+        try:
+            self._follow()
+        except Exception:
+            object.__setattr__(self, "_settings", before)
+            raise
+
+    def __delattr__(self, name: str) -> None:
+        raise UsageError(f"{name!r} cannot be taken away", where=self.path or type(self).__name__)
 
     def __repr__(self) -> str:
         settings = ", ".join(f"{name}={value!r}" for name, value in self._settings.items())
@@ -159,17 +135,41 @@ class Component:
             raise DeclarationError("the scene is not on a line, so there is no direction of it", where=self.path)
         return line
 
-    def side(self, a: Connector, b: Connector) -> float:
-        """Return, on a line, +1 if b starts further along than a, and -1 otherwise."""
-        sides = self._binding().sides
-        forward = sides.get((a.name, b.name))
-        return forward if forward is not None else -sides.get((b.name, a.name), -1.0)
+    def side(self, a: Connector, b: Connector, default: float | None = 1.0) -> float:
+        """Return, on a line, +1 if b starts further along than a, and -1 otherwise.
 
-    def distance(self, a: Any, b: Any) -> Scalar:
-        """Return the distance of two points, m; on a line, positive in the order in which they start."""
+        Parameters
+        ----------
+        a, b
+            Connectors of this component.
+        default
+            What to return if the start does not tell; None to refuse.
+        """
+        sides = self._binding().sides
+        if sides is None:
+            return 1.0
+        known = sides.get((a.name, b.name), default)
+        if known is None:
+            raise DeclarationError(
+                f"it is not known on which side of {a.name} the end {b.name} starts",
+                where=self.path,
+                advice="Give start or guess positions of what they are joined to, such as 'm1.position.z'.",
+            )
+        return known
+
+    def distance(self, a: Any, b: Any, side: float | None = 1.0) -> Scalar:
+        """Return the distance of two points, m; on a line, positive in the order in which they start.
+
+        Parameters
+        ----------
+        a, b
+            Connectors of this component.
+        side
+            On a line, the sign if the start does not tell it; None to refuse.
+        """
         separation = b.position - a.position
         if self.on_a_line:
-            return dot(separation, self.line) * self.side(a, b)
+            return dot(separation, self.line) * self.side(a, b, side)
         return norm(separation)
 
     def reaction(self, name: str) -> Scalar:
@@ -199,31 +199,51 @@ class Component:
     # -- what the fields read -----------------------------------------------------------------------------------
 
     def _value(self, name: str) -> Any:
+        """Return the value of a field; deferred if it depends on a model that is only declared so far."""
         if self._bound is not None:
             return self._bound.values[name]
-        spec: ParameterSpec | SignalSpec = self._parameters.get(name) or self._signals[name]
-        value = self._settings.get(name, spec.default)
-        if isinstance(value, Deferred) and self._parent is not None:
-            value = spec.check(value.value_in(self._parent), f"{self.path}.{name}")
-        return value
+        spec = self._field(name)
+        given = name in self._settings
+        value = self._settings[name] if given else spec.default
+        scope = self._parent if given else self
+        if not isinstance(value, Deferred) or scope is None:
+            return value
+        where = f"{self.path or type(self).__name__}.{name}"
+        try:
+            worked_out = value.value_in(scope)
+        except (ArithmeticError, TypeError) as error:
+            raise ParameterError(f"its value {value!r} cannot be worked out ({error})", where=where) from None
+        return spec.check(worked_out, where)
+
+    def _field(self, name: str) -> Field:
+        return self._parameters[name] if name in self._parameters else self._signals[name]
 
     def _connector(self, spec: ConnectorSpec) -> Any:
         motions = self._bound.motions if self._bound is not None else {}
         made = tuple(spec.kind(self, name, motions.get(name)) for name in spec.names(self))
         return made if spec.count is not None else made[0]
 
-    def _check_names(self, values: Mapping[str, Any]) -> None:
-        for name in values:
-            if name not in self._parameters and name not in self._signals:
-                raise ParameterError(
-                    f"it has no parameter {name!r}",
-                    where=type(self).__name__,
-                    advice=suggestion(name, [*self._parameters, *self._signals]),
-                )
-
     def _checked(self, name: str, value: Any) -> Any:
-        spec = self._parameters.get(name) or self._signals[name]
-        return spec.check(value, f"{self.path or type(self).__name__}.{name}")
+        return self._field(name).check(value, f"{self.path or type(self).__name__}.{name}")
+
+    def _unknown(self, name: str) -> ParameterError:
+        known = [*self._parameters, *self._signals]
+        kind = type(self).__name__
+        return ParameterError(
+            f"a {kind} has no parameter {name!r}", where=self.path or kind, advice=suggestion(name, known)
+        )
+
+    # -- what models change -------------------------------------------------------------------------------------
+
+    def _follow(self) -> None:
+        """Make what depends on a changed setting; for models."""
+
+    def _settle(self) -> None:
+        """Make what could not be made before the parts around were there; for models."""
+
+    def _children(self) -> Mapping[str, Component]:
+        """Return the parts by name; for models."""
+        return {}
 
     # -- what the rest of Atwood reads --------------------------------------------------------------------------
 
@@ -270,9 +290,7 @@ class Component:
     def input(self, name: str) -> InputRef:
         """Return an input, to be connected to an output of another component."""
         if name not in self._signals:
-            raise DeclarationError(
-                f"it has no input {name!r}", where=self.path, advice=suggestion(name, self._signals)
-            )
+            raise DeclarationError(f"it has no input {name!r}", where=self.path, advice=suggestion(name, self._signals))
         return InputRef(self, name)
 
     def output(self, name: str) -> OutputRef:
@@ -285,10 +303,9 @@ class Component:
     def copy(self) -> Self:
         """Return a component with the same settings, that belongs to no model."""
         twin = copy.copy(self)
-        object.__setattr__(twin, "_settings", dict(self._settings))
-        object.__setattr__(twin, "_changed", set(self._changed))
         object.__setattr__(twin, "_parent", None)
         object.__setattr__(twin, "_name", "")
+        object.__setattr__(twin, "_declared", "")
         return twin
 
 
@@ -303,7 +320,46 @@ def bind(component: Component, binding: Binding) -> Any:
         Numbers, expressions or sympy terms for everything its laws may read.
     """
     twin = object.__new__(type(component))
-    for name in ("_parent", "_name", "_settings", "_changed"):
+    for name in ("_parent", "_name", "_settings"):
         object.__setattr__(twin, name, getattr(component, name))
     object.__setattr__(twin, "_bound", binding)
     return twin
+
+
+def _merge_inherited(cls: type[Component]) -> None:
+    """Collect what all bases declare, in the order in which Python looks names up."""
+    for table in ("_parameters", "_signals", "_connectors", "_laws"):
+        merged: dict[str, Any] = {}
+        for base in reversed(cls.__mro__[1:]):
+            merged.update(vars(base).get(table, {}))
+        setattr(cls, table, merged)
+
+
+def _with_checked_default(spec: Any, cls: type[Component]) -> Any:
+    if spec.default is not MISSING:
+        spec.default = spec.check(spec.default, f"{cls.__name__}.{spec.name}")
+    return spec
+
+
+def _check_field_name(cls: type[Component], name: str, value: Any) -> None:
+    if getattr(value, "name", name) != name:
+        raise DeclarationError(
+            f"{name!r} is a second name for {value.name!r}",
+            where=cls.__name__,
+            advice=f"Declare {name!r} on its own; its default can be {value.name!r}.",
+        )
+    check_reserved(cls, name)
+
+
+def check_reserved(cls: type[Component], name: str) -> None:
+    """Refuse a name that every component, or every model, uses for something else."""
+    for base in cls.__mro__[1:]:
+        if not base.__module__.startswith("atwood.model."):
+            continue
+        taken = vars(base).get(name)
+        if taken is not None and not isinstance(taken, (Field, ConnectorSpec)):
+            raise DeclarationError(
+                f"the name {name!r} has a meaning of its own in every {base.__name__}",
+                where=cls.__name__,
+                advice="Choose another name.",
+            )

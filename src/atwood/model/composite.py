@@ -3,46 +3,64 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, overload
 
-from atwood.errors import ConnectError, DeclarationError, UsageError, suggestion
-from atwood.model.component import Component
-from atwood.model.connectors import Connector, ConnectorSpec, InputRef, OutputRef
+from atwood.errors import ConnectError, DeclarationError, ParameterError, UsageError, suggestion
+from atwood.model.component import Component, check_reserved
+from atwood.model.deferred import Deferred
+from atwood.model.edits import (
+    Snapshot,
+    apply_edits,
+    check_end,
+    copy_parts,
+    find_edits,
+    named_parts,
+    take_over,
+    take_snapshot,
+)
+from atwood.model.joining import (
+    Connection,
+    Parts,
+    check_ends,
+    check_same_connectors,
+    class_path,
+    connect,
+    relative_path,
+)
 
 __all__ = ["Connection", "Model", "connect"]
 
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*$")
-End = Connector | ConnectorSpec | InputRef | OutputRef
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _P = TypeVar("_P", bound=Component)
 
 
-@dataclass(frozen=True)
-class Connection:
-    """Two ends that are joined, as written in the class body of a model."""
+class _State:
+    """What a model holds besides its parameters; a plain class, so that type checkers see no fields in it.
 
-    a: Any
-    b: Any
-
-
-def connect(a: Any, b: Any) -> Connection:
-    """Join two connectors, or an output with an input, in the class body of a model.
-
-    Parameters
+    Attributes
     ----------
-    a, b
-        Connectors of parts (``rod.a``), connectors of the model itself, or an output and an input.
-
-    Raises
-    ------
-    ConnectError
-        If the two cannot meet.
+    _given
+        Parts that the constructor was given in the place of declared ones.
+    _attached
+        Parts, and arrays of parts, by name.
+    _parts
+        The same, each element of an array on its own.
+    _connections
+        Pairs of paths.
+    _baseline
+        The model as its class made it.
     """
-    return Connection(a, b)
+
+    _given: dict[str, Parts]
+    _attached: dict[str, Parts]
+    _parts: dict[str, Component]
+    _connections: list[tuple[str, str]]
+    _baseline: Snapshot
 
 
-class Model(Component):
+class Model(_State, Component):
     """A component made of components and connections; reusable, parameterised and nestable.
 
     A subclass declares parts in its class body and joins them in ``connections``::
@@ -65,59 +83,66 @@ class Model(Component):
 
     connections: ClassVar[Sequence[Connection]] = ()
 
-    _prototypes: ClassVar[dict[str, Component | list[Component]]] = {}
+    _prototypes: ClassVar[dict[str, Parts]] = {}
     _joined: ClassVar[tuple[tuple[str, str], ...]] = ()
-
-    _parts: dict[str, Component]
-    _connections: list[tuple[str, str]]
-    _replaced: dict[str, Component]
-    _built: tuple[int, frozenset[str]]
+    _joined_here: ClassVar[tuple[tuple[str, str], ...]] = ()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        cls._prototypes = dict(cls._prototypes)
-        for name, value in list(vars(cls).items()):
-            if isinstance(value, Component) or (
-                isinstance(value, list) and value and all(isinstance(v, Component) for v in value)
-            ):
-                if name in cls._prototypes:
-                    _check_same_connectors(cls._prototypes[name], value, f"{cls.__name__}.{name}")
-                cls._prototypes[name] = value
-        names = {id(part): name for name, part in _named(cls._prototypes)}
-        own = [c for c in vars(cls).get("connections", ())]
-        joined = [
-            (_class_path(c.a, names, cls.__name__), _class_path(c.b, names, cls.__name__), c) for c in own
-        ]
-        for a, b, connection in joined:
-            _check_ends(connection.a, connection.b, a, b)
-        cls._joined = cls._joined + tuple((a, b) for a, b, _ in joined)
+        inherited: dict[str, Parts] = {}
+        joined: list[tuple[str, str]] = []
+        for base in reversed(cls.__mro__[1:]):
+            inherited.update(vars(base).get("_prototypes", {}))
+            joined.extend(pair for pair in vars(base).get("_joined_here", ()) if pair not in joined)
+        cls._prototypes = _declared_parts(cls, inherited)
+        names = {id(part): name for name, part in named_parts(cls._prototypes)}
+        cls._joined_here = tuple(_declared_connection(cls, one, names) for one in vars(cls).get("connections", ()))
+        cls._joined = (*joined, *cls._joined_here)
 
     def __init__(self, **values: Any) -> None:
-        replaced = {name: value for name, value in values.items() if name in self._prototypes}
-        object.__setattr__(self, "_replaced", replaced)
-        super().__init__(**{name: value for name, value in values.items() if name not in replaced})
+        given = {name: value for name, value in values.items() if name in self._prototypes}
+        super().__init__(**{name: value for name, value in values.items() if name not in given})
+        for name, part in given.items():
+            check_same_connectors(self._prototypes[name], part, f"{type(self).__name__}.{name}")
+        object.__setattr__(self, "_given", {name: copy_parts(part) for name, part in given.items()})
         self._assemble()
 
     def build(self) -> None:
         """Add parts and connections that depend on parameters; for subclasses, called when a model is made."""
 
     def _assemble(self) -> None:
+        """Make the parts and connections that the class says."""
+        object.__setattr__(self, "_attached", {})
         object.__setattr__(self, "_parts", {})
         object.__setattr__(self, "_connections", list(self._joined))
         for name, prototype in self._prototypes.items():
-            part = self._replaced.get(name, prototype)
-            if part is not prototype:
-                _check_same_connectors(prototype, part, f"{type(self).__name__}.{name}")
-            self._attach(name, [p.copy() for p in part] if isinstance(part, list) else part.copy())
-        self.build()
-        object.__setattr__(self, "_built", (len(self._connections), frozenset(self._parts)))
+            self._attach(name, copy_parts(self._given.get(name, prototype)))
+        if not self._is_open():
+            self.build()
+        object.__setattr__(self, "_baseline", take_snapshot(self))
 
-    def _attach(self, name: str, part: Component | list[Component]) -> None:
-        for full_name, one in _named({name: part}):
+    def _attach(self, name: str, parts: Parts) -> None:
+        self._hold({**self._attached, name: parts})
+        for _, one in named_parts({name: parts}):
+            one._settle()
+
+    def _hold(self, attached: dict[str, Parts]) -> None:
+        """Take these parts, and no others, as the own ones."""
+        held = dict(named_parts(attached))
+        object.__setattr__(self, "_attached", attached)
+        object.__setattr__(self, "_parts", held)
+        for full_name, one in held.items():
             object.__setattr__(one, "_parent", self)
             object.__setattr__(one, "_name", full_name)
-            self._parts[full_name] = one
-        object.__setattr__(self, name, part)
+        for name, parts in attached.items():
+            object.__setattr__(self, name, parts)
+
+    def _release(self, name: str) -> None:
+        """Let go of parts that were just attached."""
+        for _, one in named_parts({name: self._attached[name]}):
+            object.__setattr__(one, "_parent", None)
+        object.__delattr__(self, name)
+        self._hold({other: parts for other, parts in self._attached.items() if other != name})
 
     # -- building ------------------------------------------------------------------------------------------------
 
@@ -133,20 +158,55 @@ class Model(Component):
         DeclarationError
             If the name is taken or no identifier, or the part belongs to a model already.
         """
-        if not _NAME.match(name):
-            raise DeclarationError(f"{name!r} cannot be the name of a part", advice="Use letters, digits and _.")
-        if hasattr(type(self), name) or name in self.__dict__:
-            raise DeclarationError(f"the name {name!r} is taken", where=self.path or type(self).__name__)
-        parts = part if isinstance(part, list) else [part]
-        for one in parts:
-            if not isinstance(one, Component):
-                raise DeclarationError(f"{name!r} is given {one!r}, which is no component")
-            if one._parent is not None:
+        where = self.path or type(self).__name__
+        if not _NAME.match(str(name)):
+            raise DeclarationError(
+                f"{name!r} cannot be the name of a part",
+                where=where,
+                advice="Use letters, digits and _, a letter first.",
+            )
+        if name in self._attached:
+            raise DeclarationError(
+                f"there is a part {name!r} already", where=where, advice="Use replace, or another name."
+            )
+        if hasattr(type(self), name):
+            raise DeclarationError(
+                f"the name {name!r} has a meaning of its own in a {type(self).__name__}",
+                where=where,
+                advice="Choose another name.",
+            )
+        parts: list[Any] = part if isinstance(part, list) else [part]
+        for index, one in enumerate(parts):
+            self._check_is_free(name, one)
+            if any(one is other for other in parts[:index]):
                 raise DeclarationError(
-                    f"the part given as {name!r} is already there as {one.path!r}", advice="Give each its own object."
+                    f"the array {name!r} holds one object twice", where=where, advice="Give each its own object."
                 )
-        self._attach(name, part)
-        return part
+        added = list(part) if isinstance(part, list) else part
+        try:
+            self._attach(name, added)
+        except Exception:
+            self._release(name)
+            raise
+        return added
+
+    def _check_is_free(self, name: str, part: Any) -> None:
+        where = self.path or type(self).__name__
+        if not isinstance(part, Component):
+            advice = "Call the class: Rod() and not Rod." if isinstance(part, type) else ""
+            raise DeclarationError(f"{name!r} is given {part!r}, which is no component", where=where, advice=advice)
+        if part._declared or part._parent is not None:
+            there = part._declared or part.path
+            raise DeclarationError(
+                f"the part given as {name!r} is already there as {there!r}",
+                where=where,
+                advice="Give each its own object; copy() makes one.",
+            )
+        around: Component | None = self
+        while around is not None:
+            if around is part:
+                raise DeclarationError(f"a model cannot be a part of itself, as {name!r}", where=where)
+            around = around._parent
 
     def connect(self, a: Any, b: Any) -> None:
         """Join two connectors, or an output with an input.
@@ -156,54 +216,74 @@ class Model(Component):
         ConnectError
             If they cannot meet, or belong to a part that is not in this model.
         """
-        path_a, path_b = self._relative(a), self._relative(b)
-        _check_ends(a, b, path_a, path_b)
+        path_a, path_b = relative_path(a, self), relative_path(b, self)
+        check_ends(a, b, path_a, path_b)
         self._connections.append((path_a, path_b))
 
-    def replace(self, name: str, part: Component) -> Component:
-        """Put another part with the same connectors in the place of one, and return it."""
-        if name not in self._parts:
-            raise DeclarationError(f"it has no part {name!r}", where=self.path, advice=suggestion(name, self._parts))
-        _check_same_connectors(self._parts[name], part, f"{self.path or type(self).__name__}.{name}")
-        new = part.copy()
-        self._attach(name, new)
-        self._replaced[name] = part
-        return new
+    def replace(self, name: str, part: _P) -> _P:
+        """Put a copy of another part with the same connectors in the place of one, and return it.
 
-    def _relative(self, end: Any) -> str:
-        if isinstance(end, ConnectorSpec):
-            return end.name
-        if not isinstance(end, (Connector, InputRef, OutputRef)):
-            raise ConnectError(f"{end!r} is no connector", advice="Connect things like rod.a or mass.point.")
-        names = [end.name]
-        component: Component | None = end.component
-        while component is not None and component is not self:
-            names.append(component._name or type(component).__name__)
-            component = component._parent
-        path = ".".join(reversed(names))
-        if component is None:
-            raise ConnectError(
-                "it belongs to a part that is not in this model", where=path, advice="Add the part first."
-            )
-        return path
+        Parameters
+        ----------
+        name
+            Name of the part, or of one element of an array (``"rod[2]"``).
+        part
+            What takes its place.
+
+        Raises
+        ------
+        DeclarationError
+            If there is no such part, or the new one lacks one of its connectors.
+        """
+        if name not in self._parts:
+            where = self.path or type(self).__name__
+            raise DeclarationError(f"it has no part {name!r}", where=where, advice=suggestion(name, self._parts))
+        old = self._parts[name]
+        check_same_connectors(old, part, f"{self.path or type(self).__name__}.{name}")
+        before, new = dict(self._attached), part.copy()
+        array = self._attached.get(name.partition("[")[0])
+        if isinstance(array, list):
+            short = name.partition("[")[0]
+            after = {**before, short: [new if one is old else one for one in array]}
+        else:
+            after = {**before, name: new}
+        self._hold(after)
+        try:
+            new._settle()
+        except Exception:
+            self._hold(before)
+            raise
+        object.__setattr__(old, "_parent", None)
+        return new
 
     # -- reading and setting -------------------------------------------------------------------------------------
 
     @property
     def parts(self) -> Mapping[str, Component]:
         """The parts by name, each element of an array on its own."""
-        return self._parts
+        return MappingProxyType(self._parts)
 
     def __getitem__(self, path: str) -> Any:
         """Return the part at a dotted path, such as ``"left.rod"`` or ``"rod[2]"``."""
         component: Component = self
-        for step in path.split("."):
-            parts = component._parts if isinstance(component, Model) else {}
+        for step in str(path).split("."):
+            parts = component._children()
             if step not in parts:
-                where = component.path or type(self).__name__
+                where = component.path or type(component).__name__
                 raise UsageError(f"there is no part {step!r} in it", where=where, advice=suggestion(step, parts))
             component = parts[step]
         return component
+
+    def __contains__(self, path: object) -> bool:
+        """Return whether there is a part at a dotted path."""
+        try:
+            return self[str(path)] is not None
+        except UsageError:
+            return False
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of the parts."""
+        return iter(self._parts)
 
     def set(self, path: str, value: Any) -> None:
         """Set a parameter by its dotted path; nothing changes if the value is refused.
@@ -215,128 +295,124 @@ class Model(Component):
         value
             A number in SI units, or text with a unit (``"30 cm"``).
         """
-        *steps, name = path.split(".")
-        target = self[".".join(steps)] if steps else self
-        if not isinstance(target, Component):
-            raise UsageError("it is no part", where=path)
-        setattr(target, name, value)
+        *steps, name = str(path).split(".")
+        setattr(self[".".join(steps)] if steps else self, name, value)
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        before = dict(self._settings)
-        super().__setattr__(name, value)
-        if type(self).build is not Model.build:
-            try:
-                self._rebuild()
-            except Exception:
-                object.__setattr__(self, "_settings", before)
-                self._rebuild()
-                raise
+    def _unknown(self, name: str) -> ParameterError:
+        if name in getattr(self, "_parts", {}) or name in getattr(self, "_attached", {}):
+            return ParameterError(
+                f"{name!r} is a part and cannot be set", where=self.path or type(self).__name__, advice="Use replace."
+            )
+        kind = type(self).__name__
+        known = [*self._parameters, *self._signals, *self._prototypes]
+        return ParameterError(
+            f"a {kind} has no parameter {name!r}",
+            where=self.path or kind,
+            advice=suggestion(name, known) or "A part is added with add.",
+        )
 
-    def _rebuild(self) -> None:
-        """Make the parts anew from changed parameters, keeping what was set on them and added since."""
-        count, built = self._built
-        extra_connections = self._connections[count:]
-        old = dict(self._parts)
-        added: dict[str, Any] = {name: part for name, part in self.__dict__.items() if name not in _PRIVATE}
-        for name in [name for name in self.__dict__ if name not in _PRIVATE]:
-            object.__delattr__(self, name)
-        self._assemble()
-        for name, part in added.items():
-            if not any(full in built for full, _ in _named({name: part})):
-                self._attach(name, part)
-        for name, part in self._parts.items():
-            if name in old and old[name] is not part:
-                _carry_changes(old[name], part)
-        self._connections.extend(extra_connections)
+    # -- keeping up with changes ---------------------------------------------------------------------------------
+
+    def _children(self) -> Mapping[str, Component]:
+        return self._parts
+
+    def _start_values(self) -> Mapping[str, MutableMapping[str, Any]]:
+        """Return what a scene says about its start; for scenes."""
+        return {}
+
+    def _builds(self) -> bool:
+        return type(self).build is not Model.build
+
+    def _is_open(self) -> bool:
+        """Return whether it builds from parameters that depend on a model that is only declared so far."""
+        return self._builds() and any(isinstance(self._value(name), Deferred) for name in self._settings)
+
+    def _is_built_from_around(self) -> bool:
+        """Return whether it builds from parameters of the model around it."""
+        return self._builds() and any(isinstance(value, Deferred) for value in self._settings.values())
+
+    def _settle(self) -> None:
+        if self._is_built_from_around():
+            if not self._is_open():
+                self._make_anew()
+            return
+        for child in self._children().values():
+            child._settle()
+
+    def _follow(self) -> None:
+        if self._builds() or _any_built_from_around(self):
+            self._make_anew()
+
+    def _make_anew(self) -> None:
+        """Make the parts from changed parameters, keeping what was changed and added since; all of it or nothing."""
+        fresh = object.__new__(type(self))
+        fresh._start_as(self._settings, self._parent, self._name)
+        object.__setattr__(fresh, "_given", self._given)
+        object.__setattr__(fresh, "_token", self._token)
+        fresh._assemble()
+        apply_edits(fresh, find_edits(self))
+        self._check_outer_connections(fresh)
+        take_over(self, fresh)
+
+    def _check_outer_connections(self, fresh: Model) -> None:
+        """Refuse to lose connectors that the models around have connected."""
+        prefix, around = self._name + ".", self._parent
+        while isinstance(around, Model):
+            for pair in around._connections:
+                for end, other in (pair, pair[::-1]):
+                    if end.startswith(prefix):
+                        check_end(fresh, end[len(prefix) :], other)
+            prefix, around = f"{around._name}.{prefix}", around._parent
 
     def copy(self) -> Self:
         """Return a model with the same settings and its own parts, that belongs to no model."""
         twin = super().copy()
-        for name in list(twin.__dict__):
-            if name not in _PRIVATE:
-                object.__delattr__(twin, name)
-        object.__setattr__(twin, "_parts", {})
         object.__setattr__(twin, "_connections", list(self._connections))
-        object.__setattr__(twin, "_replaced", dict(self._replaced))
-        for name, part in self.__dict__.items():
-            if name not in _PRIVATE:
-                twin._attach(name, [p.copy() for p in part] if isinstance(part, list) else part.copy())
+        object.__setattr__(twin, "_given", dict(self._given))
+        twin._hold({name: copy_parts(part) for name, part in self._attached.items()})
         return twin
 
 
-_PRIVATE = frozenset(
-    {"_parent", "_name", "_settings", "_changed", "_bound", "_parts", "_connections", "_replaced", "_built", "start", "guess"}
-)
+def _any_built_from_around(model: Component) -> bool:
+    return any(
+        (isinstance(child, Model) and child._is_built_from_around()) or _any_built_from_around(child)
+        for child in model._children().values()
+    )
 
 
-def _carry_changes(old: Component, new: Component) -> None:
-    """Repeat on a part that was made anew what had been set on the old one."""
-    if type(old) is not type(new):
-        return
-    for name in sorted(old._changed):
-        setattr(new, name, old._settings[name])
-    if isinstance(old, Model) and isinstance(new, Model):
-        for name, part in new._parts.items():
-            if name in old._parts:
-                _carry_changes(old._parts[name], part)
-
-
-def _named(parts: Mapping[str, Any]) -> list[tuple[str, Component]]:
-    """Return every part with its own name, the elements of an array as ``name[0]``, ``name[1]``, ..."""
-    found: list[tuple[str, Component]] = []
-    for name, part in parts.items():
-        if isinstance(part, list):
-            found.extend((f"{name}[{i}]", one) for i, one in enumerate(part))
-        else:
-            found.append((name, part))
+def _declared_parts(cls: type[Model], inherited: dict[str, Parts]) -> dict[str, Parts]:
+    """Return the parts that a class declares and inherits, each an object of its own."""
+    found = dict(inherited)
+    for name, value in list(vars(cls).items()):
+        is_array = isinstance(value, list) and bool(value) and all(isinstance(one, Component) for one in value)
+        if isinstance(value, Component) or is_array:
+            check_reserved(cls, name)
+            if name in inherited:
+                check_same_connectors(inherited[name], value, f"{cls.__name__}.{name}")
+            found[name] = value
+        elif name in inherited:
+            raise DeclarationError(
+                f"the part {name!r} is declared again as {value!r}, which is no component", where=cls.__name__
+            )
+    names: dict[int, str] = {}
+    for name, part in named_parts(found):
+        if id(part) in names:
+            raise DeclarationError(
+                f"one object is declared as {names[id(part)]!r} and as {name!r}",
+                where=cls.__name__,
+                advice="Give each its own object.",
+            )
+        names[id(part)] = name
+        if not part._declared:
+            object.__setattr__(part, "_declared", f"{cls.__name__}.{name}")
     return found
 
 
-def _class_path(end: Any, names: Mapping[int, str], where: str) -> str:
-    if isinstance(end, ConnectorSpec):
-        return end.name
-    if not isinstance(end, (Connector, InputRef, OutputRef)):
-        raise ConnectError(f"{end!r} is no connector", where=where, advice="Connect things like rod.a or mass.point.")
-    steps = [end.name]
-    component = end.component
-    while component._parent is not None:
-        steps.append(component._name)
-        component = component._parent
-    if id(component) not in names:
-        raise ConnectError("it belongs to a part that is not declared in the class body", where=f"{where}.{end.name}")
-    return ".".join([names[id(component)], *reversed(steps)])
-
-
-def _check_ends(a: Any, b: Any, path_a: str, path_b: str) -> None:
-    if path_a == path_b:
-        raise ConnectError("it is joined to itself", where=path_a, advice="Connect it to another connector.")
-    if isinstance(a, (InputRef, OutputRef)) or isinstance(b, (InputRef, OutputRef)):
-        if {type(a), type(b)} != {InputRef, OutputRef}:
-            raise ConnectError(
-                f"{path_a} and {path_b} are not an output and an input",
-                advice="Connect sensor.output('...') with part.input('...').",
-            )
-        return
-    kind_a, kind_b = (end.kind if isinstance(end, ConnectorSpec) else type(end) for end in (a, b))
-    if kind_a.family != kind_b.family:
+def _declared_connection(cls: type[Model], connection: Any, names: Mapping[int, str]) -> tuple[str, str]:
+    if not isinstance(connection, Connection):
         raise ConnectError(
-            f"{path_a} is a {kind_a.__name__} and {path_b} is a {kind_b.__name__}; they are unlike and cannot meet",
-            advice="A Groove takes a rope's bend; points and frames meet each other.",
+            f"{connection!r} is no connection", where=cls.__name__, advice="Write connect(rod.a, mass.point)."
         )
-
-
-def _check_same_connectors(old: Any, new: Any, where: str) -> None:
-    if isinstance(old, list) or isinstance(new, list):
-        return
-    if not isinstance(new, Component):
-        raise DeclarationError(f"{new!r} is no component", where=where)
-    have = new.connectors()
-    for name, wanted in old.connectors().items():
-        if name not in have or have[name].family != wanted.family:
-            raise DeclarationError(
-                f"a {type(new).__name__} cannot take the place of a {type(old).__name__}: it has no connector {name!r}",
-                where=where,
-                advice=suggestion(name, have),
-            )
-
-
+    pair = class_path(connection.a, names, cls.__name__), class_path(connection.b, names, cls.__name__)
+    check_ends(connection.a, connection.b, *pair)
+    return pair

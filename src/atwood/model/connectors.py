@@ -150,7 +150,8 @@ class Frame(Point):
 
     def to_world(self, vector: Vector) -> Vector:
         """Return, in world axes, a vector that is given in the axes of this frame."""
-        x_axis, y_axis, z_axis = self._read("axes")
+        axes: tuple[Vector, Vector, Vector] = self._read("axes")
+        x_axis, y_axis, z_axis = axes
         return x_axis * vector.x + y_axis * vector.y + z_axis * vector.z
 
 
@@ -180,7 +181,14 @@ class ConnectorSpec:
         """Return the names of the connectors it declares on a component: one, or an array of them."""
         if self.count is None:
             return (self.name,)
-        return tuple(f"{self.name}[{i}]" for i in range(component._value(self.count)))
+        count = component._value(self.count)
+        if not isinstance(count, int):
+            raise DeclarationError(
+                f"how many connectors {self.name!r} has is not known here, since {self.count!r} is {count!r}",
+                where=component.path or type(component).__name__,
+                advice="Connect them in a method build(self), where the parameters have their values.",
+            )
+        return tuple(f"{self.name}[{i}]" for i in range(count))
 
 
 _C = TypeVar("_C", bound=Connector)

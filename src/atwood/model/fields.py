@@ -7,18 +7,21 @@ also within arithmetic: ``Rod(length=length / 2)``.
 
 from __future__ import annotations
 
+import copy
 import math
 import operator
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Literal, Self
 
-from atwood.errors import DeclarationError, ParameterError
-from atwood.model.units import Unit, parse_quantity, parse_unit
+from atwood.errors import AtwoodError, DeclarationError, ParameterError, suggestion
+from atwood.model.deferred import Deferred
+from atwood.model.timefunction import check_function
+from atwood.model.units import Unit, parse_quantity, parse_si_unit
 
 if TYPE_CHECKING:
     from atwood.model.component import Component
 
-__all__ = ["MISSING", "Deferred", "ParameterSpec", "SignalSpec", "parameter", "signal"]
+__all__ = ["MISSING", "Deferred", "Field", "FieldReference", "ParameterSpec", "SignalSpec", "parameter", "signal"]
 
 
 class _Missing:
@@ -30,62 +33,70 @@ MISSING: Any = _Missing()
 """The default of a parameter that has none."""
 
 
-class Deferred:
-    """A value that is worked out from the parameters of the model that encloses a part.
+class FieldReference(Deferred):
+    """The value of a parameter or an input of the model that encloses a part, by name.
 
     Parameters
     ----------
-    evaluate
-        Gives the value for a component, the enclosing model.
+    name
+        The name of the field.
     """
 
-    def __init__(self, evaluate: Callable[[Component], Any]) -> None:
-        self._evaluate = evaluate
+    def __init__(self, name: str, kind: str = "field", unit: Unit | None = None) -> None:
+        super().__init__(kind, (), unit)
+        self.name = name
+
+    def __repr__(self) -> str:
+        return self.name or "a field"
 
     def value_in(self, model: Component) -> Any:
-        """Return the value within an enclosing model."""
-        return self._evaluate(model)
-
-    def _combine(self, function: Callable[[Any, Any], Any], other: Any, swapped: bool = False) -> Deferred:
-        def evaluate(model: Component) -> Any:
-            right = other.value_in(model) if isinstance(other, Deferred) else other
-            left = self.value_in(model)
-            return function(right, left) if swapped else function(left, right)
-
-        return Deferred(evaluate)
-
-    def __add__(self, other: Any) -> Deferred:
-        return self._combine(operator.add, other)
-
-    def __radd__(self, other: Any) -> Deferred:
-        return self._combine(operator.add, other, swapped=True)
-
-    def __sub__(self, other: Any) -> Deferred:
-        return self._combine(operator.sub, other)
-
-    def __rsub__(self, other: Any) -> Deferred:
-        return self._combine(operator.sub, other, swapped=True)
-
-    def __mul__(self, other: Any) -> Deferred:
-        return self._combine(operator.mul, other)
-
-    def __rmul__(self, other: Any) -> Deferred:
-        return self._combine(operator.mul, other, swapped=True)
-
-    def __truediv__(self, other: Any) -> Deferred:
-        return self._combine(operator.truediv, other)
-
-    def __rtruediv__(self, other: Any) -> Deferred:
-        return self._combine(operator.truediv, other, swapped=True)
-
-    def __pow__(self, other: Any) -> Deferred:
-        return self._combine(operator.pow, other)
-
-    def __neg__(self) -> Deferred:
-        return Deferred(lambda model: -self.value_in(model))
+        """Return the value of this field on the model that encloses a part."""
+        parameters, signals = model.parameter_specs(), model.signal_specs()
+        if self.name not in parameters and self.name not in signals:
+            raise ParameterError(
+                f"it is bound to {self.name!r}, which the {type(model).__name__} around it does not have",
+                where=model.path or type(model).__name__,
+                advice=suggestion(self.name, [*parameters, *signals]),
+            )
+        return model._value(self.name)
 
 
-class ParameterSpec(Deferred):
+class Field(FieldReference):
+    """A declared value of a component; see `parameter` and `signal`."""
+
+    unit: Unit
+    default: Any
+
+    def __init__(self, kind: str, default: Any, unit: str, doc: str) -> None:
+        super().__init__("", kind, parse_si_unit(unit))
+        self.default = default
+        self.doc = doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = self.name or name
+
+    def __get__(self, instance: Component | None, owner: type) -> Any:
+        return self if instance is None else instance._value(self.name)
+
+    def with_default(self, default: Any) -> Self:
+        """Return the same declaration with another default."""
+        twin = copy.copy(self)
+        twin.default = default
+        return twin
+
+    def check(self, value: Any, where: str) -> Any:
+        """Return a value in its own type and SI unit, or refuse it."""
+        raise NotImplementedError
+
+    def _check_deferred(self, value: Deferred, where: str) -> Deferred:
+        if value.unit is not None and not value.unit.has_dimension_of(self.unit):
+            raise ParameterError(
+                f"it is bound to {value!r}, which is in {value.unit.text} and not in {self.unit.text}", where=where
+            )
+        return value
+
+
+class ParameterSpec(Field):
     """The declaration of a parameter: unit, default, bounds and meaning.
 
     See `parameter` for the meaning of the attributes.
@@ -105,37 +116,10 @@ class ParameterSpec(Deferred):
         choices: tuple[str, ...] = (),
         structural: bool = False,
     ) -> None:
-        super().__init__(lambda model: getattr(model, self.name))
-        self.name = ""
-        self.default = default
-        self.unit: Unit = parse_unit(unit)
-        self.doc = doc
+        super().__init__("parameter", default, unit, doc)
         self.minimum, self.above, self.maximum = minimum, above, maximum
         self.size, self.integer, self.choices = size, integer, choices
         self.structural = structural or integer or bool(choices)
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = self.name or name
-
-    def __get__(self, instance: Component | None, owner: type) -> Any:
-        return self if instance is None else instance._value(self.name)
-
-    def with_default(self, default: Any) -> ParameterSpec:
-        """Return the same declaration with another default."""
-        copy = ParameterSpec(
-            default,
-            self.unit.text,
-            self.doc,
-            minimum=self.minimum,
-            above=self.above,
-            maximum=self.maximum,
-            size=self.size,
-            integer=self.integer,
-            choices=self.choices,
-            structural=self.structural,
-        )
-        copy.name = self.name
-        return copy
 
     def check(self, value: Any, where: str) -> Any:
         """Return a value in its own type and SI unit, or refuse it.
@@ -146,12 +130,13 @@ class ParameterSpec(Deferred):
             If it is not finite, of the wrong type or dimension, or out of bounds.
         """
         if isinstance(value, Deferred):
-            self._check_deferred(value, where)
-            return value
+            if value.operation == "signal":
+                raise ParameterError(f"a parameter cannot follow the input {value!r}", where=where)
+            return self._check_deferred(value, where)
         if value is None and self.default is None:
             return None
         if self.choices:
-            if value not in self.choices:
+            if not isinstance(value, str) or value not in self.choices:
                 raise ParameterError(
                     f"{value!r} is not one of its values", where=where, advice=f"Choose from {', '.join(self.choices)}."
                 )
@@ -160,69 +145,78 @@ class ParameterSpec(Deferred):
             return self._check_vector(value, where)
         return self._check_number(value, where)
 
-    def _check_deferred(self, value: Deferred, where: str) -> None:
-        if isinstance(value, ParameterSpec) and not value.unit.has_dimension_of(self.unit):
-            raise ParameterError(
-                f"it is bound to {value.name!r}, which is in {value.unit.text} and not in {self.unit.text}", where=where
-            )
-
     def _check_vector(self, value: Any, where: str) -> tuple[float, ...]:
         if isinstance(value, str):
             value = [part for part in value.strip("()[] ").split(",") if part.strip()]
-        if not hasattr(value, "__len__") or len(value) != self.size:
-            raise ParameterError(f"{value!r} is not {self.size} numbers", where=where)
-        return tuple(self._check_number(part, where) for part in value)
+        parts = list(value) if isinstance(value, Iterable) and not isinstance(value, (bytes, set, dict)) else []
+        if len(parts) != self.size:
+            raise ParameterError(
+                f"{value!r} is not {self.size} numbers", where=where, advice=f"Give {self.size} numbers in brackets."
+            )
+        return tuple(self._check_number(part, where) for part in parts)
 
     def _check_number(self, value: Any, where: str) -> float | int:
-        if isinstance(value, str):
-            value = parse_quantity(value, self.unit, where)
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            try:
-                value = float(value) if not isinstance(value, bool) else None
-            except (TypeError, ValueError):
-                value = None
-            if value is None:
-                raise ParameterError("it needs a number", where=where, advice=f"Give one in {self.unit.text}.")
-        if not math.isfinite(value):
-            raise ParameterError(f"{value} is not a finite number", where=where, advice=f"Give it in {self.unit.text}.")
-        if self.integer and value != int(value):
-            raise ParameterError(f"{value} is not a whole number", where=where)
-        self._check_bounds(value, where)
-        return int(value) if self.integer else float(value)
+        number = parse_quantity(value, self.unit, where) if isinstance(value, str) else _plain_number(value)
+        if number is None:
+            kind = "nothing" if value is None else repr(value)
+            raise ParameterError(f"it needs a number, not {kind}", where=where, advice=f"Give one in {self.unit.text}.")
+        if not math.isfinite(number):
+            raise ParameterError(
+                f"{number} is not a finite number", where=where, advice=f"Give one in {self.unit.text}."
+            )
+        if self.integer and number != int(number):
+            raise ParameterError(f"{number:g} is not a whole number", where=where)
+        self._check_bounds(number, where)
+        return int(number) if self.integer else number
 
     def _check_bounds(self, value: float, where: str) -> None:
         unit = "" if self.unit.text == "1" else f" {self.unit.text}"
         if self.minimum is not None and value < self.minimum:
-            raise ParameterError(f"{value:g}{unit} is too small", where=where, advice=f"At least {self.minimum:g}{unit}.")
-        if self.above is not None and value <= self.above:
-            raise ParameterError(f"{value:g}{unit} is too small", where=where, advice=f"More than {self.above:g}{unit}.")
-        if self.maximum is not None and value > self.maximum:
-            raise ParameterError(f"{value:g}{unit} is too large", where=where, advice=f"At most {self.maximum:g}{unit}.")
+            problem, advice = "small", f"At least {self.minimum:g}{unit}."
+        elif self.above is not None and value <= self.above:
+            problem, advice = "small", f"More than {self.above:g}{unit}."
+        elif self.maximum is not None and value > self.maximum:
+            problem, advice = "large", f"At most {self.maximum:g}{unit}."
+        else:
+            return
+        raise ParameterError(f"{value:g}{unit} is too {problem}", where=where, advice=advice)
 
 
-class SignalSpec:
+class SignalSpec(Field):
     """The declaration of an input: a quantity that is given from outside, as a function of time.
 
     See `signal` for the meaning of the attributes.
     """
 
     def __init__(self, default: Any, unit: str, doc: str) -> None:
-        self.name = ""
-        self.default = default
-        self.unit: Unit = parse_unit(unit)
-        self.doc = doc
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = self.name or name
-
-    def __get__(self, instance: Component | None, owner: type) -> Any:
-        return self if instance is None else instance._value(self.name)
+        super().__init__("signal", default, unit, doc)
 
     def check(self, value: Any, where: str) -> Any:
-        """Return a value that can drive this input: a number, or a function of time."""
-        if callable(value) or isinstance(value, Deferred):
+        """Return a value that can drive this input, a number or a function of time, or refuse it.
+
+        Raises
+        ------
+        ParameterError
+            If it is no finite number in the right unit, or a function that cannot be evaluated on an expression.
+        """
+        if isinstance(value, Deferred):
+            return self._check_deferred(value, where)
+        if callable(value):
+            check_function(value, where)
             return value
         return ParameterSpec(0.0, self.unit.text, self.doc).check(value, where)
+
+
+def _plain_number(value: Any) -> float | None:
+    """Return anything that is one real number as a float; None for truth values and everything else."""
+    if isinstance(value, (bool, bytes, bytearray)) or type(value).__name__ in ("bool", "bool_"):
+        return None
+    try:
+        if getattr(value, "ndim", 0):
+            return None
+        return float(operator.index(value)) if hasattr(value, "__index__") else float(value)
+    except (TypeError, ValueError, OverflowError, AtwoodError):
+        return None
 
 
 def parameter(
@@ -243,7 +237,8 @@ def parameter(
     Parameters
     ----------
     default
-        The value when none is given; without one, the parameter is required. None makes it optional.
+        The value when none is given; without one, the parameter is required. None makes it optional. It can be
+        worked out from parameters declared before it.
     unit
         SI unit, checked against the unit of what is given (``Rod(length="30 cm")``).
     doc
@@ -265,7 +260,7 @@ def parameter(
     Raises
     ------
     DeclarationError
-        If there is no line of meaning, or the unit cannot be read.
+        If there is no line of meaning, or the unit is no SI unit.
     """
     if not doc.strip():
         raise DeclarationError("a parameter needs one line of meaning", advice="Give doc='...'.")
@@ -287,7 +282,8 @@ def signal(default: Any = 0.0, *, unit: str = "1", doc: str, init: Literal[True]
     """Declare an input in the class body of a component.
 
     Its value is a number, a function of time written in plain arithmetic with Atwood's functions, or the output of
-    another component (``scene.connect(sensor.output("length"), force.input("value"))``).
+    another component (``scene.connect(sensor.output("length"), force.input("value"))``). In the class body of a
+    model it can be passed on to the input of a part.
 
     Parameters
     ----------
@@ -297,6 +293,11 @@ def signal(default: Any = 0.0, *, unit: str = "1", doc: str, init: Literal[True]
         SI unit.
     doc
         One line of meaning.
+
+    Raises
+    ------
+    DeclarationError
+        If there is no line of meaning, or the unit is no SI unit.
     """
     if not doc.strip():
         raise DeclarationError("an input needs one line of meaning", advice="Give doc='...'.")

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from atwood.errors import DeclarationError, StartError, UsageError
+from atwood.errors import AtwoodError, DeclarationError, ParameterError, StartError, UsageError
 from atwood.model.component import Component
 from atwood.model.composite import Model
-from atwood.model.connectors import Connector
-from atwood.model.fields import Deferred
+from atwood.model.connectors import InputRef, OutputRef
+from atwood.model.fields import Deferred, FieldReference
+from atwood.model.joining import find_end
 from atwood.model.scene import Scene
-from atwood.model.units import parse_unit
+from atwood.model.units import Unit, parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
 
 __all__ = ["FlatScene", "Part", "flatten"]
 
@@ -107,7 +108,7 @@ def flatten(scene: Model, name: str | None = None) -> FlatScene:
     _collect(scene, leaves, joined, start, guess)
     if not leaves:
         raise DeclarationError("the scene has no parts", where=name or type(scene).__name__)
-    connections, links = _split_links(joined, leaves)
+    connections, links = _split_links(scene, joined, leaves)
     settings = scene if isinstance(scene, Scene) else Scene()
     return FlatScene(
         name=name or type(scene).__name__,
@@ -142,52 +143,88 @@ def _collect(
             leaves[path] = Part(path, part, part.parameters(), signals)
     if isinstance(model, Scene):  # after the parts, so that the outer scene has the last word
         for target, given in ((start, model.start), (guess, model.guess)):
-            target.update({prefix + key: _number(value, model, prefix + key) for key, value in given.items()})
+            target.update({prefix + key: _number(value, model, key, prefix) for key, value in given.items()})
 
 
-def _number(value: Any, model: Model, path: str) -> float:
+def _number(value: Any, model: Model, key: str, prefix: str) -> float:
+    """Return a start value in SI units; text must be in a unit of what it is for, where that is known."""
+    path = prefix + key
+    wanted = _unit_at(model, key)
     if isinstance(value, Deferred):
+        if wanted is not None and value.unit is not None and not value.unit.has_dimension_of(wanted):
+            raise StartError(
+                f"it is bound to {value!r}, which is in {value.unit.text} and not in {wanted.text}", where=path
+            )
         value = value.value_in(model)
     if isinstance(value, str):
-        number, _, unit = value.strip().partition(" ")
-        value = float(number) * (parse_unit(unit).factor if unit else 1.0)
+        _, unit_text = split_quantity(value) or (0.0, "")
+        given = parse_unit(unit_text)
+        try:
+            value = parse_quantity(value, wanted or parse_si_unit(unit_of(given.exponents).text), path)
+        except ParameterError as error:
+            raise StartError(error.message, where=path, advice=error.advice) from None
     try:
-        number_value = float(value)
-    except (TypeError, ValueError):
+        number = float(value)
+    except (TypeError, ValueError, AtwoodError):
         raise StartError(f"{value!r} is not a number", where=path) from None
-    if not math.isfinite(number_value):
-        raise StartError(f"{number_value} is not a finite number", where=path)
-    return number_value
+    if not math.isfinite(number):
+        raise StartError(f"{number} is not a finite number", where=path)
+    return number
+
+
+def _unit_at(model: Component, key: str) -> Unit | None:
+    """Return the unit of the observable at a path; None if there is no such observable."""
+    component, steps = model, key.split(".")
+    while steps[0] in component._children():
+        component, steps = component._children()[steps[0]], steps[1:]
+        if not steps:
+            return None
+    if len(steps) > 1 and steps[0] in component.connectors():
+        return parse_unit(_CONNECTOR_UNITS[steps[1]]) if steps[1] in _CONNECTOR_UNITS else None
+    for law in component.laws("observable"):
+        if law.name == steps[0]:
+            return parse_unit(law.options.unit)
+    return None
+
+
+_CONNECTOR_UNITS = {"position": "m", "velocity": "m/s", "angle": "rad", "angular_velocity": "rad/s"}
 
 
 def _split_links(
-    joined: list[tuple[str, str]], leaves: Mapping[str, Part]
+    scene: Model, joined: list[tuple[str, str]], leaves: Mapping[str, Part]
 ) -> tuple[tuple[tuple[str, str], ...], dict[tuple[str, str], tuple[str, str]]]:
+    """Tell connections of connectors from links of outputs to inputs."""
     connections: list[tuple[str, str]] = []
     links: dict[tuple[str, str], tuple[str, str]] = {}
     for a, b in joined:
-        ends = [_signal_end(path, leaves) for path in (a, b)]
-        if all(end is None for end in ends):
+        first, second = find_end(scene, a), find_end(scene, b)
+        if isinstance(second, InputRef):
+            first, second = second, first
+        if not isinstance(first, InputRef) or not isinstance(second, OutputRef):
             connections.append((a, b))
             continue
-        inputs = [end for end in ends if end is not None and end[1] in leaves[end[0]].signals]
-        outputs = [end for end in ends if end is not None and end not in inputs]
-        (target,), (source,) = inputs, outputs
-        if target in links:
-            raise DeclarationError("it is connected to two outputs", where=".".join(target))
-        links[target] = source
+        for target in _driven_inputs(first, leaves):
+            if target in links:
+                raise DeclarationError("it is connected to two outputs", where=".".join(target))
+            links[target] = (second.component.path, second.name)
     return tuple(connections), links
 
 
-def _signal_end(path: str, leaves: Mapping[str, Part]) -> tuple[str, str] | None:
-    """Return (part, name) if the path ends in an input or an observable of a leaf."""
-    steps = path.split(".")
-    for cut in range(len(steps) - 1, 0, -1):
-        owner, name = ".".join(steps[:cut]), ".".join(steps[cut:])
-        if owner in leaves:
-            connectors: Mapping[str, Connector] = leaves[owner].component.connectors()
-            return None if name in connectors else (owner, name)
-    return None
+def _driven_inputs(end: InputRef, leaves: Mapping[str, Part]) -> Iterator[tuple[str, str]]:
+    """Return the inputs of leaves that follow an input, which may be that of a model."""
+    if end.component.path in leaves and leaves[end.component.path].component is end.component:
+        yield end.component.path, end.name
+        return
+    for path, part in leaves.items():
+        for name in part.signals:
+            component, source = part.component, name
+            while component is not end.component or source != end.name:
+                bound = component._settings.get(source)
+                if not isinstance(bound, FieldReference) or component._parent is None:
+                    break
+                component, source = component._parent, bound.name
+            else:
+                yield path, name
 
 
 def _unit_vector(axis: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -12,8 +12,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
+from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.model.connectors import Frame, Point
+from atwood.model.units import parse_si_unit
 from atwood.model.vector import ZERO, Vector
 
 __all__ = [
@@ -222,6 +224,7 @@ def constraint(
     modes
         The modes of the component in which the constraint acts; all when empty.
     """
+    parse_si_unit(unit)
     names = (reaction,) if isinstance(reaction, str) else tuple(reaction)
     options = ConstraintOptions(names, unit, sign, doc, tuple(modes))
     return lambda function: _mark(function, Law("constraint", function.__name__, options))
@@ -280,6 +283,9 @@ def observable(
     spaces
         The spaces in which it has a meaning.
     """
+    parse_si_unit(unit)
+    if not doc.strip():
+        raise DeclarationError("an observable needs one line of meaning", advice="Give doc='...'.")
 
     def decorate(function: _F) -> _F:
         name = function.__name__

@@ -6,6 +6,7 @@ says by itself which connectors it depends on, and whose derivatives are the for
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,7 +21,7 @@ from atwood.model.laws import BodyInertia, Law, Load, Placement, PointInertia, s
 from atwood.model.space import FIXED_AXES, Space, planar_axes
 from atwood.model.vector import Vector
 
-__all__ = ["LocalConstraint", "LocalConnector", "LocalJoint", "LocalPart", "ParameterTable", "localize"]
+__all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "ParameterTable", "localize"]
 
 
 @dataclass
@@ -114,7 +115,7 @@ def localize(
     time: Expression,
     table: ParameterTable,
     modes: Mapping[str, str],
-    sides: Mapping[tuple[str, str, str], float],
+    sides: Mapping[tuple[str, str, str], float] | None,
 ) -> dict[str, LocalPart]:
     """Evaluate the laws of every part on its local symbols.
 
@@ -131,7 +132,8 @@ def localize(
     modes
         Mode of each part that has modes.
     sides
-        On a line: for (part, connector, connector) the sign of the second's position minus the first's.
+        On a line: for (part, connector, connector) the sign of the second's position minus the first's; None while
+        they are not known yet.
 
     Raises
     ------
@@ -148,7 +150,7 @@ def _localize_part(
     time: Expression,
     table: ParameterTable,
     modes: Mapping[str, str],
-    sides: Mapping[tuple[str, str, str], float],
+    sides: Mapping[tuple[str, str, str], float] | None,
 ) -> LocalPart:
     graph, component = table.graph, part.component
     values = {name: _parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
@@ -165,7 +167,7 @@ def _localize_part(
         time=time,
         space=space.name,
         line=space.line,
-        sides={(a, b): sign for (path, a, b), sign in sides.items() if path == part.path},
+        sides=None if sides is None else {(a, b): s for (path, a, b), s in sides.items() if path == part.path},
     )
     bound = bind(component, binding)
     mode = modes.get(part.path, component.modes[0] if component.modes else "")
@@ -176,7 +178,7 @@ def _localize_part(
     def scalar_laws(kind: Any) -> tuple[Expression, ...]:
         return tuple(graph.convert(_call(part, law, getattr(bound, law.name))) for law in laws(kind))
 
-    inertias = [one for law in laws("inertia") for one in _call(part, law, lambda m=law.name: list(getattr(bound, m)()))]
+    inertias = [one for law in laws("inertia") for one in _call(part, law, functools.partial(_listed, bound, law))]
     return LocalPart(
         part=part,
         binding=binding,
@@ -186,12 +188,14 @@ def _localize_part(
         body_inertias=tuple(one for one in inertias if isinstance(one, BodyInertia)),
         potentials=scalar_laws("potential"),
         dissipations=scalar_laws("dissipation"),
-        loads=tuple(
-            one for law in laws("force") for one in _call(part, law, lambda m=law.name: list(getattr(bound, m)()))
-        ),
+        loads=tuple(one for law in laws("force") for one in _call(part, law, functools.partial(_listed, bound, law))),
         constraints=tuple(one for law in laws("constraint") for one in _local_constraints(part, law, bound, graph)),
         signal_symbols=signal_symbols,
     )
+
+
+def _listed(bound: Any, law: Law) -> list[Any]:
+    return list(getattr(bound, law.name)())
 
 
 def _parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
@@ -216,6 +220,9 @@ def _signal(
 ) -> Scalar:
     path = f"{part.path}.{name}"
     if (part.path, name) in flat.links:
+        source, observable = flat.links[part.path, name]
+        if not flat.parts[source].component.connectors():
+            return _source_value(flat.parts[source], observable, time, table)
         signal_symbols[name] = table.graph.symbol(f"{path}()")
         return signal_symbols[name]
     if not callable(given):
@@ -228,6 +235,14 @@ def _signal(
             where=path,
             advice="Write it in plain arithmetic with Atwood's own functions (atwood.sin, atwood.select, ...).",
         ) from error
+
+
+def _source_value(source: Part, observable: str, time: Expression, table: ParameterTable) -> Scalar:
+    """Return the output of a part without connectors: a function of time and its parameters alone."""
+    values = {name: _parameter(source, spec, table) for name, spec in source.component.parameter_specs().items()}
+    bound = bind(source.component, Binding(values=values, time=time))
+    law = next(law for law in source.component.laws("observable") if law.name == observable)
+    return table.graph.convert(_call(source, law, getattr(bound, law.name)))
 
 
 def _local_connector(path: str, is_frame: bool, space: Space, graph: Graph) -> LocalConnector:

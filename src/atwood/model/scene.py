@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Mapping, MutableMapping
+from typing import Any, ClassVar, Self
 
+from atwood.errors import StartError
 from atwood.model.composite import Model
 from atwood.model.fields import parameter
+from atwood.model.startvalues import StartValues
 
 __all__ = ["Scene"]
 
@@ -28,32 +30,51 @@ class Scene(Model):
     Attributes
     ----------
     start
-        What holds exactly at the start, by path: any mix of coordinates, positions and velocities.
+        What holds exactly at the start, by path: any mix of coordinates, positions and velocities. A value is a
+        number in SI units, text with a unit (``"30 deg"``), or a parameter of the scene. Every scene has its own,
+        which begins as that of its class.
     guess
         What holds roughly at the start; used where the start leaves a choice.
     """
 
     space: str = parameter("plane", choices=("line", "plane", "space"), doc="What the scene lives in.")
     line_axis: tuple[float, float, float] = parameter(
-        (1.0, 0.0, 0.0), size=3, doc="Direction of the line, for a scene on a line."
+        (1.0, 0.0, 0.0), size=3, structural=True, doc="Direction of the line, for a scene on a line."
     )
     gravity: float = parameter(9.81, unit="m/s^2", doc="Acceleration of free fall, along -z.")
     t_start: float = parameter(0.0, unit="s", doc="Time of the start.")
     t_end: float = parameter(10.0, unit="s", doc="Time of the end, unless a run is given another.")
 
-    start: ClassVar[Mapping[str, Any]] = {}
-    guess: ClassVar[Mapping[str, Any]] = {}
+    start: ClassVar[MutableMapping[str, Any]] = {}
+    guess: ClassVar[MutableMapping[str, Any]] = {}
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        for name in ("start", "guess"):
+            if not isinstance(getattr(cls, name), Mapping):
+                raise StartError(
+                    f"{name!r} must say values by path", where=cls.__name__, advice="Write {'rod.angle': 0.5}."
+                )
+            StartValues(getattr(cls, name), cls.__name__)
 
     def _assemble(self) -> None:
-        # A fresh dictionary of the class's own values for each scene: what is added in `build` or later is its own.
+        # Its own copy of the class's values for each scene: what is added in `build` or later belongs to it alone.
         for name in ("start", "guess"):
-            kept = self.__dict__.get(name)
-            object.__setattr__(self, name, dict(getattr(type(self), name) if kept is None else kept))
+            object.__setattr__(self, name, StartValues(getattr(type(self), name)))
         super()._assemble()
 
-    def copy(self) -> Any:
+    def _start_values(self) -> Mapping[str, MutableMapping[str, Any]]:
+        return {name: getattr(self, name) for name in ("start", "guess")}
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in ("start", "guess"):
+            object.__setattr__(self, name, StartValues(value, self.path))
+        else:
+            super().__setattr__(name, value)
+
+    def copy(self) -> Self:
         """Return a scene with the same settings and its own parts and start."""
         twin = super().copy()
-        object.__setattr__(twin, "start", dict(self.start))
-        object.__setattr__(twin, "guess", dict(self.guess))
+        for name in ("start", "guess"):
+            object.__setattr__(twin, name, StartValues(getattr(self, name)))
         return twin

@@ -12,12 +12,12 @@ from functools import lru_cache
 
 from atwood.errors import DeclarationError, ParameterError, suggestion
 
-__all__ = ["Unit", "parse_quantity", "parse_unit"]
+__all__ = ["Exponents", "Unit", "parse_quantity", "parse_si_unit", "parse_unit", "split_quantity", "unit_of"]
 
-_Exponents = tuple[int, int, int, int]
+Exponents = tuple[int, int, int, int]
 """Powers of mass, length, time and electric current."""
 
-_BASE: dict[str, tuple[float, _Exponents]] = {
+_BASE: dict[str, tuple[float, Exponents]] = {
     "1": (1.0, (0, 0, 0, 0)),
     "rad": (1.0, (0, 0, 0, 0)),
     "deg": (math.pi / 180.0, (0, 0, 0, 0)),
@@ -47,7 +47,7 @@ _BASE: dict[str, tuple[float, _Exponents]] = {
     "T": (1.0, (1, 0, -2, -1)),
 }
 
-_FACTOR = re.compile(r"\s*([*/·\s]?)\s*([A-Za-z]+|1)(?:\s*(?:\^|\*\*)\s*(-?\d+))?")
+_FACTOR = re.compile(r"\s*([*/·\s]?)\s*([A-Za-z]+|1)(?:\s*(?:\^|\*\*)\s*(-?\d{1,2}))?")
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
 
@@ -67,10 +67,12 @@ class Unit:
 
     text: str
     factor: float
-    exponents: _Exponents
+    exponents: Exponents
 
     def has_dimension_of(self, other: Unit) -> bool:
-        """Return whether a value in this unit can be given in the other."""
+        """Return whether a value in this unit can be given in the other; ``"any"`` takes every unit."""
+        if "any" in (self.text, other.text):
+            return True
         return self.exponents == other.exponents
 
 
@@ -88,6 +90,8 @@ def parse_unit(text: str) -> Unit:
     DeclarationError
         If a name in it is not a unit.
     """
+    if text == "any":  # of a source, whose value takes the unit of the input that it drives
+        return Unit(text, 1.0, (0, 0, 0, 0))
     factor = 1.0
     exponents = [0, 0, 0, 0]
     position, first = 0, True
@@ -108,6 +112,39 @@ def parse_unit(text: str) -> Unit:
     return Unit(text, factor, (a, b, c, d))
 
 
+def parse_si_unit(text: str) -> Unit:
+    """Read a unit that must be an SI unit, as everything is declared and reported in.
+
+    Raises
+    ------
+    DeclarationError
+        If it cannot be read, or is a multiple such as ``"mm"``.
+    """
+    unit = parse_unit(text)
+    if unit.factor != 1.0:
+        raise DeclarationError(
+            f"{text!r} is not an SI unit",
+            advice=f"Declare it in {unit_of(unit.exponents).text}; a value can still be given as text in {text}.",
+        )
+    return unit
+
+
+def unit_of(exponents: Exponents) -> Unit:
+    """Return the SI unit with the given powers of kg, m, s and A."""
+    above = [f"{n}^{p}" if p > 1 else n for n, p in zip(_NAMES, exponents, strict=True) if p > 0]
+    below = [f"{n}^{-p}" if p < -1 else n for n, p in zip(_NAMES, exponents, strict=True) if p < 0]
+    return Unit("/".join(["*".join(above) or "1", *below]), 1.0, exponents)
+
+
+_NAMES = ("kg", "m", "s", "A")
+
+
+def split_quantity(text: str) -> tuple[float, str] | None:
+    """Return the number and the text of the unit of a quantity; None if it does not begin with a number."""
+    match = _QUANTITY.match(text)
+    return None if match is None else (float(match.group(1)), match.group(2))
+
+
 def parse_quantity(text: str, unit: Unit, where: str) -> float:
     """Read a number with an optional unit, such as ``"30 cm"``, and return it in the SI unit asked for.
 
@@ -125,12 +162,12 @@ def parse_quantity(text: str, unit: Unit, where: str) -> float:
     ParameterError
         If it is not a number, or its unit has another dimension.
     """
-    match = _QUANTITY.match(text)
-    if match is None:
+    split = split_quantity(text)
+    if split is None:
         raise ParameterError(f"{text!r} is not a number", where=where, advice=f"Give a number in {unit.text}.")
-    number, unit_text = match.groups()
+    number, unit_text = split
     if not unit_text:
-        return float(number)
+        return number
     try:
         given = parse_unit(unit_text)
     except DeclarationError as error:
@@ -139,4 +176,4 @@ def parse_quantity(text: str, unit: Unit, where: str) -> float:
         raise ParameterError(
             f"{unit_text!r} does not measure what is asked for here", where=where, advice=f"Give it in {unit.text}."
         )
-    return float(number) * given.factor / unit.factor
+    return number * given.factor / unit.factor

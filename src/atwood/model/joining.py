@@ -1,0 +1,186 @@
+"""Who may meet whom: connections, their ends, and parts that can take each other's place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from atwood.errors import ConnectError, DeclarationError, UsageError, suggestion
+from atwood.model.component import Component
+from atwood.model.connectors import Connector, ConnectorSpec, InputRef, OutputRef
+from atwood.model.units import Unit, parse_unit
+
+__all__ = ["Connection", "check_ends", "check_same_connectors", "class_path", "connect", "find_end", "relative_path"]
+
+Parts: TypeAlias = Component | list[Component]
+"""What a name in a model stands for: a part, or an array of parts."""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Two ends that are joined, as written in the class body of a model."""
+
+    a: Any
+    b: Any
+
+
+def connect(a: Any, b: Any) -> Connection:
+    """Join two connectors, or an output with an input, in the class body of a model.
+
+    Parameters
+    ----------
+    a, b
+        Connectors of parts (``rod.a``), connectors of the model itself, or an output and an input.
+
+    Raises
+    ------
+    ConnectError
+        When the class is made, if the two cannot meet.
+    """
+    return Connection(a, b)
+
+
+def class_path(end: Any, names: Mapping[int, str], where: str) -> str:
+    """Return the path of an end that was written in the class body of a model.
+
+    Parameters
+    ----------
+    end
+        The end.
+    names
+        Names of the declared parts by identity.
+    where
+        Name of the class.
+    """
+    _check_is_end(end, where)
+    if isinstance(end, ConnectorSpec):
+        return end.name
+    steps = [end.name]
+    component = end.component
+    while component._parent is not None:
+        steps.append(component._name)
+        component = component._parent
+    if id(component) not in names:
+        raise ConnectError("it belongs to a part that is not declared in the class body", where=f"{where}.{end.name}")
+    return ".".join([names[id(component)], *reversed(steps)])
+
+
+def relative_path(end: Any, model: Component) -> str:
+    """Return the path of an end, as seen from the model that joins it."""
+    _check_is_end(end, model.path or type(model).__name__)
+    if isinstance(end, ConnectorSpec):
+        if model.connector_specs().get(end.name) is not end:
+            raise ConnectError("it is declared by another class", where=end.name, advice="Connect things like rod.a.")
+        return end.name
+    names = [end.name]
+    component: Component | None = end.component
+    while component is not None and component is not model:
+        names.append(component._name or type(component).__name__)
+        component = component._parent
+    path = ".".join(reversed(names))
+    if component is None:
+        raise ConnectError("it belongs to a part that is not in this model", where=path, advice="Add the part first.")
+    return path
+
+
+def _check_is_end(end: Any, where: str) -> None:
+    if isinstance(end, ConnectorSpec) and end.count is not None:
+        end = (end,)
+    if isinstance(end, tuple) and end and all(isinstance(one, (Connector, ConnectorSpec)) for one in end):
+        name = end[0].name.partition("[")[0]
+        raise ConnectError(
+            f"{name!r} is an array of connectors",
+            where=where,
+            advice=f"Connect its elements one by one, as in {name}[0]; in a method build(self) if their number varies.",
+        )
+    if not isinstance(end, (Connector, ConnectorSpec, InputRef, OutputRef)):
+        advice = "Connect things like rod.a or mass.point."
+        if isinstance(end, Component):
+            advice = f"Name one of its connectors: {', '.join(end.connector_specs())}."
+        raise ConnectError(f"{end!r} is no connector", where=where, advice=advice)
+
+
+def check_ends(a: Any, b: Any, path_a: str, path_b: str) -> None:
+    """Refuse a connection of an end to itself, or of unlike ends."""
+    if path_a == path_b:
+        raise ConnectError("it is joined to itself", where=path_a, advice="Connect it to another connector.")
+    if isinstance(a, (InputRef, OutputRef)) or isinstance(b, (InputRef, OutputRef)):
+        if isinstance(a, InputRef) and isinstance(b, OutputRef):
+            _check_signal_units(b, a, path_b, path_a)
+        elif isinstance(a, OutputRef) and isinstance(b, InputRef):
+            _check_signal_units(a, b, path_a, path_b)
+        else:
+            raise ConnectError(
+                f"{path_a} and {path_b} are not an output and an input",
+                advice="Connect sensor.output('...') with part.input('...').",
+            )
+        return
+    kind_a, kind_b = (end.kind if isinstance(end, ConnectorSpec) else type(end) for end in (a, b))
+    if kind_a.family != kind_b.family:
+        raise ConnectError(
+            f"{path_a} is a {kind_a.__name__} and {path_b} is a {kind_b.__name__}; they are unlike and cannot meet",
+            advice="A Groove takes a rope's bend; points and frames meet each other.",
+        )
+
+
+def _check_signal_units(source: OutputRef, target: InputRef, path_source: str, path_target: str) -> None:
+    given, wanted = output_unit(source), target.component.signal_specs()[target.name].unit
+    if given is not None and not given.has_dimension_of(wanted):
+        raise ConnectError(f"{path_source} is in {given.text} and {path_target} takes {wanted.text}")
+
+
+def output_unit(output: OutputRef) -> Unit | None:
+    """Return the unit of an observable; None if it is not known."""
+    for law in output.component.laws("observable"):
+        if law.name == output.name.split(".")[0]:
+            return parse_unit(law.options.unit)
+    return None
+
+
+def check_same_connectors(old: Parts, new: Any, where: str) -> None:
+    """Refuse a part, or an array of parts, that cannot take the place of another."""
+    if isinstance(old, list) or isinstance(new, list):
+        if not isinstance(new, list) or not isinstance(old, list) or len(old) != len(new):
+            wanted = f"an array of {len(old)} parts" if isinstance(old, list) else "one part"
+            raise DeclarationError(f"here must be {wanted}", where=where)
+        for index, (old_one, new_one) in enumerate(zip(old, new, strict=True)):
+            check_same_connectors(old_one, new_one, f"{where}[{index}]")
+        return
+    if not isinstance(new, Component):
+        raise DeclarationError(f"{new!r} is no component", where=where)
+    have = new.connectors()
+    for name, connector in old.connectors().items():
+        if name not in have or have[name].family != connector.family:
+            raise DeclarationError(
+                f"a {type(new).__name__} cannot take the place of a {type(old).__name__}: it has no connector {name!r}",
+                where=where,
+                advice=suggestion(name, have),
+            )
+
+
+def find_end(model: Component, path: str) -> Connector | InputRef | OutputRef:
+    """Return the end at a dotted path within a model.
+
+    Raises
+    ------
+    UsageError
+        If there is none.
+    """
+    component, steps = model, path.split(".")
+    while len(steps) > 1 and steps[0] in component._children():
+        component = component._children()[steps[0]]
+        steps = steps[1:]
+    name = ".".join(steps)
+    connectors = component.connectors()
+    if name in connectors:
+        return connectors[name]
+    if name in component.signal_specs():
+        return component.input(name)
+    if steps[0] in [law.name for law in component.laws("observable")]:
+        return component.output(name)
+    raise UsageError(
+        f"there is no connector, input or output {name!r}",
+        where=component.path or type(component).__name__,
+        advice=suggestion(name, [*connectors, *component._children()]),
+    )
