@@ -98,11 +98,20 @@ def _shift_minus(c: float, b: Expression) -> Expression:
 
 
 def _merge(a: Expression, b: Expression, side: float) -> Expression | None:
-    """Return ``a + side * b`` as one product if both are constants times the same thing."""
+    """Return ``a + side * b`` as one product if both share all but a known factor, or the constant factor."""
+    known_a, rest_a = _parametric_factor(a)
+    known_b, rest_b = _parametric_factor(b)
+    if rest_a is rest_b and not (known_a is None and known_b is None):
+        one = a.graph.one
+        p, q = (one if known_a is None else known_a), (one if known_b is None else known_b)
+        return multiply(add(p, q) if side > 0.0 else subtract(p, q), rest_a)
     factor_a, core_a = _split(a)
     factor_b, core_b = _split(b)
     if core_a is not core_b:
-        return None
+        if factor_a == 1.0 or abs(factor_a) != abs(factor_b):
+            return None
+        alike = (factor_a == factor_b) == (side > 0.0)
+        return multiply(a.graph.constant(factor_a), add(core_a, core_b) if alike else subtract(core_a, core_b))
     total = factor_a + side * factor_b
     if not math.isfinite(total):
         return None
@@ -135,6 +144,17 @@ def multiply(a: Expression, b: Expression) -> Expression:
         return negate(multiply(a.arguments[0], b))
     if a is b and a.operation == "sqrt":
         return a.arguments[0]
+    if a.is_parametric != b.is_parametric:
+        known, other = (a, b) if a.is_parametric else (b, a)
+        inner, rest = _parametric_factor(other)
+        if inner is not None:
+            return multiply(multiply(known, inner), rest)
+        if other.operation == "mul":  # l (c u) is (l c) u where l c is there already
+            for factor, rest in (other.arguments, other.arguments[::-1]):
+                product = graph.find("mul", (known, factor) if known.index < factor.index else (factor, known))
+                if product is not None:
+                    return graph.node("mul", (product, rest) if product.index < rest.index else (rest, product))
+        return graph.node("mul", (a, b) if a.index < b.index else (b, a))
     factor_a, core_a = _split(a)
     factor_b, core_b = _split(b)
     if core_a is not a or core_b is not b:
@@ -142,6 +162,17 @@ def multiply(a: Expression, b: Expression) -> Expression:
         if _is_safe(factor):
             return multiply(graph.constant(factor), multiply(core_a, core_b))
     return graph.node("mul", (a, b) if a.index < b.index else (b, a))
+
+
+def _parametric_factor(a: Expression) -> tuple[Expression | None, Expression]:
+    """Return a product as its factor that depends on parameters alone and the rest; None if it has no such factor."""
+    if a.operation == "mul" and not a.is_parametric:
+        p, q = a.arguments
+        if p.is_parametric:
+            return p, q
+        if q.is_parametric:
+            return q, p
+    return None, a
 
 
 def _scale(c: float, b: Expression) -> Expression:
@@ -160,6 +191,11 @@ def _scale(c: float, b: Expression) -> Expression:
         if _is_safe(product):
             rest = b.arguments[1]
             return _scale(product, rest) if b.operation == "mul" else divide(graph.constant(product), rest)
+    factor, rest = _parametric_factor(b)
+    if factor is not None and not factor.is_constant:
+        if c < 0.0:  # the sign stays outside, where products of either sign are shared
+            return negate(_scale(-c, b))
+        return multiply(_scale(c, factor), rest)
     return graph.node("mul", (graph.constant(c), b))
 
 

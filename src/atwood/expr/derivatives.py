@@ -270,6 +270,10 @@ def vjp(
         if node.operation == "component":
             unknowns.setdefault(node.arguments[0].index, {})[node.payload] = weight
             continue
+        if node.operation == "mul" and node.arguments[0] is node.arguments[1]:
+            # The factor two goes to the weight, where it may meet a constant; the sum of two halves never would.
+            hand_back(node.arguments[0], multiply(multiply(graph.constant(2.0), weight), node.arguments[0]))
+            continue
         for position, argument in enumerate(node.arguments):
             if argument.index in active:
                 hand_back(argument, _partial(node, position, weight))

@@ -35,24 +35,34 @@ class Expression:
         :class:`~atwood.expr.operations.ExternalFunction`; otherwise ``None``.
     index
         The position in order of creation.
+    is_parametric
+        Whether it depends on constants and parameters alone, so that it is computed once a run.
     """
 
-    __slots__ = ("arguments", "graph", "index", "operation", "payload")
+    __slots__ = ("arguments", "graph", "index", "is_parametric", "operation", "payload")
 
     graph: Graph
     operation: str
     arguments: tuple[Expression, ...]
     payload: Any
     index: int
+    is_parametric: bool
 
     def __init__(
-        self, graph: Graph, operation: str, arguments: tuple[Expression, ...], payload: Any, index: int
+        self,
+        graph: Graph,
+        operation: str,
+        arguments: tuple[Expression, ...],
+        payload: Any,
+        index: int,
+        is_parametric: bool,
     ) -> None:
         self.graph = graph
         self.operation = operation
         self.arguments = arguments
         self.payload = payload
         self.index = index
+        self.is_parametric = is_parametric
 
     @property
     def is_constant(self) -> bool:
@@ -227,11 +237,24 @@ class Graph:
         """Return the symbol of that name; the same name gives the same symbol."""
         return self.node("symbol", (), name)
 
+    def parameter(self, name: str) -> Expression:
+        """Return the symbol of that name, marked as one that keeps its value for a run.
+
+        Products and sums are arranged so that what depends on parameters alone stays together.
+        """
+        key = ("symbol", (), name)
+        found = self._table.get(key)
+        return self._insert(key, "symbol", (), name, is_parameter=True) if found is None else found
+
     def node(self, operation: str, arguments: tuple[Expression, ...], payload: Any = None) -> Expression:
         """Return the node of an operation as it stands, without any folding."""
         key = (operation, arguments, payload)
         found = self._table.get(key)
         return self._insert(key, operation, arguments, payload) if found is None else found
+
+    def find(self, operation: str, arguments: tuple[Expression, ...], payload: Any = None) -> Expression | None:
+        """Return the node of an operation if it is there already."""
+        return self._table.get((operation, arguments, payload))
 
     def convert(self, value: Expression | float) -> Expression:
         """Return a number as a constant of this graph, and an expression of this graph as it is."""
@@ -242,9 +265,15 @@ class Graph:
         return self.constant(value)
 
     def _insert(
-        self, key: tuple[Any, ...], operation: str, arguments: tuple[Expression, ...], payload: Any
+        self,
+        key: tuple[Any, ...],
+        operation: str,
+        arguments: tuple[Expression, ...],
+        payload: Any,
+        is_parameter: bool = False,
     ) -> Expression:
-        created = Expression(self, operation, arguments, payload, len(self.nodes))
+        known = is_parameter or operation == "constant" or (bool(arguments) and all(a.is_parametric for a in arguments))
+        created = Expression(self, operation, arguments, payload, len(self.nodes), known)
         self._table[key] = created
         self.nodes.append(created)
         return created

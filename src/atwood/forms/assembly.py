@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
@@ -27,6 +27,9 @@ __all__ = ["Assembly", "FormName"]
 
 FormName = Literal["reduced", "dae"]
 FloatArray = NDArray[np.float64]
+
+_BY_HAND = 12
+"""Up to so many coordinates the equations are rewritten; beyond, the recursion is shorter than any closed form."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +82,14 @@ class Assembly:
     @cached_property
     def rows(self) -> tuple[Expression, ...]:
         """The equations of motion of the reduced form, as short as they come."""
-        equations = self.reduced
+        return tuple(self._tidy(self.reduced, self.reduced.rows))
+
+    def _tidy(self, equations: Equations, rows: Sequence[Expression]) -> list[Expression]:
+        """Write rows as an expert would by hand, for scenes of the size that one would do by hand."""
+        if len(equations.coordinates) > _BY_HAND:
+            return list(rows)
         angles = [q for q, c in zip(equations.coordinates, equations.names, strict=True) if c.unit == "rad"]
-        return tuple(collect(list(equations.rows), angles, self.parameters))
+        return collect(list(rows), angles, self.parameters)
 
     # -- parameters -----------------------------------------------------------------------------------------------
 
@@ -114,7 +122,8 @@ class Assembly:
             if self.form == "reduced":
                 self._made[key] = reduced_form(name, equations, self.parameters, self.rows, dependent)
             else:
-                self._made[key] = dae_form(name, equations, self.parameters, self.level)
+                residual = partial(self._tidy, equations)
+                self._made[key] = dae_form(name, equations, self.parameters, self.level, residual)
         made: FormProgram = self._made[key]
         return made
 

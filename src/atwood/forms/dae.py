@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 from atwood.errors import UsageError, suggestion
@@ -15,7 +15,13 @@ __all__ = ["LEVELS", "dae_form", "keep_constraints"]
 LEVELS: tuple[Level, ...] = ("ggl", "index1", "index1-projected")
 
 
-def dae_form(name: str, equations: Equations, parameters: Collection[Expression], level: str) -> FormProgram:
+def dae_form(
+    name: str,
+    equations: Equations,
+    parameters: Collection[Expression],
+    level: str,
+    tidy: Callable[[Sequence[Expression]], list[Expression]] = list,
+) -> FormProgram:
     """Return the dae form of a scene at a level.
 
     ``ggl``, the stabilised index-2 form of Gear, Gupta and Leimkuhler (J. Comput. Appl. Math. 12, 1985), holds
@@ -33,6 +39,8 @@ def dae_form(name: str, equations: Equations, parameters: Collection[Expression]
         The symbols of parameters.
     level
         ``"ggl"``, ``"index1"`` or ``"index1-projected"``.
+    tidy
+        Rewrites the residual without changing its values.
 
     Raises
     ------
@@ -46,7 +54,7 @@ def dae_form(name: str, equations: Equations, parameters: Collection[Expression]
     kinematic: list[Expression] = [r - u for r, u in zip(rates, equations.speeds, strict=True)]
     dynamic = [r - f for r, f in zip(equations.rows, equations.constraint_rows, strict=True)]
     if not multipliers:
-        return make_form_program(name, "dae", "ggl", equations, parameters, kinematic + dynamic)
+        return make_form_program(name, "dae", "ggl", equations, parameters, tidy(kinematic + dynamic))
     if level == "ggl":
         extra = tuple(equations.graph.symbol(f"mu:{m.name}") for m in multipliers)
         shift = substitute(list(equations.constraint_rows), dict(zip(multipliers, extra, strict=True)))
@@ -57,8 +65,9 @@ def dae_form(name: str, equations: Equations, parameters: Collection[Expression]
         held = [one.second for one in equations.constraints]
     chosen: Level = "ggl" if level == "ggl" else ("index1" if level == "index1" else "index1-projected")
     algebraic = range(2 * n, 2 * n + len(multipliers) + len(extra))
+    residual = tidy(kinematic + dynamic + held)
     return make_form_program(
-        name, "dae", chosen, equations, parameters, kinematic + dynamic + held, multipliers, extra, tuple(algebraic)
+        name, "dae", chosen, equations, parameters, residual, multipliers, extra, tuple(algebraic)
     )
 
 
