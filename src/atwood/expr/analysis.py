@@ -123,6 +123,8 @@ def substitute(
     mapping
         What to replace, usually symbols, and by what.  All replacements happen at once.
     """
+    if not outputs:
+        return []
     graph = _graph_of(outputs, mapping)
     nodes = live(outputs)
     replaced = {old.index: graph.convert(new) for old, new in mapping.items()}

@@ -321,6 +321,8 @@ def jacobian(
         The entries in the order of compressed columns.
     """
     directions = [{column: 1.0} if isinstance(column, Expression) else column for column in wrt]
+    if not directions or not any(isinstance(output, Expression) for output in outputs):
+        return SparseMatrix((), (), ())
     graph = _graph_of(outputs, *directions)
     nodes = live(outputs)
     by_index = {node.index: node for node in nodes}

@@ -171,16 +171,16 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
     at_rest = dict.fromkeys(equations.accelerations, 0.0)
     mass = jacobian(list(equations.rows), list(equations.accelerations))
     rates = [one.rate for one in equations.constraints]
-    slope = jacobian(rates, list(equations.speeds)) if rates else jacobian([equations.graph.constant(0.0)], [])
+    slope = jacobian(rates, list(equations.speeds))
     still = dict.fromkeys(equations.speeds, 0.0)
     outputs = (
         OutputGroup("mass", tuple(mass.entries)),
         OutputGroup("bias", tuple(substitute(list(equations.rows), at_rest))),
         OutputGroup("value", tuple(one.value for one in equations.constraints)),
         OutputGroup("rate", tuple(rates)),
-        OutputGroup("gamma", tuple(substitute([one.second for one in equations.constraints], at_rest)) if rates else ()),
+        OutputGroup("gamma", tuple(substitute([one.second for one in equations.constraints], at_rest))),
         OutputGroup("slope", tuple(slope.entries)),
-        OutputGroup("drift", tuple(substitute(rates, still)) if rates else ()),
+        OutputGroup("drift", tuple(substitute(rates, still))),
     )
     inputs = (
         InputGroup("t", (equations.time,)),

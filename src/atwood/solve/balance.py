@@ -163,7 +163,7 @@ def _undetermined(t: float) -> SolveError:
 
 def row_scales(slope: FloatArray, scales: FloatArray) -> FloatArray:
     """Return the size of each constraint: how much it changes when a coordinate changes by its scale."""
-    rows: FloatArray = np.max(np.abs(slope * scales), axis=1)
+    rows: FloatArray = np.max(np.abs(slope * scales), axis=1, initial=0.0)
     rows[rows == 0.0] = 1.0
     return rows
 
