@@ -1,0 +1,1 @@
+"""Results: trajectories, energies, and files."""

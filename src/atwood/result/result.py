@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -271,3 +275,32 @@ class Result:
     def multipliers(self) -> Mapping[str, FloatArray]:
         """Every reaction of every component at the output times, by path."""
         return self.table([one.path for one in self.assembly.reactions])
+
+    # -- keeping and showing --------------------------------------------------------------------------------------
+
+    def save(self, file: str | os.PathLike[str], paths: Iterable[str] | None = None) -> Path:
+        """Save trajectories as NetCDF-3 (``.nc``), NumPy (``.npz``) or ``.csv``; see `atwood.load_result`.
+
+        Parameters
+        ----------
+        file
+            Where to.
+        paths
+            Which quantities; all when not given.
+        """
+        from atwood.result.files import save_result
+
+        return save_result(self, file, paths)
+
+    def plot(self, paths: Iterable[str] | None = None, file: str | os.PathLike[str] | None = None) -> Any:
+        """Plot quantities over time, and return the figure; see `atwood.plot`.
+
+        Parameters
+        ----------
+        paths
+            Which quantities; the coordinates and the energy when not given.
+        file
+            Where to save the picture; its suffix says how.
+        """
+        # Views stand above results and are never imported from here, only looked up when a picture is wanted.
+        return import_module("atwood.view.plot").plot(self, paths, file)

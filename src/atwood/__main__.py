@@ -1,0 +1,6 @@
+"""``python -m atwood`` is the command line."""
+
+from atwood.cli import main
+
+if __name__ == "__main__":
+    main(prog_name="atwood")

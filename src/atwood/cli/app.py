@@ -1,0 +1,123 @@
+"""The commands, with their arguments and options."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from atwood.cli.errors import reporting_errors
+
+__all__ = ["main"]
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_SCENE_HELP = """SCENE is the name of a scene of an installed library (see `atwood list`), or FILE.py:NAME, where NAME
+is a Scene class, a scene, or a function that returns one."""
+
+
+def _version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if value and not ctx.resilient_parsing:
+        import atwood
+
+        click.echo(f"atwood {atwood.__version__}")
+        ctx.exit()
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Show the version.")
+def main() -> None:
+    r"""Mechanics from parts: what moves, how it moves, and with which forces.
+
+    \b
+    atwood list                          the scenes there are
+    atwood info four-bar                 bodies, joints, freedom, equations
+    atwood run double-pendulum           its motion and its forces
+    atwood compare double-pendulum       what each form costs for which error
+    """
+
+
+def _scene_options(function: F) -> F:
+    """Add the scene, and what changes it."""
+    for option in (
+        click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output."),
+        click.option(
+            "--start", "starts", multiple=True, metavar="PATH=VALUE",
+            help="Start value, such as rod1.angle='30 deg'. Can be repeated.",
+        ),
+        click.option(
+            "--set", "settings", multiple=True, metavar="PATH=VALUE",
+            help="Parameter, such as rod1.length='30 cm'. Can be repeated.",
+        ),
+        click.argument("scene"),
+    ):  # fmt: skip
+        function = option(function)
+    return function
+
+
+@main.command("list", short_help="List the scenes of the installed libraries.")
+@click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output.")
+@reporting_errors
+def list_command(as_json: bool) -> None:
+    """List the scenes of the installed libraries."""
+    from atwood.cli.listing import list_scenes
+
+    list_scenes(as_json)
+
+
+@main.command("info", short_help="Say what a scene is made of, before any run.", epilog=_SCENE_HELP)
+@_scene_options
+@reporting_errors
+def info_command(scene: str, settings: tuple[str, ...], starts: tuple[str, ...], as_json: bool) -> None:
+    """Say what SCENE is made of: bodies, joints, freedom, constraints, and what its equations cost."""
+    from atwood.cli.info import show_info
+
+    show_info(scene, settings, starts, as_json)
+
+
+_FORM = click.Choice(["reduced", "dae"])
+_LEVEL = click.Choice(["ggl", "index1", "index1-projected"])
+_FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+@main.command("run", short_help="Simulate a scene.", epilog=_SCENE_HELP)
+@_scene_options
+@click.option("--form", type=_FORM, default="reduced", show_default=True, help="Constraints eliminated, or kept.")
+@click.option(
+    "--level", type=_LEVEL, default="ggl", show_default=True, help="Level of the constraints of the dae form."
+)
+@click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
+@click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative tolerance of the solver.")
+@click.option("--outputs", type=click.IntRange(min=2), default=201, show_default=True, help="Number of output times.")
+@click.option("--max-steps", type=click.IntRange(min=1), help="Stop after so many steps.")
+@click.option("--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after so many seconds.")
+@click.option("--plot", type=_FILE, help="Save a plot; the suffix says how (.png, .svg, .pdf).")
+@click.option("--save", type=_FILE, help="Save all trajectories (.nc, .npz or .csv).")
+@click.option("--progress/--no-progress", default=True, help="Show progress where there is a terminal.")
+@reporting_errors
+def run_command(scene: str, as_json: bool, **options: Any) -> None:
+    """Simulate SCENE, and show where it ends and how accurate that is."""
+    from atwood.cli.running import RunRequest, run_scene
+
+    run_scene(RunRequest(scene=scene, as_json=as_json, **options))
+
+
+@main.command("compare", short_help="Compare what each form costs for which error.", epilog=_SCENE_HELP)
+@_scene_options
+@click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
+@click.option(
+    "--rtol", "rtols", type=float, multiple=True, help="Relative tolerance; can be repeated.  [default: 1e-4 to 1e-10]"
+)
+@click.option(
+    "--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Give up a run after so many seconds."
+)
+@click.option("--plot", type=_FILE, help="Save a work-precision diagram; the suffix says how (.png, .svg, .pdf).")
+@click.option("--progress/--no-progress", default=True, help="Show progress where there is a terminal.")
+@reporting_errors
+def compare_command(scene: str, as_json: bool, **options: Any) -> None:
+    """Run SCENE in both forms, at several tolerances, against a far more accurate reference."""
+    from atwood.cli.comparing import CompareRequest, compare_scene
+
+    compare_scene(CompareRequest(scene=scene, as_json=as_json, **options))

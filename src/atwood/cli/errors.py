@@ -1,0 +1,54 @@
+"""How errors reach the reader: one clear line, and an exit code."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, ParamSpec
+
+import click
+
+from atwood.errors import AtwoodError
+
+__all__ = ["FAILED", "INTERRUPTED", "reporting_errors"]
+
+FAILED = 1
+"""Exit code when a scene, or what was asked of it, is not sound."""
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells expect it."""
+
+P = ParamSpec("P")
+
+
+def reporting_errors(function: Callable[P, Any]) -> Callable[P, None]:
+    """Wrap a command so that its errors are shown without a traceback.
+
+    Parameters
+    ----------
+    function
+        The command; with its option ``as_json``, errors go to standard output as JSON too.
+    """
+
+    @functools.wraps(function)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
+        context = click.get_current_context()
+        try:
+            function(*args, **kwargs)
+        except AtwoodError as error:
+            if kwargs.get("as_json"):
+                from atwood.cli.output import print_json
+
+                content = {"message": error.message, "where": error.where, "advice": error.advice}
+                print_json({"error": content})
+            click.echo(f"Error: {_one_line(str(error))}", err=True)
+            context.exit(FAILED)
+        except KeyboardInterrupt:
+            click.echo("Interrupted.", err=True)
+            context.exit(INTERRUPTED)
+
+    return wrapped
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

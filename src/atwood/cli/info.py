@@ -1,0 +1,67 @@
+"""`atwood info`: the mechanism report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from atwood.cli.output import console, print_json
+from atwood.cli.scenes import prepare
+
+if TYPE_CHECKING:
+    from atwood.report import MechanismReport
+
+__all__ = ["show_info"]
+
+
+def show_info(scene: str, settings: Sequence[str], starts: Sequence[str], as_json: bool) -> None:
+    """Show what a scene is made of.
+
+    Parameters
+    ----------
+    scene, settings, starts
+        See `atwood.cli.scenes.prepare`.
+    as_json
+        Whether to write JSON.
+    """
+    from atwood.report import report
+
+    model, name = prepare(scene, settings, starts)
+    found = report(model, name)
+    if as_json:
+        print_json(found.to_dict())
+    else:
+        _print(found)
+
+
+def _print(found: MechanismReport) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from atwood.report.text import facts, title
+
+    out = console()
+    out.print(Text(title(found), style="bold"))
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_column(style="cyan", no_wrap=True)
+    table.add_column(overflow="fold")
+    for label, text in facts(found):
+        table.add_row(label, Text(text))
+    out.print(table)
+    parameters = [one for one in found.parameters if isinstance(one.value, float)]
+    if not parameters:
+        return
+    out.print()
+    listing = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
+    listing.add_column("parameter", no_wrap=True)
+    listing.add_column("value", justify="right")
+    listing.add_column("unit")
+    listing.add_column("meaning", overflow="ellipsis", no_wrap=True)
+    for one in parameters[:_SHOWN]:
+        listing.add_row(one.path, f"{one.value:g}", "" if one.unit == "1" else one.unit, one.meaning)
+    out.print(listing)
+    if len(parameters) > _SHOWN:
+        out.print(f"... and {len(parameters) - _SHOWN} more; --json shows all", style="dim")
+
+
+_SHOWN = 16

@@ -1,0 +1,180 @@
+"""`atwood run`: from a scene to its motion."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from atwood.cli.errors import INTERRUPTED
+from atwood.cli.output import print_json, warn
+from atwood.cli.scenes import prepare
+
+if TYPE_CHECKING:
+    from atwood.forms.assembly import Assembly
+    from atwood.result.result import Result
+
+__all__ = ["RunRequest", "progress_bar", "run_scene"]
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """What was asked for on the command line; see the options of `atwood run`."""
+
+    scene: str
+    settings: tuple[str, ...] = ()
+    starts: tuple[str, ...] = ()
+    form: str = "reduced"
+    level: str = "ggl"
+    t_end: float | None = None
+    rtol: float = 1e-8
+    outputs: int = 201
+    max_steps: int | None = None
+    max_seconds: float | None = None
+    plot: Path | None = None
+    save: Path | None = None
+    progress: bool = True
+    as_json: bool = False
+
+
+def run_scene(request: RunRequest) -> None:
+    """Run a scene, and show, save and plot what came of it.
+
+    Parameters
+    ----------
+    request
+        What was asked for.
+    """
+    _check_files(request)
+    scene, name = prepare(request.scene, request.settings, request.starts)
+    from atwood.pipeline import assemble, simulate
+
+    assembly = assemble(scene, form=request.form, level=request.level, name=name)
+    t_start, t_end = assembly.flat.t_start, assembly.flat.t_end if request.t_end is None else request.t_end
+    with progress_bar(request.progress, name, t_start, t_end) as progress:
+        result = simulate(
+            assembly,
+            t_end=request.t_end,
+            rtol=request.rtol,
+            outputs=request.outputs,
+            max_steps=request.max_steps,
+            max_seconds=request.max_seconds,
+            progress=progress,
+        )
+    if request.save is not None:
+        result.save(request.save)
+    if request.plot is not None:
+        result.plot(file=request.plot)
+    if request.as_json:
+        print_json(run_data(result, request))
+    else:
+        from atwood.cli.summary import print_summary
+
+        print_summary(result, request)
+    if result.status == "interrupted":
+        warn(f"Interrupted at t = {result.time[-1]:.6g} s.")
+        click.get_current_context().exit(INTERRUPTED)
+
+
+def _check_files(request: RunRequest) -> None:
+    """Refuse files that could not be written before any work is done."""
+    if request.save is not None:
+        from atwood.result.files import check_target
+
+        check_target(request.save)
+    if request.plot is not None:
+        from atwood.view.canvas import check_picture
+
+        check_picture(request.plot)
+
+
+def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
+    """Return a run as plain data.
+
+    Parameters
+    ----------
+    result
+        The run.
+    request
+        What was asked for.
+    """
+    from atwood.result.about import describe_run
+
+    data = describe_run(result)
+    asked = {**data.pop("asked"), "set": list(request.settings)}
+    assembly = result.assembly
+    coordinates = [one.name for one in assembly.equations.names]
+    return {
+        **{key: data.pop(key) for key in ("scene", "form", "level")},
+        "degrees_of_freedom": degrees_of_freedom(result),
+        "coordinates": coordinates,
+        "speeds": [f"{name}'" for name in coordinates],
+        "multipliers": multiplier_labels(result),
+        "states": result.run.segments[0].plan.program.size,
+        "solver": data.pop("solver"),
+        "start": result.at(0),
+        "end": result.at(-1),
+        "energy": data.pop("energy"),
+        "constraint_max": data.pop("constraint_max"),
+        **data,
+        "asked": asked,
+    }
+
+
+def degrees_of_freedom(result: Result) -> int:
+    """Return the degrees of freedom of the scene at its start.
+
+    Parameters
+    ----------
+    result
+        The run.
+    """
+    plan = result.run.segments[0].plan
+    return len(plan.assembly.equations.names) - plan.finding.rank
+
+
+def multiplier_labels(result: Result) -> list[str]:
+    """Return the constraints whose multipliers are in the solver's vector, by label.
+
+    Parameters
+    ----------
+    result
+        The run.
+    """
+    assembly: Assembly = result.assembly
+    plan = result.run.segments[0].plan
+    if assembly.form == "reduced":
+        return []
+    constraints = assembly.equations.constraints
+    return [constraints[i].label for i in plan.finding.kept]
+
+
+@contextlib.contextmanager
+def progress_bar(wanted: bool, name: str, t_start: float, t_end: float) -> Iterator[Callable[[float], object] | None]:
+    """Show a progress bar on standard error while a run goes on, if there is a terminal.
+
+    Parameters
+    ----------
+    wanted
+        Whether to show one at all.
+    name
+        What is running.
+    t_start, t_end
+        Time span, s.
+    """
+    if not (wanted and sys.stderr.isatty() and t_end > t_start):
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    reached = TextColumn("t = {task.fields[time]:.3g} s")
+    columns = (TextColumn("{task.description}"), BarColumn(), reached, TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(name, total=t_end - t_start, time=t_start)
+        yield lambda t: bar.update(task, completed=t - t_start, time=t)

@@ -1,0 +1,205 @@
+"""Finding scenes: by name in the installed libraries, or in a file."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import importlib.util
+import sys
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
+
+if TYPE_CHECKING:
+    from atwood.model.composite import Model
+
+__all__ = ["bundled_scenes", "find_scene", "prepare"]
+
+GROUP = "atwood.libraries"
+"""The entry point group in which component libraries make themselves known."""
+
+
+def bundled_scenes() -> dict[str, type[Model]]:
+    """Return the scenes of all installed libraries by name.
+
+    Raises
+    ------
+    UsageError
+        If a library cannot be loaded.
+    """
+    found: dict[str, type[Model]] = {}
+    for entry in entry_points(group=GROUP):
+        name = f"{entry.value}.scenes"
+        try:
+            module = importlib.import_module(name)
+        except ModuleNotFoundError as error:
+            if error.name == name:
+                continue  # a library without scenes
+            raise UsageError(f"the library cannot be loaded ({error})", where=entry.value) from error
+        except ImportError as error:
+            raise UsageError(f"the library cannot be loaded ({error})", where=entry.value) from error
+        for scene, kind in getattr(module, "SCENES", {}).items():
+            found.setdefault(scene, kind)
+    return found
+
+
+def find_scene(text: str) -> tuple[Model, str]:
+    """Return a scene and what to call it.
+
+    Parameters
+    ----------
+    text
+        The name of a scene of a library, or ``file.py:name``.
+
+    Raises
+    ------
+    UsageError
+        If there is no such scene, or the file cannot be read.
+    """
+    file, colon, name = text.rpartition(":")
+    if colon and file.endswith(".py"):
+        return _scene_in_file(Path(file), name), name
+    if text.endswith(".py"):
+        return _only_scene(Path(text))
+    scenes = bundled_scenes()
+    if text in scenes:
+        return scenes[text](), text
+    if not scenes:
+        raise UsageError(
+            "no component library is installed", where=text, advice="Install one, or give a scene as FILE.py:NAME."
+        )
+    close = suggestion(text, scenes) if near_matches(text, scenes) else "see `atwood list`, or give FILE.py:NAME"
+    raise UsageError("there is no such scene", where=text, advice=f"{close[0].upper()}{close[1:]}")
+
+
+def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[Model, str]:
+    """Return a scene with its parameters and start values changed, and what to call it.
+
+    Parameters
+    ----------
+    text
+        See `find_scene`.
+    settings, starts
+        Parameters and start values as ``path=value``.
+    """
+    from atwood.model.scene import Scene
+
+    scene, name = find_scene(text)
+    for path, value in _pairs(settings, "--set"):
+        scene.set(path, value)
+    for path, value in _pairs(starts, "--start"):
+        if not isinstance(scene, Scene):
+            raise UsageError("this is a model and no scene, and has no start of its own", where=name)
+        scene.start[path] = value
+    return scene, name
+
+
+def _pairs(texts: Sequence[str], option: str) -> Iterator[tuple[str, str]]:
+    for text in texts:
+        path, equals, value = text.partition("=")
+        if not (equals and path.strip() and value.strip()):
+            raise UsageError(f"{text!r} does not say which value", where=option, advice=f"Write {option} PATH=VALUE.")
+        yield path.strip(), value.strip()
+
+
+# -- files -------------------------------------------------------------------------------------------------------------
+
+
+def _scene_in_file(file: Path, name: str) -> Model:
+    module = _load(file)
+    where = f"{file}:{name}"
+    if not hasattr(module, name):
+        names = _candidates(module)
+        raise UsageError(f"the file defines no {name!r}", where=where, advice=suggestion(name, names))
+    return _as_scene(getattr(module, name), file, where)
+
+
+def _only_scene(file: Path) -> tuple[Model, str]:
+    """Return the scene of a file that defines just one."""
+    names = list(_candidates(_load(file)))
+    if len(names) != 1:
+        listed = f"it defines {', '.join(names)}" if names else "it defines no scene"
+        raise UsageError(f"which scene? {listed}", where=str(file), advice=f"Write {file}:NAME.")
+    return _scene_in_file(file, names[0]), names[0]
+
+
+def _candidates(module: ModuleType) -> Mapping[str, Any]:
+    """Return the scenes that a module itself defines."""
+    from atwood.model.scene import Scene
+
+    return {
+        name: value
+        for name, value in vars(module).items()
+        if not name.startswith("_")
+        and (
+            isinstance(value, Scene)
+            or (isinstance(value, type) and issubclass(value, Scene) and value.__module__ == module.__name__)
+        )
+    }
+
+
+def _as_scene(value: Any, file: Path, where: str) -> Model:
+    from atwood.model.composite import Model
+
+    if callable(value) and not isinstance(value, Model):
+        with _placing_errors(file):
+            value = value()
+    if not isinstance(value, Model):
+        raise UsageError(
+            f"it is a {type(value).__name__} and no scene",
+            where=where,
+            advice="Name a Scene class, a scene, or a function without arguments that returns one.",
+        )
+    return value
+
+
+def _load(file: Path) -> ModuleType:
+    """Run a file as a module; what it prints goes to standard error."""
+    if not file.is_file():
+        raise UsageError("there is no such file", where=str(file))
+    name = f"_atwood_scene_{file.stem}"
+    spec = importlib.util.spec_from_file_location(name, file)
+    if spec is None or spec.loader is None:
+        raise UsageError("it cannot be read as a Python file", where=str(file))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses and the like look their module up
+    folder = str(file.resolve().parent)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)  # as when the file is run as a script; functions in it may import later
+    with _placing_errors(file):
+        spec.loader.exec_module(module)
+    return module
+
+
+@contextlib.contextmanager
+def _placing_errors(file: Path) -> Iterator[None]:
+    """Turn whatever goes wrong in a user's file into an error with the file and the line."""
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    except SyntaxError as error:
+        name = error.filename or str(file)
+        raise UsageError(f"it is not valid Python ({error.msg})", where=f"{name}:{error.lineno}") from error
+    except AtwoodError as error:
+        where = f"{_line_in(error, file)}: {error.where}" if error.where else _line_in(error, file)
+        raise UsageError(error.message, where=where, advice=error.advice) from error
+    except KeyboardInterrupt:
+        raise
+    except SystemExit as error:
+        raise UsageError(f"it leaves Python with exit code {error.code}", where=_line_in(error, file)) from error
+    except Exception as error:
+        raise UsageError(f"{type(error).__name__}: {error}", where=_line_in(error, file)) from error
+
+
+def _line_in(error: BaseException, file: Path) -> str:
+    """Return the file with the line of it in which an error arose."""
+    wanted = file.resolve()
+    lines = [
+        frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename).resolve() == wanted
+    ]
+    return f"{file}:{lines[-1]}" if lines and lines[-1] is not None else str(file)

@@ -1,0 +1,170 @@
+"""What `atwood run` shows: how the run went, how accurate it is, and where it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.cli.output import console
+from atwood.cli.running import RunRequest, degrees_of_freedom, multiplier_labels
+from atwood.report.text import count_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from atwood.result.result import Result
+
+__all__ = ["duration", "main_quantities", "print_summary", "sparkline"]
+
+_ROWS = 16
+_NARROWEST, _WIDEST = 9, 32  # of a small picture of a curve
+_BARS = "▁▂▃▄▅▆▇█"
+
+
+def print_summary(result: Result, request: RunRequest) -> None:
+    """Show a run.
+
+    Parameters
+    ----------
+    result
+        The run.
+    request
+        What was asked for.
+    """
+    from rich.table import Table
+    from rich.text import Text
+
+    out = console()
+    form = f"{result.form} form" + (f" ({result.level})" if result.form == "dae" else "")
+    out.print(Text.assemble((result.assembly.flat.name, "bold"), f", {form}"))
+    facts = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    facts.add_column(style="cyan", no_wrap=True)
+    facts.add_column()
+    for label, text in _facts(result):
+        facts.add_row(label, Text(text))
+    out.print(facts)
+    out.print()
+    paths = main_quantities(result)
+    out.print(_quantities(result, paths[:_ROWS], out.width))
+    hidden = len(result.paths) - min(len(paths), _ROWS)
+    if hidden:
+        out.print(
+            f"{count_of(hidden, 'more quantity', 'more quantities')}: --json or --save FILE shows all", style="dim"
+        )
+    for option, file in (("saved", request.save), ("plotted", request.plot)):
+        if file is not None:
+            out.print(f"{option}: {file}", style="dim", soft_wrap=True)
+
+
+def _quantities(result: Result, paths: list[str], width: int) -> Table:
+    """Return the table of quantities, with a small picture of each curve where there is room for it."""
+    from rich.table import Table
+
+    headings = ("quantity", "start", "end", "smallest", "largest", "unit")
+    rows = []
+    for path in paths:
+        values = result.array(path)
+        low, high = float(np.min(values)), float(np.max(values))
+        ends = [f"{_clean(v, values):.6g}" for v in (values[0], values[-1])]
+        rows.append((path, *ends, *(f"{_clean(v, values):.4g}" for v in (low, high)), result.unit(path)))
+    left = width - 2 - sum(max(map(len, column)) + 2 for column in zip(headings, *rows, strict=True))
+    table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
+    for heading in headings:
+        is_number = heading not in ("quantity", "unit")
+        table.add_column(heading, justify="right" if is_number else "left", no_wrap=True)
+    if left < _NARROWEST:
+        for row in rows:
+            table.add_row(*row)
+        return table
+    table.add_column("over time", no_wrap=True)
+    for path, texts in zip(paths, rows, strict=True):
+        table.add_row(*texts, sparkline(result.array(path), min(left, _WIDEST)))
+    return table
+
+
+def _facts(result: Result) -> Iterator[tuple[str, str]]:
+    """Yield how a run went, as labels and sentences."""
+    plan, statistics = result.run.segments[0].plan, result.statistics
+    size = [count_of(degrees_of_freedom(result), "degree") + " of freedom", count_of(plan.program.size, "state")]
+    multipliers = len(multiplier_labels(result))
+    if multipliers:
+        size.append(count_of(multipliers, "multiplier"))
+    yield "mechanism", ", ".join(size)
+    span = f"t = {result.run.start.time:g} to {result.time[-1]:.6g} s"
+    yield "run", f"{span}, rtol {result.run.options.relative_tolerance:g}, {len(result.time)} outputs"
+    if result.status != "finished":
+        why = {"stopped": "stopped", "step_limit": "out of steps", "time_limit": "out of time"}
+        said = why.get(result.status, result.status)
+        yield "ended early", f"{said}: {result.message}" if result.message else said
+    yield from (("event", one.describe()) for one in result.happenings if one.target != "stop")
+    yield (
+        "solver",
+        f"SUNDIALS IDA, {count_of(statistics.steps, 'step')}, {statistics.residual_evaluations} residuals, "
+        f"{statistics.jacobian_evaluations} Jacobians, {duration(statistics.seconds)}",
+    )
+    yield "energy", _energy(result)
+    if plan.balance.constraints:
+        missed = result.constraint_max
+        held = max(missed["held_position"], missed["held_velocity"])
+        before = f" ({held:.1e} before projection)" if plan.is_projected else ""
+        yield "constraints", f"missed by {max(missed['position'], missed['velocity']):.1e}{before}"
+
+
+def _energy(result: Result) -> str:
+    ledger = result.energy
+    size = float(np.max(np.abs(ledger.kinetic)) + np.ptp(ledger.potential))
+    first, last = (0.0 if abs(e) < 1e-13 * size else e for e in (ledger.total[0], ledger.total[-1]))
+    work = f", work {ledger.work[-1] - ledger.work[0]:.6g} J" if np.any(ledger.work) else ""
+    return f"{first:.6g} J to {last:.6g} J{work}; the balance drifts by {ledger.max_drift:.1e}"
+
+
+def duration(seconds: float) -> str:
+    """Return a time as a reader says it, in milliseconds where it is short."""
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+
+
+def _clean(value: float, values: NDArray[np.float64]) -> float:
+    """Return a value, or zero where it is rounding against the others."""
+    return 0.0 if abs(value) < 1e-13 * float(np.max(np.abs(values))) else float(value)
+
+
+def main_quantities(result: Result) -> list[str]:
+    """Return the quantities that say most: coordinates, where masses are, then what pulls and holds.
+
+    Parameters
+    ----------
+    result
+        The run.
+    """
+    assembly = result.assembly
+    names = [one.name for one in assembly.reduced.names if one.name in result]
+    shown = assembly.mechanism.bodies.bodies
+    masses = [f"{body.name}.position.{axis}" for body in shown if not body.is_fixed for axis in "xyz"]
+    tensions = [path for path in result.paths if path.endswith(".tension")]
+    forces = [one.path for one in assembly.reactions if one.path not in tensions and np.any(result.array(one.path))]
+    chosen = [*names[:8], *tensions[:6], *(p for p in masses if p in result), *names[8:], *tensions[6:], *forces]
+    return list(dict.fromkeys(chosen))
+
+
+def sparkline(values: NDArray[np.float64], width: int = 24) -> str:
+    """Return a small picture of a curve as text.
+
+    Parameters
+    ----------
+    values
+        The curve.
+    width
+        Number of characters.
+    """
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return ""
+    low, high = float(np.min(finite)), float(np.max(finite))
+    if high - low <= 1e-9 * max(abs(low), abs(high)):
+        return "─" * min(width, len(values))
+    picked = np.interp(np.linspace(0, len(values) - 1, min(width, len(values))), np.arange(len(values)), values)
+    heights = np.nan_to_num((picked - low) / (high - low)) * (len(_BARS) - 1)
+    return "".join(_BARS[round(float(h))] for h in heights)

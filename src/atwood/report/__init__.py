@@ -1,0 +1,21 @@
+"""The mechanism report: what Atwood made of a scene, before anything runs."""
+
+from atwood.report.mechanism import (
+    BodyEntry,
+    DroppedPart,
+    JointEntry,
+    MechanismReport,
+    MergedPart,
+    ParameterEntry,
+    report,
+)
+
+__all__ = [
+    "BodyEntry",
+    "DroppedPart",
+    "JointEntry",
+    "MechanismReport",
+    "MergedPart",
+    "ParameterEntry",
+    "report",
+]

@@ -1,0 +1,249 @@
+"""The mechanism report: bodies, joints, freedom, constraints, and what was merged, dropped and eliminated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.forms.assembly import Assembly
+from atwood.model.composite import Model
+from atwood.pipeline import assemble, assemble_flat
+from atwood.report.parts import (
+    BodyEntry,
+    DroppedPart,
+    JointEntry,
+    MergedPart,
+    ParameterEntry,
+    list_bodies,
+    list_dropped,
+    list_joints,
+    list_merged,
+    list_parameters,
+    list_ties,
+)
+from atwood.solve.problem import Plan, make_plan
+from atwood.solve.start import Start, find_start
+
+__all__ = [
+    "BodyEntry",
+    "DroppedPart",
+    "JointEntry",
+    "MechanismReport",
+    "MergedPart",
+    "ParameterEntry",
+    "report",
+]
+
+
+@dataclass(frozen=True)
+class MechanismReport:
+    """What Atwood made of a scene.
+
+    Attributes
+    ----------
+    scene, space
+        Its name, and what it lives in.
+    gravity
+        Acceleration of free fall, m/s^2.
+    degrees_of_freedom
+        Speeds of the reduced form less its independent constraints.
+    coordinates
+        Coordinates of the reduced form.
+    eliminated
+        Coordinates that linear constraints gave as functions of the others.
+    dependent
+        With loops: the coordinates that follow from the others at the start.
+    bodies, massless
+        What has mass and can move, and the names of what moves without mass.
+    joints, ties
+        Joints between bodies, and other parts that hold by a constraint.
+    merged, dropped
+        Parts that are one body with another, and parts that leave nothing in the equations.
+    loops
+        How many independent loops the joints make.
+    constraints
+        The scalar constraints of the dae form.
+    redundant
+        Those that follow from the others.
+    not_unique
+        The reactions that are then not unique.
+    starts_singular
+        Whether the start is a singular position, where constraints lose rank.
+    free_coordinates, free_speeds
+        What nothing fixes at the start; it keeps its guess as far as it can, or starts at zero.
+    repeated
+        Start values that follow from the others.
+    states
+        Length of the solver's vector, by form.
+    operations
+        Operations of one residual, by form and kind.
+    parameters
+        All parameters.
+    """
+
+    scene: str
+    space: str
+    gravity: float
+    degrees_of_freedom: int
+    coordinates: tuple[str, ...]
+    eliminated: tuple[str, ...]
+    dependent: tuple[str, ...]
+    bodies: tuple[BodyEntry, ...]
+    massless: tuple[str, ...]
+    joints: tuple[JointEntry, ...]
+    ties: tuple[str, ...]
+    merged: tuple[MergedPart, ...]
+    dropped: tuple[DroppedPart, ...]
+    loops: int
+    constraints: tuple[str, ...]
+    redundant: tuple[str, ...]
+    not_unique: tuple[str, ...]
+    starts_singular: bool
+    free_coordinates: tuple[str, ...]
+    free_speeds: tuple[str, ...]
+    repeated: tuple[str, ...]
+    states: Mapping[str, int]
+    operations: Mapping[str, Mapping[str, int]]
+    parameters: tuple[ParameterEntry, ...]
+
+    def __str__(self) -> str:
+        from atwood.report.text import as_text
+
+        return as_text(self)
+
+    @property
+    def loop_joints(self) -> tuple[str, ...]:
+        """The joints that close loops."""
+        return tuple(joint.path for joint in self.joints if joint.closes_loop)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as plain data, with lists of paths."""
+        return {
+            "scene": self.scene,
+            "space": self.space,
+            "gravity": self.gravity,
+            "degrees_of_freedom": self.degrees_of_freedom,
+            "constraints": len(self.constraints),
+            "loops": self.loops,
+            "bodies": [one.path for one in self.bodies],
+            "massless": list(self.massless),
+            "joints": [one.path for one in self.joints],
+            "ties": list(self.ties),
+            "redundant": list(self.redundant),
+            "merged": [one.path for one in self.merged],
+            "dropped": [one.path for one in self.dropped],
+            "coordinates": list(self.coordinates),
+            "eliminated": list(self.eliminated),
+            "dependent": list(self.dependent),
+            "loop_joints": list(self.loop_joints),
+            "constraint_labels": list(self.constraints),
+            "not_unique": list(self.not_unique),
+            "starts_singular": self.starts_singular,
+            "start": {
+                "free_coordinates": list(self.free_coordinates),
+                "free_speeds": list(self.free_speeds),
+                "repeated": list(self.repeated),
+            },
+            "states": dict(self.states),
+            "operations": {form: dict(counts) for form, counts in self.operations.items()},
+            "masses": {one.path: one.mass for one in self.bodies},
+            "merged_into": {one.path: one.into for one in self.merged},
+            "dropped_because": {one.path: one.why for one in self.dropped},
+            "joint_kinds": {one.path: one.kind for one in self.joints},
+            "parameters": [
+                {"path": one.path, "value": _plain(one.value), "unit": one.unit, "meaning": one.meaning}
+                for one in self.parameters
+            ],
+        }
+
+
+def _plain(value: object) -> object:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
+    """Report what became of a scene: bodies, joints, degrees of freedom, constraints, and why.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it.
+    name
+        What to call the scene.
+
+    Returns
+    -------
+    MechanismReport
+        Everything that is known before a run; ``print`` it, or take `to_dict`.
+
+    Raises
+    ------
+    AtwoodError
+        If the scene cannot be simulated; the error says why and names the part.
+    """
+    given = scene if isinstance(scene, Assembly) else assemble(scene, name=name)
+    reduced = assemble_flat(given.flat, form="reduced")
+    dae = assemble_flat(given.flat, form="dae", level=given.level or "ggl")
+    start = find_start(reduced)
+    plans = {"reduced": _plan(reduced, start), "dae": _plan(dae, start)}
+    finding, forest = plans["dae"].finding, reduced.reduced.forest
+    labels = [one.label for one in dae.maximal.constraints]
+    bodies, massless = list_bodies(reduced)
+    names = [one.name for one in reduced.reduced.names]
+    return MechanismReport(
+        scene=given.flat.name,
+        space=given.flat.space,
+        gravity=given.flat.gravity,
+        degrees_of_freedom=len(names) - plans["reduced"].finding.rank,
+        coordinates=tuple(names),
+        eliminated=reduced.reduced.eliminated,
+        dependent=tuple(names[i] for i in plans["reduced"].dependent),
+        bodies=bodies,
+        massless=massless,
+        joints=list_joints(reduced),
+        ties=list_ties(reduced),
+        merged=list_merged(reduced),
+        dropped=list_dropped(reduced),
+        loops=forest.loops,
+        constraints=tuple(labels),
+        redundant=tuple(labels[i] for i in finding.redundant),
+        not_unique=_not_unique(dae, plans["dae"], start) if finding.redundant else (),
+        starts_singular=any(plan.finding.starts_singular for plan in plans.values()),
+        free_coordinates=start.free_coordinates,
+        free_speeds=start.free_speeds,
+        repeated=start.repeated,
+        states={form: plan.program.size for form, plan in plans.items()},
+        operations={form: plan.program.operations for form, plan in plans.items()},
+        parameters=list_parameters(reduced),
+    )
+
+
+def _plan(assembly: Assembly, start: Start) -> Plan:
+    span = max(assembly.flat.t_end - start.time, 1e-3)
+    return make_plan(assembly, start.time, *_state(assembly, start), start.length, span)
+
+
+def _state(assembly: Assembly, start: Start) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the start in the coordinates of the form."""
+    if assembly.form == "reduced":
+        return start.coordinates, start.speeds
+    q, u = assembly.kernel(assembly.to_maximal)([start.time], start.coordinates, start.speeds)
+    return np.asarray(q, dtype=float), np.asarray(u, dtype=float)
+
+
+def _not_unique(assembly: Assembly, plan: Plan, start: Start) -> tuple[str, ...]:
+    """Return the reactions that a stress without any force from outside could change."""
+    q, _ = _state(assembly, start)
+    slope = plan.balance.at(start.time, q, np.zeros_like(q)).slope * plan.sizes
+    sizes = np.maximum(np.max(np.abs(slope), axis=1), 1e-300)
+    _, values, directions = np.linalg.svd((slope / sizes[:, None]).T)
+    rank = int(np.sum(values > 1e-9 * values[0]))
+    involved = np.max(np.abs(directions[rank:]), axis=0, initial=0.0) > 1e-9
+    constraints = assembly.maximal.constraints
+    return tuple(
+        dict.fromkeys(f"{one.key[0]}.{one.reaction}" for one, hit in zip(constraints, involved, strict=True) if hit)
+    )

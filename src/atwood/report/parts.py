@@ -1,0 +1,288 @@
+"""What became of the parts of a scene: bodies, joints, what was merged and what was dropped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from atwood.expr import Expression, Scalar, evaluate
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.build import Mechanism
+from atwood.model.local import LocalPart
+from atwood.topology.forest import Forest
+from atwood.topology.graph import Joint
+
+__all__ = [
+    "BodyEntry",
+    "DroppedPart",
+    "JointEntry",
+    "MergedPart",
+    "ParameterEntry",
+    "list_bodies",
+    "list_dropped",
+    "list_joints",
+    "list_merged",
+    "list_parameters",
+    "list_ties",
+]
+
+
+@dataclass(frozen=True)
+class BodyEntry:
+    """Something that moves.
+
+    Attributes
+    ----------
+    path
+        The part it is named after, or its first connector.
+    mass
+        kg; zero for a point without mass.
+    parts
+        The parts that its mass comes from.
+    """
+
+    path: str
+    mass: float
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class JointEntry:
+    """A joint between two bodies.
+
+    Attributes
+    ----------
+    path, kind
+        The part, and the name of its class.
+    joins
+        The two bodies.
+    coordinates
+        Coordinates of the reduced form that come with it.
+    closes_loop
+        Whether no body hangs on it, so that it closes a loop.
+    """
+
+    path: str
+    kind: str
+    joins: tuple[str, str]
+    coordinates: tuple[str, ...]
+    closes_loop: bool
+
+
+@dataclass(frozen=True)
+class MergedPart:
+    """A part that is one body with another; `into` is the name of that body."""
+
+    path: str
+    into: str
+
+
+@dataclass(frozen=True)
+class DroppedPart:
+    """A part that leaves nothing in the equations, and why."""
+
+    path: str
+    why: str
+
+
+@dataclass(frozen=True)
+class ParameterEntry:
+    """A parameter with its value."""
+
+    path: str
+    value: object
+    unit: str
+    meaning: str
+
+
+def list_bodies(assembly: Assembly) -> tuple[tuple[BodyEntry, ...], tuple[str, ...]]:
+    """Return what has mass and can move, and the names of what moves without mass.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    """
+    mechanism, masses = assembly.mechanism, assembly.maximal.masses
+    body_of = mechanism.bodies.body_of
+    spread = {body_of[node] for one in masses.coupled for node in one.nodes}
+    found: list[BodyEntry] = []
+    massless: list[str] = []
+    for body in mechanism.bodies.bodies:
+        if body.is_fixed:
+            continue
+        mass = masses.bodies.get(body.index)
+        if mass is not None:
+            found.append(BodyEntry(body.name, _number(mechanism, mass.mass), mass.parts))
+        elif body.index not in spread:
+            massless.append(body.name)
+    for part in dict.fromkeys(one.part for one in masses.coupled):
+        entries = [m for one in masses.coupled if one.part == part for row in one.masses for m in row]
+        total = sum(_number(mechanism, entry) for entry in entries)
+        found.append(BodyEntry(part, total, (part,)))
+    order = {path: i for i, path in enumerate(assembly.flat.parts)}
+    found.sort(key=lambda one: order.get(one.path, len(order)))
+    return tuple(found), tuple(massless)
+
+
+def _number(mechanism: Mechanism, value: Scalar) -> float:
+    return float(evaluate([mechanism.table.graph.convert(value)], mechanism.table.values)[0])
+
+
+def list_joints(assembly: Assembly) -> tuple[JointEntry, ...]:
+    """Return the joints between different bodies, in the order of declaration.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    """
+    mechanism, forest = assembly.mechanism, assembly.reduced.forest
+    bodies, cuts = mechanism.bodies, {id(joint) for joint in forest.cuts}
+    names = {one.name for one in assembly.reduced.names}
+    found: dict[str, JointEntry] = {}
+    for joint in mechanism.graph.joints:
+        ends = bodies.body_of[joint.a], bodies.body_of[joint.b]
+        holds = any(not one.value.is_zero for one in mechanism.locals_[joint.part].constraints)
+        if joint.is_rigid or ends[0] == ends[1] or not holds or joint.part in found:
+            continue
+        found[joint.part] = JointEntry(
+            joint.part,
+            type(assembly.flat.parts[joint.part].component).__name__,
+            (bodies.bodies[ends[0]].name, bodies.bodies[ends[1]].name),
+            tuple(name for name in _coordinates_of(forest, joint) if name in names),
+            id(joint) in cuts,
+        )
+    return tuple(found.values())
+
+
+def _coordinates_of(forest: Forest, joint: Joint) -> Iterator[str]:
+    """Yield the coordinates that place and turn the body that hangs on a joint."""
+    for one in forest.attachments:
+        if one.joint is not joint:
+            continue
+        yield from (forest.coordinates[number].name for number in one.coordinates)
+        if joint.turns:
+            for turn in forest.orientations:
+                if turn.body == one.body and turn.coordinate is not None:
+                    yield forest.coordinates[turn.coordinate].name
+
+
+def list_ties(assembly: Assembly) -> tuple[str, ...]:
+    """Return the parts that hold others by a constraint without being a joint, such as ropes.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    """
+    mechanism = assembly.mechanism
+    joints = {joint.part for joint in mechanism.graph.joints}
+    return tuple(
+        path
+        for path, local in mechanism.locals_.items()
+        if path not in joints and any(not one.value.is_zero for one in local.constraints)
+    )
+
+
+def list_merged(assembly: Assembly) -> tuple[MergedPart, ...]:
+    """Return the parts that are one body with another part, or with the world.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    """
+    mechanism = assembly.mechanism
+    found = []
+    for path, local in mechanism.locals_.items():
+        body = _own_body(mechanism, path)
+        if body is None or _is_anchor(mechanism, path):
+            continue
+        name = mechanism.bodies.bodies[body].name
+        is_solid = bool(local.point_inertias or local.body_inertias) or any(j.law.options.rigid for j in local.joints)
+        if is_solid and path != name and len(_solids(mechanism, body)) > 1:
+            found.append(MergedPart(path, name))
+    return tuple(found)
+
+
+def _own_body(mechanism: Mechanism, path: str) -> int | None:
+    """Return the body that all connectors of a part belong to; None if there are several or none."""
+    nodes = mechanism.graph.node_of
+    bodies = {mechanism.bodies.body_of[nodes[path, name]] for name in mechanism.locals_[path].connectors}
+    return bodies.pop() if len(bodies) == 1 else None
+
+
+def _is_anchor(mechanism: Mechanism, path: str) -> bool:
+    """Return whether a part is fixed in the world by its own law."""
+    return any(joint.law.options.rigid and joint.law.options.a == "world" for joint in mechanism.locals_[path].joints)
+
+
+def _solids(mechanism: Mechanism, body: int) -> list[str]:
+    """Return the parts that lie in one body with all their connectors and have a shape or a mass."""
+    return [
+        path
+        for path, local in mechanism.locals_.items()
+        if (local.point_inertias or local.body_inertias or any(j.law.options.rigid for j in local.joints))
+        and _own_body(mechanism, path) == body
+    ]
+
+
+def list_dropped(assembly: Assembly) -> tuple[DroppedPart, ...]:
+    """Return the parts that leave nothing in the equations.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    """
+    mechanism = assembly.mechanism
+    feeding = {source for source, _ in assembly.flat.links.values()}
+    found = []
+    for path, local in mechanism.locals_.items():
+        if path in feeding or local.joints or any(not one.value.is_zero for one in local.constraints):
+            continue
+        why = _why_nothing(mechanism, local)
+        if why:
+            found.append(DroppedPart(path, why))
+    return tuple(found)
+
+
+def _why_nothing(mechanism: Mechanism, local: LocalPart) -> str:
+    """Return why a part without joints and constraints leaves nothing in the equations; empty if it does."""
+    inertias = [m for one in local.point_inertias for row in one.masses for m in row]
+    inertias += [m for one in local.body_inertias for m in (one.mass, one.moment)]
+    forces: list[Scalar] = [*local.potentials, *local.dissipations]
+    forces += [c for one in local.loads for c in (*one.force, *one.torque)]
+    if not inertias and not forces:
+        return "it only measures"
+    if all(_is_nothing(value) for value in (*inertias, *forces)):
+        return "it has no mass" if inertias else "its force is zero"
+    fixed = {
+        mechanism.bodies.bodies[mechanism.bodies.body_of[mechanism.graph.node_of[local.part.path, name]]].is_fixed
+        for name in local.connectors
+    }
+    if fixed == {True}:
+        return "it is fixed in the world" if inertias else "everything it joins is fixed in the world"
+    return ""
+
+
+def _is_nothing(value: Scalar) -> bool:
+    return value.is_zero if isinstance(value, Expression) else value == 0.0
+
+
+def list_parameters(assembly: Assembly) -> tuple[ParameterEntry, ...]:
+    """Return every parameter of every part with its value, by path.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    """
+    found = []
+    for path, part in assembly.flat.parts.items():
+        for name, spec in part.component.parameter_specs().items():
+            value = part.values[name]
+            if value is not None:
+                found.append(ParameterEntry(f"{path}.{name}", value, spec.unit.text, spec.doc))
+    return tuple(found)

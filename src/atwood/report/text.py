@@ -1,0 +1,131 @@
+"""The mechanism report as text."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from atwood.report.mechanism import MechanismReport
+
+__all__ = ["as_text", "count_of", "facts", "shorten", "title"]
+
+_SHOWN = 12
+"""Of a long list, so many are named."""
+
+_WIDTH = 100
+_LABEL = 18
+
+
+def as_text(report: MechanismReport) -> str:
+    """Return a mechanism report as text.
+
+    Parameters
+    ----------
+    report
+        The report.
+    """
+    lines = [title(report), ""]
+    for label, text in facts(report):
+        lines += textwrap.wrap(
+            f"{label:<{_LABEL}}{text}",
+            width=_WIDTH,
+            subsequent_indent=" " * _LABEL,
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+    return "\n".join(lines)
+
+
+def title(report: MechanismReport) -> str:
+    """Return the heading of a mechanism report."""
+    gravity = f"gravity {report.gravity:g} m/s^2" if report.gravity else "without gravity"
+    where = {"line": "on a line", "plane": "in the plane", "space": "in space"}[report.space]
+    return f"{report.scene}: a mechanism {where}, {gravity}"
+
+
+def count_of(number: int, one: str, many: str = "") -> str:
+    """Return a number with its noun, as in "1 loop" and "2 loops"."""
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+def shorten(names: Iterable[str], shown: int = _SHOWN) -> str:
+    """Return names with commas; of a long list the first ones, the last, and how many there are."""
+    listed = list(names)
+    if len(listed) <= shown:
+        return ", ".join(listed)
+    return f"{', '.join(listed[: shown - 2])}, ... {listed[-1]} ({len(listed)} in all)"
+
+
+def facts(report: MechanismReport) -> Iterator[tuple[str, str]]:
+    """Yield a mechanism report as labels and sentences."""
+    yield "freedom", count_of(report.degrees_of_freedom, "degree") + " of freedom"
+    yield "coordinates", shorten(report.coordinates) or "none: everything is fixed or driven"
+    yield "bodies", shorten(f"{one.path} ({one.mass:g} kg)" for one in report.bodies) or "nothing that moves has mass"
+    if report.massless:
+        yield "without mass", f"{shorten(report.massless)}; no state of its own"
+    if report.joints:
+        yield "joints", shorten(f"{one.path} ({one.kind})" for one in report.joints)
+    if report.ties:
+        yield "held by", shorten(report.ties)
+    yield from _what_became(report)
+    yield from _loops(report)
+    yield from _warnings(report)
+    yield from _forms(report)
+
+
+def _what_became(report: MechanismReport) -> Iterator[tuple[str, str]]:
+    if report.merged:
+        yield "merged", shorten(f"{one.path} is one with {_world(one.into)}" for one in report.merged)
+    if report.dropped:
+        yield "dropped", shorten(f"{one.path} ({one.why})" for one in report.dropped)
+    if report.eliminated:
+        yield "eliminated", f"{shorten(report.eliminated)}: a linear constraint gives it from the other coordinates"
+
+
+def _world(name: str) -> str:
+    return "the ground" if name == "world" else name
+
+
+def _loops(report: MechanismReport) -> Iterator[tuple[str, str]]:
+    if not report.loops:
+        return
+    closing = f", closed by {shorten(report.loop_joints)}" if report.loop_joints else ""
+    yield "loops", count_of(report.loops, "loop") + closing
+    if report.dependent:
+        yield "dependent", f"{shorten(report.dependent)}: from the others through the loops, chosen anew where needed"
+
+
+def _warnings(report: MechanismReport) -> Iterator[tuple[str, str]]:
+    if report.redundant:
+        text = f"{shorten(report.redundant)}: it follows from the other constraints and is left out"
+        if report.not_unique:
+            text += f"; the reactions {shorten(report.not_unique)} are then not unique, the smallest ones are reported"
+        yield "redundant", text
+    if report.starts_singular:
+        yield "singular start", "here constraints lose rank; the motion from this position is not unique"
+    if report.repeated:
+        yield "start", f"{shorten(report.repeated)} follows from the other start values"
+    free = [*report.free_coordinates, *(f"{name}'" for name in report.free_speeds)]
+    if free:
+        yield "start", f"nothing fixes {shorten(free)}: guesses and zeros decide"
+
+
+def _forms(report: MechanismReport) -> Iterator[tuple[str, str]]:
+    notes = {
+        "reduced": "",
+        "dae": f" with {count_of(len(report.constraints), 'constraint')}" if report.constraints else "",
+    }
+    for form, states in report.states.items():
+        counts = report.operations[form]
+        total = count_of(sum(counts.values()), "operation")
+        yield f"{form} form", f"{count_of(states, 'state')}{notes[form]}; {total}{_kinds(counts)} a residual"
+
+
+def _kinds(counts: object) -> str:
+    """Return the most frequent kinds of operations, in brackets."""
+    if not isinstance(counts, dict) or not counts:
+        return ""
+    ordered: Sequence[tuple[str, int]] = sorted(counts.items(), key=lambda entry: -entry[1])
+    return f" ({', '.join(f'{number} {kind}' for kind, number in ordered)})"

@@ -1,0 +1,91 @@
+"""What a run was asked for, what came of it in a few numbers, and which versions answered."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from atwood.result.result import Result
+
+__all__ = ["describe_run", "solver_name", "versions"]
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what a run depends on."""
+    found = {"python": platform.python_version()}
+    for name in ("atwood", "numpy", "scipy", "scikit-sundae"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:  # a checkout that is not installed
+            found[name] = "unknown"
+    try:
+        from sksundae import SUNDIALS_VERSION
+
+        found["sundials"] = str(SUNDIALS_VERSION)
+    except ImportError:
+        found["sundials"] = "unknown"
+    return found
+
+
+def solver_name() -> str:
+    """Return the name of the solver that runs are made with."""
+    return "SUNDIALS IDA"
+
+
+def describe_run(result: Result) -> dict[str, Any]:
+    """Return everything about a run but its trajectories, as plain data.
+
+    Parameters
+    ----------
+    result
+        The run.
+
+    Returns
+    -------
+    dict
+        Scene, form, status, happenings, solver statistics, energy, constraints, what was asked for, versions.
+    """
+    statistics, options, flat = result.statistics, result.run.options, result.assembly.flat
+    ledger, missed = result.energy, result.constraint_max
+    outputs = options.outputs
+    return {
+        "scene": flat.name,
+        "form": result.form,
+        "level": result.level,
+        "status": result.status,
+        "message": result.message,
+        "t_start": float(result.run.start.time),
+        "t_end": float(result.time[-1]),
+        "happenings": [
+            {"time": one.time, "part": one.part, "what": one.message, "mode": one.target} for one in result.happenings
+        ],
+        "solver": {
+            "name": solver_name(),
+            "steps": statistics.steps,
+            "residual_evaluations": statistics.residual_evaluations,
+            "jacobian_evaluations": statistics.jacobian_evaluations,
+            "wall_s": statistics.seconds,
+        },
+        "energy": {
+            "start": float(ledger.total[0]),
+            "end": float(ledger.total[-1]),
+            "work": float(ledger.work[-1] - ledger.work[0]),
+            "max_drift": ledger.max_drift,
+        },
+        "constraint_max": max(missed["position"], missed["velocity"]),
+        "constraint_held": max(missed["held_position"], missed["held_velocity"]),
+        "asked": {
+            "t_end": options.t_end,
+            "rtol": options.relative_tolerance,
+            "outputs": int(outputs) if isinstance(outputs, (int, np.integer)) else len(outputs),
+            "max_steps": options.max_steps,
+            "max_seconds": options.max_seconds,
+            "max_step": options.max_step,
+            "start": dict(flat.start),
+            "guess": dict(flat.guess),
+        },
+        "versions": versions(),
+    }

@@ -1,0 +1,354 @@
+"""Results in files: NetCDF-3, NPZ and CSV.
+
+A file appears under its name only once it is complete. NetCDF and NPZ keep numbers exactly, with units, meanings and
+everything that is known about the run; CSV keeps numbers, paths and units, so that any program can read it.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import ResultError, UsageError, suggestion
+from atwood.result.about import describe_run
+from atwood.result.result import Result
+
+__all__ = ["SavedResult", "load_result", "save_result"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SavedResult:
+    """Trajectories that were read from a file; they are read like a `Result`.
+
+    Attributes
+    ----------
+    time
+        Output times, s.
+    quantities
+        Trajectories by path.
+    units, meanings
+        SI unit and one line of meaning by path; CSV files hold no meanings.
+    metadata
+        What was known about the run; empty for CSV files.
+    """
+
+    time: FloatArray
+    quantities: Mapping[str, FloatArray]
+    units: Mapping[str, str]
+    meanings: Mapping[str, str] = field(default_factory=dict)
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of all quantities."""
+        return tuple(self.quantities)
+
+    @property
+    def status(self) -> str:
+        """How the run ended; empty if the file does not say."""
+        return str(self.metadata.get("status", ""))
+
+    def unit(self, path: str) -> str:
+        """Return the SI unit of a quantity."""
+        return self.units[self._known(path)]
+
+    def describe(self, path: str) -> str:
+        """Return one line of meaning of a quantity."""
+        return self.meanings.get(self._known(path), "")
+
+    def __contains__(self, path: object) -> bool:
+        return path in self.quantities
+
+    def __getitem__(self, path: str) -> FloatArray | dict[str, FloatArray]:
+        """Return a quantity, or all quantities below a path.
+
+        Raises
+        ------
+        ResultError
+            If there is nothing at this path.
+        """
+        if path in self.quantities:
+            return self.quantities[path]
+        cut = len(path) + 1
+        below = {one[cut:]: values for one, values in self.quantities.items() if one.startswith(f"{path}.")}
+        if not below:
+            self._known(path)
+        return below
+
+    def array(self, path: str) -> FloatArray:
+        """Return a quantity at the output times, shape (times,)."""
+        return self.quantities[self._known(path)]
+
+    def table(self, paths: Iterable[str] | None = None) -> dict[str, FloatArray]:
+        """Return quantities by path; all when no paths are given."""
+        return {path: self.array(path) for path in (self.paths if paths is None else paths)}
+
+    def at(self, index: int) -> dict[str, float]:
+        """Return all quantities at one output time, by its number; -1 for the end."""
+        return {path: float(values[index]) for path, values in self.quantities.items()}
+
+    def _known(self, path: str) -> str:
+        if path not in self.quantities:
+            raise ResultError("there is no such quantity", where=path, advice=suggestion(path, self.paths))
+        return path
+
+
+def save_result(result: Result, file: str | os.PathLike[str], paths: Iterable[str] | None = None) -> Path:
+    """Save the trajectories of a run.
+
+    Parameters
+    ----------
+    result
+        The run.
+    file
+        Where to; its suffix says how: ``.nc`` (NetCDF-3), ``.npz`` (NumPy) or ``.csv``.
+    paths
+        Which quantities; all when not given.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    UsageError
+        If the suffix is not known, or the file cannot be written.
+    """
+    target, (write, _) = Path(file), _format_of(Path(file))
+    wanted = tuple(result.paths if paths is None else paths)
+    saved = SavedResult(
+        result.time,
+        result.table(wanted),
+        {path: result.unit(path) for path in wanted},
+        {path: result.describe(path) for path in wanted},
+        describe_run(result),
+    )
+    write_atomically(target, lambda part: write(saved, part))
+    return target
+
+
+def load_result(file: str | os.PathLike[str]) -> SavedResult:
+    """Read trajectories that were saved.
+
+    Parameters
+    ----------
+    file
+        A file that `save_result` wrote.
+
+    Raises
+    ------
+    UsageError
+        If it does not exist, its suffix is not known, or it holds something else.
+    """
+    source = Path(file)
+    _, read = _format_of(source)
+    if not source.is_file():
+        raise UsageError("there is no such file", where=str(source))
+    try:
+        return read(source)
+    except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, StopIteration) as error:
+        raise UsageError(
+            f"this is no result that Atwood saved ({type(error).__name__}: {error})", where=str(source)
+        ) from error
+
+
+def check_target(file: str | os.PathLike[str]) -> None:
+    """Refuse a file that a result could not be saved to, before the work is done.
+
+    Raises
+    ------
+    UsageError
+        If the suffix is not known or there is no such directory.
+    """
+    _format_of(Path(file))
+    check_directory(Path(file))
+
+
+def check_directory(target: Path) -> None:
+    """Refuse a file in a directory that does not exist."""
+    if not target.parent.is_dir():
+        raise UsageError("there is no such directory", where=str(target.parent), advice="Make it first.")
+    if target.is_dir():
+        raise UsageError("this is a directory", where=str(target), advice="Give the name of a file.")
+
+
+def write_atomically(target: Path, write: Callable[[Path], object]) -> None:
+    """Write a file next to its place and move it there once it is complete.
+
+    Parameters
+    ----------
+    target
+        The file.
+    write
+        Writes to the path it is given.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be written; nothing is left behind then.
+    """
+    check_directory(target)
+    part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
+    try:
+        write(part)
+        os.replace(part, target)
+    except OSError as error:
+        raise UsageError(f"it cannot be written ({error.strerror or error})", where=str(target)) from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+# -- NetCDF ------------------------------------------------------------------------------------------------------------
+
+
+def _write_netcdf(saved: SavedResult, file: Path) -> None:
+    from scipy.io import netcdf_file
+
+    data: Any
+    with netcdf_file(str(file), "w", version=2) as data:
+        data.title = b"Atwood result"
+        data.atwood = _metadata_text(saved.metadata).encode()
+        data.createDimension("time", len(saved.time))
+        _netcdf_variable(data, "time", saved.time, path="time", unit="s", meaning="Time.")
+        taken = {"time"}
+        for path, values in saved.quantities.items():
+            name = _netcdf_name(path, taken)
+            _netcdf_variable(data, name, values, path, saved.units[path], saved.meanings.get(path, ""))
+
+
+def _netcdf_variable(data: Any, name: str, values: FloatArray, path: str, unit: str, meaning: str) -> None:
+    variable = data.createVariable(name, "d", ("time",))
+    variable[:] = values
+    variable.path = path.encode()
+    variable.units = unit.encode()
+    if meaning:
+        variable.long_name = meaning.encode()
+
+
+def _netcdf_name(path: str, taken: set[str]) -> str:
+    """Return a name that NetCDF and its readers take, for instance ``rod_0.angle`` for ``rod[0].angle``."""
+    name = re.sub(r"[^A-Za-z0-9_.]", "_", path.replace("]", ""))
+    base, count = name, 1
+    while name in taken:
+        count += 1
+        name = f"{base}_{count}"
+    taken.add(name)
+    return name
+
+
+def _read_netcdf(file: Path) -> SavedResult:
+    from scipy.io import netcdf_file
+
+    data: Any
+    with netcdf_file(str(file), "r", mmap=False) as data:
+        metadata = json.loads(data.atwood.decode())
+        quantities, units, meanings = {}, {}, {}
+        for variable in data.variables.values():
+            path = variable.path.decode()
+            quantities[path] = np.array(variable[:], dtype=np.float64)
+            units[path] = variable.units.decode()
+            meanings[path] = getattr(variable, "long_name", b"").decode()
+    time = quantities.pop("time")
+    return SavedResult(time, quantities, _without_time(units), _without_time(meanings), metadata)
+
+
+def _without_time(table: dict[str, str]) -> dict[str, str]:
+    return {path: text for path, text in table.items() if path != "time"}
+
+
+# -- NPZ ---------------------------------------------------------------------------------------------------------------
+
+_ABOUT = "atwood"
+
+
+def _write_npz(saved: SavedResult, file: Path) -> None:
+    about = {"metadata": saved.metadata, "units": saved.units, "meanings": saved.meanings}
+    arrays: dict[str, Any] = {"time": saved.time, **saved.quantities, _ABOUT: np.array(_metadata_text(about))}
+    with file.open("wb") as stream:
+        _savez(stream, arrays)
+
+
+def _savez(stream: BinaryIO, arrays: Mapping[str, Any]) -> None:
+    np.savez_compressed(stream, allow_pickle=False, **arrays)
+
+
+def _read_npz(file: Path) -> SavedResult:
+    with np.load(file, allow_pickle=False) as data:
+        about = json.loads(str(data[_ABOUT]))
+        quantities = {name: data[name] for name in data.files if name not in ("time", _ABOUT)}
+        return SavedResult(data["time"], quantities, about["units"], about["meanings"], about["metadata"])
+
+
+# -- CSV ---------------------------------------------------------------------------------------------------------------
+
+_HEADING = re.compile(r"(.+) \[(.*)\]$")
+
+
+def _write_csv(saved: SavedResult, file: Path) -> None:
+    columns = [saved.time.tolist(), *(values.tolist() for values in saved.quantities.values())]
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(["time [s]", *(f"{path} [{saved.units[path]}]" for path in saved.quantities)])
+        writer.writerows([repr(value) for value in row] for row in zip(*columns, strict=True))
+
+
+def _read_csv(file: Path) -> SavedResult:
+    with file.open(newline="", encoding="utf-8") as stream:
+        reader = csv.reader(stream)
+        headings = next(reader)
+        rows = [[float(value) for value in row] for row in reader]
+    units: dict[str, str] = {}
+    for heading in headings:
+        match = _HEADING.match(heading)
+        if match is None:
+            raise ValueError(f"a heading without a unit: {heading!r}")
+        units[match[1]] = match[2]
+    values = np.array(rows, dtype=np.float64).reshape(len(rows), len(headings)).T
+    quantities = dict(zip(units, values, strict=True))
+    return SavedResult(quantities.pop("time"), quantities, _without_time(units))
+
+
+# -- which -------------------------------------------------------------------------------------------------------------
+
+_Write = Callable[[SavedResult, Path], None]
+_Read = Callable[[Path], SavedResult]
+_FORMATS: dict[str, tuple[_Write, _Read]] = {
+    ".nc": (_write_netcdf, _read_netcdf),
+    ".npz": (_write_npz, _read_npz),
+    ".csv": (_write_csv, _read_csv),
+}
+
+
+def _format_of(file: Path) -> tuple[_Write, _Read]:
+    suffix = file.suffix.lower()
+    if suffix not in _FORMATS:
+        problem = f"the suffix {suffix!r} is not known" if suffix else "the name has no suffix"
+        raise UsageError(problem, where=str(file), advice="Use .nc (NetCDF-3), .npz (NumPy) or .csv.")
+    return _FORMATS[suffix]
+
+
+def _metadata_text(data: Mapping[str, Any]) -> str:
+    return json.dumps(data, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    """Return what JSON does not know by itself as plain data."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return dict(value)
+    return str(value)
