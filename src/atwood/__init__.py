@@ -71,10 +71,13 @@ from atwood.model.vector import Vector, as_vector, cross, dot, norm
 
 if TYPE_CHECKING:
     from atwood.model.store import from_data, load_scene, save_scene, to_data
+    from atwood.pipeline import Assembly, assemble, simulate
+    from atwood.result.result import Result
 
     __version__: str
 
 __all__ = [
+    "Assembly",
     "AtwoodError",
     "BodyInertia",
     "Component",
@@ -92,6 +95,7 @@ __all__ = [
     "Placement",
     "Point",
     "PointInertia",
+    "Result",
     "ResultError",
     "Scalar",
     "Scene",
@@ -106,6 +110,7 @@ __all__ = [
     "acos",
     "as_vector",
     "asin",
+    "assemble",
     "atan",
     "atan2",
     "connect",
@@ -136,6 +141,7 @@ __all__ = [
     "select",
     "sign",
     "signal",
+    "simulate",
     "sin",
     "sinh",
     "solve_linear",
@@ -146,9 +152,13 @@ __all__ = [
 ]
 
 _LATER = {
+    "Assembly": "atwood.pipeline",
+    "Result": "atwood.result.result",
+    "assemble": "atwood.pipeline",
     "from_data": "atwood.model.store",
     "load_scene": "atwood.model.store",
     "save_scene": "atwood.model.store",
+    "simulate": "atwood.pipeline",
     "to_data": "atwood.model.store",
 }
 """Names whose modules are imported when they are first used; each also stands in `__all__` and above."""

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, overload
 
-from atwood.errors import ConnectError, DeclarationError, ParameterError, UsageError, suggestion
-from atwood.model.component import Component, check_reserved
+from atwood.errors import DeclarationError, ParameterError, UsageError, suggestion
+from atwood.model.component import Component
 from atwood.model.deferred import Deferred
 from atwood.model.edits import (
     Snapshot,
@@ -16,7 +16,6 @@ from atwood.model.edits import (
     check_end,
     copy_parts,
     find_edits,
-    named_parts,
     take_over,
     take_snapshot,
 )
@@ -25,8 +24,10 @@ from atwood.model.joining import (
     Parts,
     check_ends,
     check_same_connectors,
-    class_path,
     connect,
+    declared_connection,
+    declared_parts,
+    named_parts,
     relative_path,
 )
 
@@ -94,9 +95,9 @@ class Model(_State, Component):
         for base in reversed(cls.__mro__[1:]):
             inherited.update(vars(base).get("_prototypes", {}))
             joined.extend(pair for pair in vars(base).get("_joined_here", ()) if pair not in joined)
-        cls._prototypes = _declared_parts(cls, inherited)
+        cls._prototypes = declared_parts(cls, inherited)
         names = {id(part): name for name, part in named_parts(cls._prototypes)}
-        cls._joined_here = tuple(_declared_connection(cls, one, names) for one in vars(cls).get("connections", ()))
+        cls._joined_here = tuple(declared_connection(cls, one, names) for one in vars(cls).get("connections", ()))
         cls._joined = (*joined, *cls._joined_here)
 
     def __init__(self, **values: Any) -> None:
@@ -378,41 +379,3 @@ def _any_built_from_around(model: Component) -> bool:
         (isinstance(child, Model) and child._is_built_from_around()) or _any_built_from_around(child)
         for child in model._children().values()
     )
-
-
-def _declared_parts(cls: type[Model], inherited: dict[str, Parts]) -> dict[str, Parts]:
-    """Return the parts that a class declares and inherits, each an object of its own."""
-    found = dict(inherited)
-    for name, value in list(vars(cls).items()):
-        is_array = isinstance(value, list) and bool(value) and all(isinstance(one, Component) for one in value)
-        if isinstance(value, Component) or is_array:
-            check_reserved(cls, name)
-            if name in inherited:
-                check_same_connectors(inherited[name], value, f"{cls.__name__}.{name}")
-            found[name] = value
-        elif name in inherited:
-            raise DeclarationError(
-                f"the part {name!r} is declared again as {value!r}, which is no component", where=cls.__name__
-            )
-    names: dict[int, str] = {}
-    for name, part in named_parts(found):
-        if id(part) in names:
-            raise DeclarationError(
-                f"one object is declared as {names[id(part)]!r} and as {name!r}",
-                where=cls.__name__,
-                advice="Give each its own object.",
-            )
-        names[id(part)] = name
-        if not part._declared:
-            object.__setattr__(part, "_declared", f"{cls.__name__}.{name}")
-    return found
-
-
-def _declared_connection(cls: type[Model], connection: Any, names: Mapping[int, str]) -> tuple[str, str]:
-    if not isinstance(connection, Connection):
-        raise ConnectError(
-            f"{connection!r} is no connection", where=cls.__name__, advice="Write connect(rod.a, mass.point)."
-        )
-    pair = class_path(connection.a, names, cls.__name__), class_path(connection.b, names, cls.__name__)
-    check_ends(connection.a, connection.b, *pair)
-    return pair

@@ -152,7 +152,8 @@ class Frame(Point):
         """Return, in world axes, a vector that is given in the axes of this frame."""
         axes: tuple[Vector, Vector, Vector] = self._read("axes")
         x_axis, y_axis, z_axis = axes
-        return x_axis * vector.x + y_axis * vector.y + z_axis * vector.z
+        world: Vector = x_axis * vector.x + y_axis * vector.y + z_axis * vector.z
+        return world
 
 
 class Groove(Point):

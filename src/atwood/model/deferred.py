@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import numbers
 import operator
 from collections.abc import Callable, Mapping
@@ -85,6 +86,9 @@ class Deferred:
     def __pow__(self, other: Any) -> Deferred:
         return combine("pow", self, other)
 
+    def __rpow__(self, other: Any) -> Deferred:
+        return combine("pow", other, self)
+
     def __neg__(self) -> Deferred:
         return combine("neg", self)
 
@@ -100,9 +104,9 @@ def combine(operation: str, *operands: Any) -> Deferred:
     for operand in operands:
         if isinstance(operand, Deferred):
             _check_is_number(operand)
-        elif isinstance(operand, bool) or not isinstance(operand, numbers.Real):
+        elif isinstance(operand, bool) or not isinstance(operand, numbers.Real) or not math.isfinite(operand):
             raise DeclarationError(
-                f"{operand!r} cannot be combined with a parameter in a class body", advice="Use a plain number."
+                f"{operand!r} cannot be combined with a parameter in a class body", advice="Use a plain finite number."
             )
     return Deferred(operation, tuple(operands), _result_unit(operation, operands))
 
@@ -119,7 +123,7 @@ def _check_is_number(operand: Deferred) -> None:
 def _result_unit(operation: str, operands: tuple[Any, ...]) -> Unit | None:
     """Return the unit of a result; a plain number takes the unit it needs in a sum, and has none in a product."""
     units = [one.unit if isinstance(one, Deferred) else None for one in operands]
-    if any(isinstance(one, Deferred) and one.unit is None for one in operands):
+    if any(isinstance(one, Deferred) and (one.unit is None or one.unit.text == "any") for one in operands):
         return None
     if operation == "neg":
         return units[0]

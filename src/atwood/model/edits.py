@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from atwood.errors import ConnectError, UsageError
 from atwood.model.component import Component
-from atwood.model.joining import Parts, find_end
+from atwood.model.joining import Parts, find_end, named_parts
 
 if TYPE_CHECKING:
     from atwood.model.composite import Model
@@ -137,15 +137,6 @@ def _compare_starts(model: Model, path: str, before: Mapping[str, Mapping[str, A
         changed.update({key: REMOVED for key in old if key not in values})
         if changed:
             edits.starts.setdefault(path, {})[name] = changed
-
-
-def named_parts(parts: Mapping[str, Parts]) -> Iterator[tuple[str, Component]]:
-    """Return every part with its own name, the elements of an array as ``name[0]``, ``name[1]``, ..."""
-    for name, part in parts.items():
-        if isinstance(part, list):
-            yield from ((f"{name}[{index}]", one) for index, one in enumerate(part))
-        else:
-            yield name, part
 
 
 def copy_parts(parts: Parts) -> Any:

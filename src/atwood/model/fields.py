@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import copy
 import math
-import operator
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -214,7 +213,7 @@ def _plain_number(value: Any) -> float | None:
     try:
         if getattr(value, "ndim", 0):
             return None
-        return float(operator.index(value)) if hasattr(value, "__index__") else float(value)
+        return float(value)
     except (TypeError, ValueError, OverflowError, AtwoodError):
         return None
 

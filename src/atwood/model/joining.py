@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from atwood.errors import ConnectError, DeclarationError, UsageError, suggestion
-from atwood.model.component import Component
+from atwood.model.component import Component, check_reserved
 from atwood.model.connectors import Connector, ConnectorSpec, InputRef, OutputRef
 from atwood.model.units import Unit, parse_unit
 
-__all__ = ["Connection", "check_ends", "check_same_connectors", "class_path", "connect", "find_end", "relative_path"]
+__all__ = [
+    "Connection",
+    "check_ends",
+    "check_same_connectors",
+    "connect",
+    "declared_connection",
+    "declared_parts",
+    "find_end",
+    "named_parts",
+    "relative_path",
+]
 
 Parts: TypeAlias = Component | list[Component]
 """What a name in a model stands for: a part, or an array of parts."""
@@ -39,6 +49,15 @@ def connect(a: Any, b: Any) -> Connection:
         When the class is made, if the two cannot meet.
     """
     return Connection(a, b)
+
+
+def named_parts(parts: Mapping[str, Parts]) -> Iterator[tuple[str, Component]]:
+    """Return every part with its own name, the elements of an array as ``name[0]``, ``name[1]``, ..."""
+    for name, part in parts.items():
+        if isinstance(part, list):
+            yield from ((f"{name}[{index}]", one) for index, one in enumerate(part))
+        else:
+            yield name, part
 
 
 def class_path(end: Any, names: Mapping[int, str], where: str) -> str:
@@ -184,3 +203,50 @@ def find_end(model: Component, path: str) -> Connector | InputRef | OutputRef:
         where=component.path or type(component).__name__,
         advice=suggestion(name, [*connectors, *component._children()]),
     )
+
+
+def declared_parts(cls: type[Component], inherited: dict[str, Parts]) -> dict[str, Parts]:
+    """Return the parts that a class declares and inherits, each an object of its own.
+
+    Parameters
+    ----------
+    cls
+        The class, a model.
+    inherited
+        The parts of its bases.
+    """
+    found = dict(inherited)
+    for name, value in list(vars(cls).items()):
+        is_array = isinstance(value, list) and bool(value) and all(isinstance(one, Component) for one in value)
+        if isinstance(value, Component) or is_array:
+            check_reserved(cls, name)
+            if name in inherited:
+                check_same_connectors(inherited[name], value, f"{cls.__name__}.{name}")
+            found[name] = value
+        elif name in inherited:
+            raise DeclarationError(
+                f"the part {name!r} is declared again as {value!r}, which is no component", where=cls.__name__
+            )
+    names: dict[int, str] = {}
+    for name, part in named_parts(found):
+        if id(part) in names:
+            raise DeclarationError(
+                f"one object is declared as {names[id(part)]!r} and as {name!r}",
+                where=cls.__name__,
+                advice="Give each its own object.",
+            )
+        names[id(part)] = name
+        if not part._declared:
+            object.__setattr__(part, "_declared", f"{cls.__name__}.{name}")
+    return found
+
+
+def declared_connection(cls: type[Component], connection: Any, names: Mapping[int, str]) -> tuple[str, str]:
+    """Return the paths of the two ends of a connection that was written in a class body."""
+    if not isinstance(connection, Connection):
+        raise ConnectError(
+            f"{connection!r} is no connection", where=cls.__name__, advice="Write connect(rod.a, mass.point)."
+        )
+    pair = class_path(connection.a, names, cls.__name__), class_path(connection.b, names, cls.__name__)
+    check_ends(connection.a, connection.b, *pair)
+    return pair

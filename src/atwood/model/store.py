@@ -227,7 +227,7 @@ def _find_class(name: Any, where: str) -> type[Component]:
             raise UsageError(
                 f"there is no class {qualified!r} in the module {module_name!r}",
                 where=where,
-                advice=suggestion(step, known) or advice,
+                advice=advice if module_name == "__main__" else suggestion(step, known) or advice,
             )
         if not isinstance(found, type):
             break

@@ -176,4 +176,8 @@ def parse_quantity(text: str, unit: Unit, where: str) -> float:
         raise ParameterError(
             f"{unit_text!r} does not measure what is asked for here", where=where, advice=f"Give it in {unit.text}."
         )
-    return number * given.factor / unit.factor
+    ratio = given.factor / unit.factor
+    inverse = round(1.0 / ratio) if ratio < 1.0 else 0
+    if inverse and math.isclose(inverse * ratio, 1.0, rel_tol=1e-15):  # 35 cm is 35/100 m, the float 0.35 exactly
+        return number / inverse
+    return number * ratio
