@@ -34,7 +34,7 @@ from atwood.topology.bodies import Bodies
 from atwood.topology.forest import Forest
 from atwood.topology.graph import MechanismGraph
 
-__all__ = ["Mechanism", "build_equations", "check_closures", "make_gravity", "resolve_signals"]
+__all__ = ["Mechanism", "build_equations", "check_closures", "extent", "make_gravity", "resolve_signals"]
 
 _CLOSES = 1e-9
 """Relative to the extent of the mechanism: how far rigid parts may miss each other and still count as joined."""
@@ -255,14 +255,24 @@ def _drop_closed(mechanism: Mechanism, q: tuple[Expression, ...], values: Values
             continue
         for moment in (0.0, 0.3217, 1.7331):
             (miss,) = evaluate([value], {**parameters, mechanism.time: moment})
-            scale = max([1e-300, *(abs(v) for v in parameters.values())])
-            if not abs(miss) <= _CLOSES * scale:
+            if not abs(miss) <= _CLOSES * max(1.0, extent(mechanism)):
                 raise TopologyError(
                     f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
                     where=f"{path}.{constraint.law.name}",
                     advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
                 )
     return kept
+
+
+def extent(mechanism: Mechanism) -> float:
+    """Return the extent of a mechanism, m: the largest of its parameters that are lengths; 1 m if it has none."""
+    sizes = [0.0]
+    for local in mechanism.locals_.values():
+        for name, spec in local.part.component.parameter_specs().items():
+            value = local.part.values[name]
+            if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
+                sizes += [abs(v) for v in (value if isinstance(value, tuple) else (value,))]
+    return max(sizes) or 1.0
 
 
 def check_closures(mechanism: Mechanism) -> None:
@@ -286,8 +296,7 @@ def check_closures(mechanism: Mechanism) -> None:
         graph = mechanism.table.graph
         misses = [*gap, turns[joint.b] - turns[joint.a] - rotation if space.has_rotation else 0.0]
         numbers = evaluate([graph.convert(m) for m in misses], mechanism.table.values)
-        scale = max([1.0, *(abs(v) for v in mechanism.table.values.values())])
-        if not all(abs(m) <= _CLOSES * scale for m in numbers):
+        if not all(abs(m) <= _CLOSES * max(1.0, extent(mechanism)) for m in numbers):
             kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
             raise TopologyError(
                 f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {numbers[3]:g} rad",

@@ -56,6 +56,7 @@ class Plan:
     dependent: tuple[int, ...]
     switches: int = 0
     _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
+    _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
 
     @property
     def kept(self) -> NDArray[np.intp] | None:
@@ -92,6 +93,12 @@ class Plan:
         self.switches += 1
         return True
 
+    def between_steps(self, t: float) -> None:
+        """Review the dependent coordinates where the solver last asked for a Jacobian; for the driver's poll."""
+        if self._seen is not None:
+            seen, self._seen = self._seen, None
+            self.review_dependent(*seen)
+
     def problem(
         self,
         events: Callable[[float, FloatArray, FloatArray], Sequence[float]] | None = None,
@@ -109,6 +116,7 @@ class Plan:
             return values
 
         def full_jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> FloatArray:
+            self._seen = (t, y[: self.program.coordinates].copy())
             full = np.zeros(size * size)
             full[self.program.columns * size + self.program.rows] = self.kernels()[1]([t], y, yp, [cj])[0]
             return full

@@ -297,6 +297,7 @@ def _open(
     budget = Budget(
         max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
         wall_seconds=None if options.max_seconds is None else max(0.0, options.max_seconds - spent.seconds),
+        poll=plan.between_steps if plan.dependent else None,
     )
     problem = plan.problem(probe.function(), probe.directions)
     return open_session(problem, settings, t, y, yp, budget)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
+from atwood.mechanics.build import extent
 from atwood.mechanics.equations import Equations
 
 __all__ = ["Scales", "coordinate_scales", "find_scales", "scene_length"]
@@ -36,18 +37,13 @@ class Scales:
 
 
 def scene_length(assembly: Assembly) -> float:
-    """Return the extent of a scene from its parameters that are lengths; 1 m if it has none."""
-    sizes = [0.0]
-    for part in assembly.flat.parts.values():
-        for name, spec in part.component.parameter_specs().items():
-            value = part.values[name]
-            if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
-                sizes += [abs(v) for v in (value if isinstance(value, tuple) else (value,))]
+    """Return the extent of a scene, from its parameters and start values that are lengths; 1 m if it has none."""
+    sizes = [extent(assembly.mechanism)]
     for path, value in assembly.flat.start.items():
         observable = assembly.start_observables.get(path)
         if observable is not None and observable.unit == "m":
             sizes.append(abs(value))
-    return max(sizes) or 1.0
+    return max(sizes)
 
 
 def coordinate_scales(equations: Equations, length: float) -> FloatArray:
