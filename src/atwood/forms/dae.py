@@ -50,7 +50,7 @@ def dae_form(
     if level not in LEVELS:
         raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
     rates = rate_symbols(equations)
-    n, multipliers = len(rates), equations.multipliers
+    multipliers = equations.multipliers
     kinematic: list[Expression] = [r - u for r, u in zip(rates, equations.speeds, strict=True)]
     dynamic = [r - f for r, f in zip(equations.rows, equations.constraint_rows, strict=True)]
     if not multipliers:
@@ -64,11 +64,8 @@ def dae_form(
         extra = ()
         held = [one.second for one in equations.constraints]
     chosen: Level = "ggl" if level == "ggl" else ("index1" if level == "index1" else "index1-projected")
-    algebraic = range(2 * n, 2 * n + len(multipliers) + len(extra))
     residual = tidy(kinematic + dynamic + held)
-    return make_form_program(
-        name, "dae", chosen, equations, parameters, residual, multipliers, extra, tuple(algebraic)
-    )
+    return make_form_program(name, "dae", chosen, equations, parameters, residual, multipliers, extra)
 
 
 def keep_constraints(equations: Equations, kept: Sequence[int]) -> Equations:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, substitute
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, live, substitute
 from atwood.mechanics.equations import Equations
 
 __all__ = ["BalanceProgram", "FormProgram", "Level", "balance_program", "make_form_program"]
@@ -106,7 +106,6 @@ def make_form_program(
     residual: Sequence[Expression],
     multipliers: Sequence[Expression] = (),
     extra: Sequence[Expression] = (),
-    algebraic: Sequence[int] = (),
     independent: Sequence[int] = (),
 ) -> FormProgram:
     """Put a residual into programs, with its Jacobian by forward derivatives.
@@ -123,7 +122,7 @@ def make_form_program(
         F, in terms of time, coordinates, their rates, speeds, accelerations and multipliers.
     multipliers, extra
         Symbols of the multipliers.
-    algebraic, independent
+    independent
         See `FormProgram`.
     """
     graph = equations.graph
@@ -131,6 +130,7 @@ def make_form_program(
     y = (*equations.coordinates, *equations.speeds, *multipliers, *extra)
     idle = tuple(graph.symbol(f"rate of {s.name}") for s in (*multipliers, *extra))
     yp = (*rates, *equations.accelerations, *idle)
+    appearing = set(live(residual))
     cj = graph.symbol("cj")
     entries = jacobian(list(residual), [{a: 1.0, b: cj} for a, b in zip(y, yp, strict=True)])
     t = InputGroup("t", (equations.time,))
@@ -151,7 +151,7 @@ def make_form_program(
         len(equations.coordinates),
         len(multipliers),
         len(extra),
-        tuple(algebraic),
+        tuple(i for i, rate in enumerate(yp) if rate not in appearing),
         tuple(independent),
     )
 

@@ -54,10 +54,7 @@ def reduced_form(
         *projected,
         *(one.rate for one in equations.constraints),
     ]
-    algebraic = [*chosen, *(n + i for i in chosen)]
-    return make_form_program(
-        name, "reduced", "", equations, parameters, residual, algebraic=algebraic, independent=independent
-    )
+    return make_form_program(name, "reduced", "", equations, parameters, residual, independent=independent)
 
 
 def _project(
