@@ -29,7 +29,8 @@ def run_both(make: Callable[[], Model], **options: Any) -> tuple[Result, Result]
 def apart(a: Mapping[str, FloatArray], b: Mapping[str, FloatArray]) -> dict[str, float]:
     """Return how far two tables of quantities are apart, relative to the size of each quantity but at least to 1."""
     return {
-        path: float(np.max(np.abs(values - b[path]))) / max(1.0, float(np.max(np.abs(values)))) for path, values in a.items()
+        path: float(np.max(np.abs(values - b[path]))) / max(1.0, float(np.max(np.abs(values))))
+        for path, values in a.items()
     }
 
 

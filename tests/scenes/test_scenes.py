@@ -104,7 +104,12 @@ def test_frequencies_of_the_mass_spring_chain(shape: tuple[float, float], factor
     for i in before:  # a few Newton steps on the Hermite cubic of the two samples
         h = t[i + 1] - t[i]
         coefficients = np.polynomial.Polynomial(
-            [x[i], h * v[i], -3 * x[i] + 3 * x[i + 1] - h * (2 * v[i] + v[i + 1]), 2 * (x[i] - x[i + 1]) + h * (v[i] + v[i + 1])]
+            [
+                x[i],
+                h * v[i],
+                -3 * x[i] + 3 * x[i + 1] - h * (2 * v[i] + v[i + 1]),
+                2 * (x[i] - x[i + 1]) + h * (v[i] + v[i + 1]),
+            ]
         )
         root = next(r.real for r in coefficients.roots() if abs(r.imag) < 1e-9 and -1e-9 <= r.real <= 1.0 + 1e-9)
         crossings.append(t[i] + h * root)
@@ -119,12 +124,18 @@ def test_frequencies_of_the_mass_spring_chain(shape: tuple[float, float], factor
     ("angle", "rate", "expected"),
     [
         # Closed form by elliptic functions, evaluated with mpmath (shared/reference/pendulum_elliptic.json).
-        (math.pi / 2.0, 0.0, {1.0: (-1.405027311524799, -1.799309016907079), 5.0: (1.229451811485386, -2.562787568192629)}),
+        (
+            math.pi / 2.0,
+            0.0,
+            {1.0: (-1.405027311524799, -1.799309016907079), 5.0: (1.229451811485386, -2.562787568192629)},
+        ),
         (0.0, 6.5, {1.0: (3.425682815305696, 1.948442254586227), 5.0: (18.487178646944435, 6.401235270608984)}),
         (3.0, 0.0, {1.0: (1.602248901927917, -4.336664040473031), 5.0: (2.982353102400168, 0.227776327108745)}),
     ],
 )
-def test_pendulum_at_large_angles(form: str, angle: float, rate: float, expected: dict[float, tuple[float, float]]) -> None:
+def test_pendulum_at_large_angles(
+    form: str, angle: float, rate: float, expected: dict[float, tuple[float, float]]
+) -> None:
     scene = SimplePendulum()
     scene.start.update({"rod.angle": angle, "rod.angular_velocity": rate})
     result = simulate(scene, form=form, rtol=TIGHT, t_end=5.0, outputs=[0.0, *expected])

@@ -1,0 +1,58 @@
+"""What a chain costs grows linearly with its length."""
+
+import time
+
+import pytest
+
+from atwood.pipeline import assemble
+from atwood_library.scenes import Chain
+
+
+def operations(links: int, form: str) -> int:
+    return sum(assemble(Chain(links=links), form=form).form_program().operations.values())
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_operations_grow_linearly(form: str) -> None:
+    # well above the size up to which rows are rewritten as by hand
+    counts = [operations(links, form) for links in (20, 30, 40, 50)]
+    steps = [b - a for a, b in zip(counts, counts[1:], strict=False)]
+    assert len(set(steps)) == 1
+    # a link costs a sine, a cosine, two accelerations and its share of the balance
+    assert steps[0] / 10 < (32 if form == "reduced" else 40)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_hundred_links_are_derived_at_once(form: str) -> None:
+    began = time.process_time()
+    assembly = assemble(Chain(links=100), form=form)
+    operations = assembly.form_program().residual.operations
+    assert time.process_time() - began < 2.0
+    assert sum(operations.values()) < 5000
+
+
+def test_no_sympy_on_the_way() -> None:
+    import subprocess
+    import sys
+
+    script = (
+        "import sys\n"
+        "from atwood.pipeline import simulate\n"
+        "from atwood_library.scenes import Chain\n"
+        "result = simulate(Chain(links=3), t_end=0.1, outputs=2)\n"
+        "result.at(-1)\n"
+        "assert 'sympy' not in sys.modules and 'matplotlib' not in sys.modules\n"
+    )
+    import os
+    from pathlib import Path
+
+    root = Path(__file__).resolve().parents[2]
+    path = os.pathsep.join([str(root / "src"), str(root / "library")])
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr

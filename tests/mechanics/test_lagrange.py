@@ -1,0 +1,119 @@
+"""The balance of forces against Lagrange's equations, done with differences of the energies."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from atwood.solve.reactions import accelerations_and_multipliers, maximal_state
+from atwood_library.scenes import SCENES
+
+from ..helpers.runs import FORMS, Prepared, difference_quotient, nearby_states, prepare
+
+FloatArray = NDArray[np.float64]
+EVERY_SCENE_AND_FORM = [(name, form) for name in SCENES for form in FORMS]
+
+
+def energies(prepared: Prepared, t: float, q: FloatArray, u: FloatArray) -> tuple[float, float]:
+    assembly = prepared.assembly
+    kernel = assembly.kernel(assembly.energy_program)
+    kinetic, potential = kernel([t], q, u, np.zeros_like(u), [0.0] * len(assembly.reactions))[0]
+    return kinetic, potential
+
+
+@pytest.mark.parametrize(("name", "form"), EVERY_SCENE_AND_FORM)
+def test_rows_are_lagranges_equations(name: str, form: str) -> None:
+    # d/dt dT/du - dT/dq + dV/dq, time derivatives along (u, a); Goldstein, equation 1.57
+    prepared = prepare(SCENES[name](), form)
+    balance, t = prepared.plan.balance, 0.4
+    n = len(prepared.q)
+    random = np.random.default_rng(5)
+
+    def kinetic(t: float, q: FloatArray, u: FloatArray) -> float:
+        return energies(prepared, t, q, u)[0]
+
+    def momentum(t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+        return difference_quotient(lambda d: kinetic(t, q, u + d), np.zeros(n), step=1e-2)
+
+    def lagrange(t: float, q: FloatArray, u: FloatArray, a: FloatArray) -> Any:
+        rate = difference_quotient(
+            lambda h: momentum(t + h[0], q + h[0] * u + 0.5 * h[0] ** 2 * a, u + h[0] * a), np.zeros(1), step=2e-3
+        )[:, 0]
+        slope = difference_quotient(
+            lambda d: kinetic(t, q + d, u) - energies(prepared, t, q + d, u)[1], np.zeros(n), step=2e-3
+        )
+        return rate - slope
+
+    for q, u in nearby_states(prepared, 2):
+        a = random.standard_normal(n)
+        now = balance.at(t, q, u)
+        expected = lagrange(t, q, u, a)
+        assert np.max(np.abs(now.mass @ a + now.bias - expected)) < 2e-7 * max(1.0, np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize(("name", "form"), EVERY_SCENE_AND_FORM)
+def test_mass_matrix_is_symmetric_and_carries_the_kinetic_energy(name: str, form: str) -> None:
+    prepared = prepare(SCENES[name](), form)
+    for q, u in nearby_states(prepared, 3):
+        now = prepared.plan.balance.at(0.0, q, u)
+        assert np.max(np.abs(now.mass - now.mass.T)) < 1e-12 * np.max(np.abs(now.mass))
+        if name == "driven-pendulum" and form == "reduced":
+            continue  # what moves as prescribed has kinetic energy of its own
+        kinetic, _ = energies(prepared, 0.0, q, u)
+        assert kinetic == pytest.approx(0.5 * u @ now.mass @ u, rel=1e-12)
+
+
+@pytest.mark.parametrize(("name", "form"), EVERY_SCENE_AND_FORM)
+def test_power_balance_at_any_state(name: str, form: str) -> None:
+    # the energy changes by the work of drives alone, at admissible states whatever they are
+    prepared = prepare(SCENES[name](), form)
+    balance, t = prepared.plan.balance, prepared.time
+    for q, u in nearby_states(prepared, 3):
+        a, multipliers = balance.accelerate(t, q, u)
+        change = difference_quotient(
+            lambda h, q=q, u=u, a=a: [
+                sum(energies(prepared, t + h[0], q + h[0] * u + 0.5 * h[0] ** 2 * a, u + h[0] * a))
+            ],
+            np.zeros(1),
+            step=1e-3,
+        )[0, 0]
+        now = balance.at(t, q, u)
+        power = -multipliers @ now.drift if balance.constraints else 0.0
+        if name == "driven-pendulum" and form == "reduced":
+            reaction = _drive_force(prepared, q, u)
+            power = reaction * 0.1 * 2.5  # at t = 0 the drive moves at amplitude times angular frequency
+        size = max(1.0, abs(energies(prepared, t, q, u)[0]))
+        assert change == pytest.approx(power, abs=2e-6 * size)
+
+
+def _drive_force(prepared: Prepared, q: FloatArray, u: FloatArray) -> float:
+    from atwood.solve.reactions import ReactionSolver
+
+    solver = ReactionSolver(prepared.assembly, prepared.time, q, u)
+    values, _ = solver.at(np.array([prepared.time]), q[:, None], u[:, None])
+    index = [one.path for one in prepared.assembly.reactions].index("drive.force.x")
+    return float(values[index, 0])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_reduced_and_maximal_accelerations_are_the_same_motion(name: str) -> None:
+    prepared = prepare(SCENES[name](), "reduced")
+    assembly = prepared.assembly
+    kept = np.arange(prepared.plan.balance.constraints)
+    for q, u in nearby_states(prepared, 3):
+        t = np.array([0.6])
+        if name != "driven-pendulum":
+            t = np.array([0.0])
+        a, _, _ = accelerations_and_multipliers(assembly, "reduced", t, q[:, None], u[:, None], kept)
+        big_q, big_u = maximal_state(assembly, t, q[:, None], u[:, None])
+        every = np.arange(len(assembly.maximal.constraints))
+        big_a, _, _ = accelerations_and_multipliers(assembly, "dae", t, big_q, big_u, every)
+
+        def along(h: FloatArray, t: Any = t, q: Any = q, u: Any = u, a: Any = a) -> FloatArray:
+            step = float(h[0])
+            q_then, u_then = q + step * u + 0.5 * step**2 * a[:, 0], u + step * a[:, 0]
+            return maximal_state(assembly, t + step, q_then[:, None], u_then[:, None])[1][:, 0]
+
+        expected = difference_quotient(along, np.zeros(1), step=1e-3)[:, 0]
+        assert np.max(np.abs(big_a[:, 0] - expected)) < 1e-8 * max(1.0, np.max(np.abs(expected)))
