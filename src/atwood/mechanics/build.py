@@ -265,14 +265,14 @@ def _drop_closed(mechanism: Mechanism, q: tuple[Expression, ...], values: Values
 
 
 def extent(mechanism: Mechanism) -> float:
-    """Return the extent of a mechanism, m: the largest of its parameters that are lengths; 1 m if it has none."""
+    """Return the extent of a mechanism, m: the largest of its parameters that are lengths; 0 if it has none."""
     sizes = [0.0]
     for local in mechanism.locals_.values():
         for name, spec in local.part.component.parameter_specs().items():
             value = local.part.values[name]
             if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
                 sizes += [abs(v) for v in (value if isinstance(value, tuple) else (value,))]
-    return max(sizes) or 1.0
+    return max(sizes)
 
 
 def check_closures(mechanism: Mechanism) -> None:

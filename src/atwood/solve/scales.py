@@ -43,7 +43,7 @@ def scene_length(assembly: Assembly) -> float:
         observable = assembly.start_observables.get(path)
         if observable is not None and observable.unit == "m":
             sizes.append(abs(value))
-    return max(sizes)
+    return max(sizes) or 1.0
 
 
 def coordinate_scales(equations: Equations, length: float) -> FloatArray:
