@@ -72,6 +72,7 @@ from atwood.model.vector import Vector, as_vector, cross, dot, norm
 if TYPE_CHECKING:
     from atwood.model.store import from_data, load_scene, save_scene, to_data
     from atwood.pipeline import Assembly, assemble, simulate
+    from atwood.result.files import SavedResult, load_result, save_result
     from atwood.result.result import Result
 
     __version__: str
@@ -97,6 +98,7 @@ __all__ = [
     "PointInertia",
     "Result",
     "ResultError",
+    "SavedResult",
     "Scalar",
     "Scene",
     "SolveError",
@@ -129,6 +131,7 @@ __all__ = [
     "hypot",
     "inertia",
     "joint",
+    "load_result",
     "load_scene",
     "log",
     "maximum",
@@ -137,6 +140,7 @@ __all__ = [
     "observable",
     "parameter",
     "potential",
+    "save_result",
     "save_scene",
     "select",
     "sign",
@@ -154,9 +158,12 @@ __all__ = [
 _LATER = {
     "Assembly": "atwood.pipeline",
     "Result": "atwood.result.result",
+    "SavedResult": "atwood.result.files",
     "assemble": "atwood.pipeline",
     "from_data": "atwood.model.store",
+    "load_result": "atwood.result.files",
     "load_scene": "atwood.model.store",
+    "save_result": "atwood.result.files",
     "save_scene": "atwood.model.store",
     "simulate": "atwood.pipeline",
     "to_data": "atwood.model.store",

@@ -243,8 +243,13 @@ TAMPERED = {
     "bad name": (put("scene", "changes", "added", "a b", {"class": f"{HERE}:Bob"}), aw.DeclarationError, "a b"),
     "one end": (put("scene", "changes", "connections", "", [["extra.bob.point"]]), aw.UsageError, "two ends"),
     "no end": (put("scene", "changes", "connections", "", [["a.b", "c.d"]]), aw.UsageError, "no connector"),
+    "connections of a leaf": (
+        put("scene", "changes", "connections", "extra.bob", [["point", "point"]]),
+        aw.UsageError,
+        "no parts",
+    ),
     "start of nothing": (put("scene", "changes", "starts", "", {"begin": {}}), aw.UsageError, "begin"),
-    "start of a leaf": (put("scene", "changes", "starts", "extra.bob", {"start": {}}), aw.UsageError, "start"),
+    "start of a leaf": (put("scene", "changes", "starts", "extra.bob", {"start": {}}), aw.UsageError, "no parts"),
     "bad start": (put("scene", "changes", "starts", "", {"start": {"x": [1]}}), aw.StartError, "x"),
     "unknown change": (put("scene", "changes", "removed", {}), aw.UsageError, "'removed'"),
     "bound to nothing known": (

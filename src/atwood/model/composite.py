@@ -123,18 +123,24 @@ class Model(_State, Component):
         object.__setattr__(self, "_baseline", take_snapshot(self))
 
     def _attach(self, name: str, parts: Parts) -> None:
-        self._hold({**self._attached, name: parts})
+        self._attached[name] = parts
+        object.__setattr__(self, name, parts)
+        for full_name, one in named_parts({name: parts}):
+            self._take(full_name, one)
         for _, one in named_parts({name: parts}):
             one._settle()
 
+    def _take(self, name: str, part: Component) -> None:
+        self._parts[name] = part
+        object.__setattr__(part, "_parent", self)
+        object.__setattr__(part, "_name", name)
+
     def _hold(self, attached: dict[str, Parts]) -> None:
         """Take these parts, and no others, as the own ones."""
-        held = dict(named_parts(attached))
         object.__setattr__(self, "_attached", attached)
-        object.__setattr__(self, "_parts", held)
-        for full_name, one in held.items():
-            object.__setattr__(one, "_parent", self)
-            object.__setattr__(one, "_name", full_name)
+        object.__setattr__(self, "_parts", {})
+        for full_name, one in named_parts(attached):
+            self._take(full_name, one)
         for name, parts in attached.items():
             object.__setattr__(self, name, parts)
 
@@ -177,12 +183,12 @@ class Model(_State, Component):
                 advice="Choose another name.",
             )
         parts: list[Any] = part if isinstance(part, list) else [part]
-        for index, one in enumerate(parts):
+        for one in parts:
             self._check_is_free(name, one)
-            if any(one is other for other in parts[:index]):
-                raise DeclarationError(
-                    f"the array {name!r} holds one object twice", where=where, advice="Give each its own object."
-                )
+        if len({id(one) for one in parts}) < len(parts):
+            raise DeclarationError(
+                f"the array {name!r} holds one object twice", where=where, advice="Give each its own object."
+            )
         added = list(part) if isinstance(part, list) else part
         try:
             self._attach(name, added)

@@ -167,8 +167,9 @@ def apply_edits(model: Model, edits: Edits) -> None:
             owner.add(name, copy_parts(parts))
     for path, joined in edits.joined.items():
         owner = _part_at(model, path)
+        present = set(owner._connections) if owner is not None else set()
         for a, b in joined if owner is not None else ():
-            if (a, b) not in owner._connections:
+            if (a, b) not in present:
                 check_end(owner, a, b)
                 check_end(owner, b, a)
                 owner.connect(find_end(owner, a), find_end(owner, b))

@@ -293,16 +293,17 @@ def _read_changes(model: Model, data: Any, where: str) -> None:
         if name not in owner._attached:  # a part that was made anew with its parameters is there already
             owner.add(name, _read_parts(part, path))
     for path, joined in _mapping(changes.get("connections"), where).items():
-        owner = model[path] if path else model
+        owner = _model_at(model, path)
+        present = set(owner._connections)
         for pair in joined if isinstance(joined, list) else ():
             if not isinstance(pair, list) or len(pair) != 2:
                 raise UsageError(f"{pair!r} does not name two ends", where=where)
-            if tuple(pair) not in owner._connections:
+            if tuple(map(str, pair)) not in present:
                 owner.connect(*(find_end(owner, str(end)) for end in pair))
     for path, starts in _mapping(changes.get("starts"), where).items():
-        owner = model[path] if path else model
+        owner = _model_at(model, path)
         for kind, values in _mapping(starts, where).items():
-            if not isinstance(owner, Model) or kind not in owner._start_values():
+            if kind not in owner._start_values():
                 raise UsageError(f"it has no {kind!r}", where=_join(where, path))
             target = owner._start_values()[kind]
             for key, value in _mapping(values, where).items():
@@ -314,10 +315,14 @@ def _read_changes(model: Model, data: Any, where: str) -> None:
 
 def _owner(model: Model, path: str) -> tuple[Model, str]:
     outer, _, name = path.rpartition(".")
-    owner = model[outer] if outer else model
-    if not isinstance(owner, Model):
-        raise UsageError("it has no parts", where=outer)
-    return owner, name
+    return _model_at(model, outer), name
+
+
+def _model_at(model: Model, path: str) -> Model:
+    found = model[path] if path else model
+    if not isinstance(found, Model):
+        raise UsageError("it has no parts", where=path)
+    return found
 
 
 def _mapping(data: Any, where: str, known: tuple[str, ...] = ()) -> Mapping[str, Any]:
