@@ -27,6 +27,7 @@ __all__ = [
     "ImplicitProblem",
     "IntArray",
     "LinearSolver",
+    "NativeCallbacks",
     "OpenSession",
     "Session",
     "SolverOptions",
@@ -42,6 +43,42 @@ LinearSolver: TypeAlias = Literal["dense", "sparse"]
 
 SPARSE_SIZE = 60
 SPARSE_DENSITY = 0.15
+
+
+@dataclass(frozen=True, eq=False)
+class NativeCallbacks:
+    """Addresses of compiled functions with SUNDIALS' own C signatures, for one session.
+
+    Residual and Jacobian return 0, or +1 where a value is not finite, which makes IDA try a smaller step.
+
+    Parameters
+    ----------
+    residual
+        An ``IDAResFn``: ``int (double t, N_Vector y, N_Vector yp, N_Vector out, void *data)``.
+    jacobian
+        An ``IDALsJacFn``: ``int (double t, double cj, N_Vector y, N_Vector yp, N_Vector out, SUNMatrix J,
+        void *data, N_Vector, N_Vector, N_Vector)``.  The matrix comes filled with zeros; a sparse one (by column)
+        has its index arrays zeroed too, so that these are written as well.
+    user_data
+        The last argument of all of them, this session's own; 0 for none.
+    weights
+        An ``IDAEwtFn``: ``int (N_Vector y, N_Vector weights, void *data)``, or 0 for none.
+    set_weights
+        ``set_weights(relative, absolute)``, called once before `weights` is used: it makes it give
+        ``1 / (relative[i] * |y[i]| + absolute[i])``.
+    missing_values
+        How often residual and Jacobian had no finite value so far, if somebody counts it.
+    keep
+        Whatever must live as long as the addresses are used.
+    """
+
+    residual: int
+    jacobian: int
+    user_data: int = 0
+    weights: int = 0
+    set_weights: Callable[[FloatArray, FloatArray], None] | None = None
+    missing_values: Callable[[], int] | None = None
+    keep: object = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +107,10 @@ class ImplicitProblem:
         The number of events.
     event_directions
         For each event +1 (rising values only), -1 (falling values only) or 0 (both).  Empty: all 0.
+    native
+        ``native(linear_solver)``: compiled forms of the residual and the Jacobian for a matrix that is dense or
+        sparse.  Each session asks once, and must not share its answer with another one.  Drivers that cannot use
+        them ignore them.
     """
 
     size: int
@@ -80,6 +121,7 @@ class ImplicitProblem:
     events: Callable[[float, FloatArray, FloatArray], Values] | None = None
     event_count: int = 0
     event_directions: tuple[int, ...] = ()
+    native: Callable[[LinearSolver], NativeCallbacks] | None = None
 
     def __post_init__(self) -> None:
         if self.size < 1:
