@@ -39,17 +39,17 @@ class Rope(Component):
         r = self.b.position - self.a.position
         return dot(r, r) * (0.5 / self.length) - 0.5 * self.length
 
-    @event(modes=("taut",), direction=-1, target="when_slack", message="the rope has gone slack")
+    @event(modes=("taut",), direction=-1, unit="N", target="when_slack", message="the rope has gone slack")
     def goes_slack(self) -> Scalar:
         """Return the tension."""
         return self.reaction("tension")
 
-    @event(modes=("slack",), direction=-1, target="taut", message="the rope has come taut", impact=True)
+    @event(modes=("slack",), direction=-1, unit="m", target="taut", message="the rope has come taut", impact=True)
     def comes_taut(self) -> Scalar:
         """Return how much rope is to spare."""
         return self.length - self.reach()
 
-    @event(direction=-1, target="stop", message="an end of the rope has reached a pulley")
+    @event(direction=-1, unit="m", target="stop", message="an end of the rope has reached a pulley")
     def reaches_pulley(self) -> Scalar:
         """Return the shortest piece; on a line, where the sides would change, it must stay positive."""
         spans = self.spans()

@@ -167,5 +167,7 @@ def constraint_forces(
     forces: Forces,
 ) -> None:
     """Add the forces of a constraint: its multiplier times its derivatives (Goldstein, section 2.4)."""
-    for name, slopes, turning in _slopes(local, value, multiplier):
-        _push_mapped(site, local, name, slopes, turning, mapping, forces)
+    # The derivatives first, and then times the multiplier: so both sets of multipliers and the rate share them.
+    for name, slopes, turning in _slopes(local, value, site.graph.constant(1.0)):
+        pushes = [slope * multiplier for slope in slopes]
+        _push_mapped(site, local, name, pushes, None if turning is None else turning * multiplier, mapping, forces)

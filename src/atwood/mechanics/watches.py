@@ -30,6 +30,8 @@ class Watch:
         The mode it leads to, or ``"stop"``.
     message
         What has happened, in words.
+    unit
+        SI unit of the value.
     impact
         Whether velocities jump.
     """
@@ -40,6 +42,7 @@ class Watch:
     direction: int
     target: str
     message: str
+    unit: str
     impact: bool
 
 
@@ -61,7 +64,8 @@ def list_watches(
             if value.is_constant or value in mechanism.table.values:
                 continue
             target = local.part.values.get(law.options.target, law.options.target)
+            options = law.options
             found.append(
-                Watch(path, law.name, value, law.options.direction, target, law.options.message, law.options.impact)
+                Watch(path, law.name, value, options.direction, target, options.message, options.unit, options.impact)
             )
     return tuple(found)

@@ -174,6 +174,7 @@ class EventOptions:
     direction: int
     target: str
     message: str
+    unit: str
     impact: bool
 
 
@@ -301,7 +302,13 @@ def observable(
 
 
 def event(
-    *, target: str, message: str, modes: Sequence[str] = (), direction: int = 0, impact: bool = False
+    *,
+    target: str,
+    message: str,
+    unit: str = "1",
+    modes: Sequence[str] = (),
+    direction: int = 0,
+    impact: bool = False,
 ) -> Callable[[_F], _F]:
     """Mark a method whose zero crossing changes the mode of the component or ends the run.
 
@@ -311,6 +318,8 @@ def event(
         The mode to go to, ``"stop"``, or the name of a choice parameter that says which of these.
     message
         What has happened, in words.
+    unit
+        SI unit of the value, which says what is small.
     modes
         The modes in which it is watched; all when empty.
     direction
@@ -318,7 +327,7 @@ def event(
     impact
         Whether velocities jump: they are made consistent with the new mode by a plastic impact.
     """
-    options = EventOptions(tuple(modes), direction, target, message, impact)
+    options = EventOptions(tuple(modes), direction, target, message, unit, impact)
     return lambda function: _mark(function, Law("event", function.__name__, options))
 
 

@@ -17,7 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.mechanics.watches import Watch, list_watches
 from atwood.solve.balance import Balance, least_norm
 from atwood.solve.reactions import ReactionSolver, maximal_state
-from atwood.solve.scales import coordinate_scales
+from atwood.solve.scales import Scales, coordinate_scales
 
 __all__ = ["EventProbe", "Happening", "enter_mode"]
 
@@ -63,9 +63,16 @@ class EventProbe:
         The scene in its mode.
     t, q, u
         The state at the start of the mode.
+    scales
+        Sizes of the scene.
+    tolerance
+        Relative tolerance of the run. A one-sided event that starts within ten times this of zero, as a rope does that
+        has just gone slack, happens only when it has passed zero by as much; else errors of a step would set it off.
     """
 
-    def __init__(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> None:
+    def __init__(
+        self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray, scales: Scales, tolerance: float
+    ) -> None:
         self.assembly = assembly
         self.watches: tuple[Watch, ...] = list_watches(
             assembly.mechanism, assembly.equations, assembly.reactions, assembly.modes
@@ -78,39 +85,42 @@ class EventProbe:
             if self.watches
             else None
         )
+        sizes = {"m": scales.length, "N": scales.force, "m/s": scales.length / scales.time}
+        small = [10.0 * tolerance * sizes.get(one.unit, 1.0) for one in self.watches]
+        self._shift = np.zeros(len(small))
+        values = np.asarray(self.values(t, q, u)) if self.watches else np.zeros(0)
+        self.broken = next(
+            (one for one, v, s in zip(self.watches, values, small, strict=True) if one.direction * v > s), None
+        )
+        for i, (one, value) in enumerate(zip(self.watches, values, strict=True)):
+            if abs(value) <= small[i]:
+                self._shift[i] = -one.direction * small[i]
 
     @property
     def directions(self) -> tuple[int, ...]:
         """Direction of each event."""
         return tuple(one.direction for one in self.watches)
 
-    def values(self, t: float, q: FloatArray, u: FloatArray) -> Sequence[float]:
-        """Return the value of each event at a state."""
+    def values(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+        """Return the value of each event at a state, shifted where it starts at zero."""
         assert self.kernel is not None
         reactions: Any = [0.0] * len(self.assembly.reactions)
         if self.reactions is not None:
             found, _ = self.reactions.at(np.array([t]), q[:, None], u[:, None])
             reactions = found[:, 0]
-        values: Sequence[float] = self.kernel([t], q, u, np.zeros_like(u), reactions)[0]
+        values: FloatArray = np.asarray(self.kernel([t], q, u, np.zeros_like(u), reactions)[0]) + self._shift
         return values
 
-    def function(self) -> Callable[[float, FloatArray, FloatArray], Sequence[float]] | None:
+    def function(self) -> Callable[[float, FloatArray, FloatArray], FloatArray] | None:
         """Return the events as a function of the solver's vector; None if nothing is watched."""
         if not self.watches:
             return None
         n = len(self.assembly.equations.coordinates)
         return lambda t, y, yp: self.values(t, y[:n], y[n : 2 * n])
 
-    def broken_at_start(self, t: float, q: FloatArray, u: FloatArray) -> Happening | None:
+    def broken_at_start(self, t: float) -> Happening | None:
         """Return the first event whose one-sided bound does not hold from the outset."""
-        if not self.watches:
-            return None
-        values = np.asarray(self.values(t, q, u))
-        rounding = 1e-9 * float(np.max(np.abs(values), initial=1e-300))
-        for watch, value in zip(self.watches, values, strict=True):
-            if watch.direction * value > rounding:
-                return self._happening(t, watch)
-        return None
+        return None if self.broken is None else self._happening(t, self.broken)
 
     def name(self, t: float, events: Sequence[int]) -> Happening:
         """Return what happened when the driver reports an event."""

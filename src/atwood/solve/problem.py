@@ -101,7 +101,7 @@ class Plan:
 
     def problem(
         self,
-        events: Callable[[float, FloatArray, FloatArray], Sequence[float]] | None = None,
+        events: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
         directions: tuple[int, ...] = (),
     ) -> ImplicitProblem:
         """Return the problem for a driver; its functions follow changes of the dependent coordinates."""

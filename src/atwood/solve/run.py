@@ -196,7 +196,7 @@ def run(
     recent = 0
     while True:
         plan = make_plan(assembly, t, q, u, start.length, options.t_end - start.time)
-        probe = EventProbe(assembly, t, q, u)
+        probe = EventProbe(assembly, t, q, u, plan.scales, options.relative_tolerance)
         recorder = _Recorder(plan)
         left = times > t
         outcome = _run_mode(plan, probe, recorder, t, q, u, times[left], shown[left], bool(shown[~left][-1]), options, statistics)
@@ -256,7 +256,7 @@ def _run_mode(
         return _Outcome(float(times[-1]), "finished", "", None, Statistics())
     y, yp = pack_state(plan, t, q, u)
     recorder.take(t, y, first_shown)
-    already = probe.broken_at_start(t, q, u)
+    already = probe.broken_at_start(t)
     if already is not None:
         return _Outcome(t, "event", "", already, Statistics())
     session = _open(plan, probe, options, t, y, yp, spent)
