@@ -200,6 +200,32 @@ def test_a_part_is_replaced_by_keyword_subclass_or_replace():
             bob: Bob = Wheel()
 
 
+def test_what_takes_the_place_of_a_part_must_have_all_its_connected_ends():
+    class Deep(aw.Model):
+        row: Row = Row(n=3)
+        hook: Hook = Hook()
+
+        def build(self):
+            self.connect(self.hook.frame, self.row.bobs[2].point)
+
+    model = Deep()
+    refuses(model, aw.ConnectError, lambda m: m.replace("row", Row(n=2)), r"^row\.bobs\[2\]\.point")
+    model.replace("row", Row(n=4))
+
+    class Direct(aw.Model):
+        row: Row = Row(n=3)
+        hook: Hook = Hook()
+        connections = [aw.connect(hook.frame, row["bobs[2]"].point)]
+
+    assert len(Direct(row=Row(n=5)).row.bobs) == 5
+    with pytest.raises(aw.ConnectError, match="connected with hook"):
+        Direct(row=Row(n=1))
+    with pytest.raises(aw.ConnectError, match="connected with hook"):
+
+        class Shorter(Direct):
+            row: Row = Row(n=2)
+
+
 def test_arrays_are_replaced_as_arrays_or_one_by_one():
     scene = Outer(pair=[Pendulum(mass=8.0), Pendulum(mass=9.0)])
     assert [one.mass for one in scene.pair] == [8.0, 9.0]

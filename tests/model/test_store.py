@@ -12,6 +12,7 @@ import atwood as aw
 from atwood.expr import Graph, evaluate, select
 from atwood.model.flatten import flatten
 from atwood.model.timefunction import StoredFunction, write_function
+from atwood_library.scenes import SCENES as LIBRARY_SCENES
 
 from . import things
 from .things import (
@@ -378,3 +379,50 @@ def test_hook_has_nothing_to_say():
     scene = aw.Scene()
     scene.add("hook", Hook())
     assert aw.to_data(scene)["scene"]["changes"]["added"] == {"hook": {"class": f"{HERE}:Hook"}}
+
+
+# -- any scene --------------------------------------------------------------------------------------------------------
+
+CHANGES = {
+    "count": lambda s, k: s.set("row.n", k + 1),
+    "count around": lambda s, k: s.set("n", k + 1),
+    "mass": lambda s, k: s.set(f"row.bobs[{k}].mass", float(k)),
+    "bar": lambda s, k: s.set(f"row.bar{k}.length", f"{k + 1} cm"),
+    "pitch": lambda s, k: s.set("row.pitch", k + 1.0),
+    "replaced": lambda s, k: s.row.replace(f"bobs[{k}]", HeavyBob(mass=10.0 + k)),
+    "row replaced": lambda s, k: s.replace("row", Row(n=k + 1)),
+    "added": lambda s, k: s.add(f"extra{k}", Pendulum(length=k + 1.0)),
+    "changed extra": lambda s, k: s.set(f"extra{k}.bar.count", k),
+    "added within": lambda s, k: s.row.add(f"push{k}", Push(value=float(k))),
+    "an input": lambda s, k: s.set(f"row.push{k}.value", lambda t: k * t),
+    "row added": lambda s, k: s.add(f"row{k}", Row(n=RowScene.n, pitch=k + 1.0)),
+    "row changed": lambda s, k: s.set(f"row{k}.bobs[0].mass", 5.0),
+    "row replaced, bound": lambda s, k: s.replace("row", Row(n=RowScene.n, pitch=k + 1.0)),
+    "rows added": lambda s, k: s.add(f"rows{k}", [Row(n=RowScene.n), Row(n=k + 1)]),
+    "rows changed": lambda s, k: s.set(f"rows{k}[0].bobs[0].mass", 6.0),
+    "joined": lambda s, k: s.connect(s.hook.frame, s.row.bobs[k].point),
+    "joined within": lambda s, k: s.row.connect(s.row[f"push{k}"].point, s.row.bobs[k].point),
+    "start": lambda s, k: s.start.update({f"row.bobs[{k}].position.x": f"{k} cm"}),
+    "start gone": lambda s, k: s.start.clear(),
+}
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from(sorted(CHANGES)), st.integers(0, 4)), max_size=12))
+def test_whatever_was_changed_a_scene_reads_back_and_copies(steps):
+    scene = RowScene()
+    for name, k in steps:
+        before = data_of(scene)
+        try:
+            CHANGES[name](scene, k)
+        except (aw.AtwoodError, IndexError):
+            assert data_of(scene) == before
+    assert data_of(round_trip(scene)) == data_of(scene.copy()) == data_of(scene)
+    assert all(scene[path].path == path for path in flatten(scene).parts)
+
+
+@pytest.mark.parametrize("name", LIBRARY_SCENES)
+def test_scenes_of_the_library_read_back(name):
+    scene = LIBRARY_SCENES[name]()
+    assert data_of(round_trip(scene)) == data_of(scene)
+    assert data_of(scene.copy()) == data_of(scene)

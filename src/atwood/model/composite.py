@@ -13,7 +13,8 @@ from atwood.model.deferred import Deferred
 from atwood.model.edits import (
     Snapshot,
     apply_edits,
-    check_end,
+    check_connections,
+    check_pairs,
     copy_parts,
     find_edits,
     take_over,
@@ -99,6 +100,9 @@ class Model(_State, Component):
         names = {id(part): name for name, part in named_parts(cls._prototypes)}
         cls._joined_here = tuple(declared_connection(cls, one, names) for one in vars(cls).get("connections", ()))
         cls._joined = (*joined, *cls._joined_here)
+        for name, part in named_parts(cls._prototypes):
+            if name.partition("[")[0] in vars(cls):
+                check_pairs(joined, f"{name}.", part)
 
     def __init__(self, **values: Any) -> None:
         given = {name: value for name, value in values.items() if name in self._prototypes}
@@ -118,6 +122,8 @@ class Model(_State, Component):
         object.__setattr__(self, "_connections", list(self._joined))
         for name, prototype in self._prototypes.items():
             self._attach(name, copy_parts(self._given.get(name, prototype)))
+        for name, part in named_parts(self._given):
+            check_connections(self, name, part)
         if not self._is_open():
             self.build()
         object.__setattr__(self, "_baseline", take_snapshot(self))
@@ -257,6 +263,7 @@ class Model(_State, Component):
         self._hold(after)
         try:
             new._settle()
+            check_connections(self, name, new)
         except Exception:
             self._hold(before)
             raise
@@ -358,18 +365,8 @@ class Model(_State, Component):
         object.__setattr__(fresh, "_token", self._token)
         fresh._assemble()
         apply_edits(fresh, find_edits(self))
-        self._check_outer_connections(fresh)
+        check_connections(self._parent, self._name, fresh)
         take_over(self, fresh)
-
-    def _check_outer_connections(self, fresh: Model) -> None:
-        """Refuse to lose connectors that the models around have connected."""
-        prefix, around = self._name + ".", self._parent
-        while isinstance(around, Model):
-            for pair in around._connections:
-                for end, other in (pair, pair[::-1]):
-                    if end.startswith(prefix):
-                        check_end(fresh, end[len(prefix) :], other)
-            prefix, around = f"{around._name}.{prefix}", around._parent
 
     def copy(self) -> Self:
         """Return a model with the same settings and its own parts, that belongs to no model."""

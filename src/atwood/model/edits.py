@@ -7,7 +7,7 @@ work; `find_edits` compares with it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,18 @@ from atwood.model.joining import Parts, find_end, named_parts
 if TYPE_CHECKING:
     from atwood.model.composite import Model
 
-__all__ = ["REMOVED", "Edits", "Snapshot", "apply_edits", "find_edits", "take_over", "take_snapshot"]
+__all__ = [
+    "REMOVED",
+    "Edits",
+    "Snapshot",
+    "apply_edits",
+    "check_connections",
+    "check_pairs",
+    "copy_parts",
+    "find_edits",
+    "take_over",
+    "take_snapshot",
+]
 
 REMOVED: Any = None
 """Stands for a start value that was taken away."""
@@ -206,6 +217,32 @@ def check_end(model: Component, path: str, other: str) -> None:
             where=_join(model.path, path),
             advice="Connections cannot be taken away; make the model anew.",
         ) from None
+
+
+def check_pairs(joined: Iterable[tuple[str, str]], prefix: str, new: Component) -> None:
+    """Refuse a component that lacks an end that connections with a prefix name."""
+    for pair in joined:
+        for end, other in (pair, pair[::-1]):
+            if end.startswith(prefix):
+                check_end(new, end[len(prefix) :], other)
+
+
+def check_connections(around: Any, name: str, new: Component) -> None:
+    """Refuse a component that lacks an end that the models around have connected.
+
+    Parameters
+    ----------
+    around
+        The model that it is to be part of; None if there is none.
+    name
+        Its name there.
+    new
+        The component.
+    """
+    prefix = f"{name}."
+    while around is not None:
+        check_pairs(around._connections, prefix, new)
+        prefix, around = f"{around._name}.{prefix}", around._parent
 
 
 def take_over(old: Any, new: Any) -> None:

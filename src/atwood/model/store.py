@@ -7,10 +7,11 @@ so read only files that you would also run.
 
 from __future__ import annotations
 
+import functools
 import importlib
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -258,8 +259,25 @@ def _read(data: Any, where: str) -> Component:
         )
     model = object.__new__(cls)  # not by calling the class: what its constructor may add is written as added parts
     Model.__init__(model, **_told_apart(given, cls, where), **parts)
-    _read_changes(model, entries.get("changes"), where)
+    if not _depends_on_around(model):
+        _read_changes(model, entries.get("changes"), where)
     return model
+
+
+def _depends_on_around(part: Component) -> bool:
+    """Return whether a part that belongs to no model yet has values bound to the model that it will be in.
+
+    Its own parts may not be there before; so its changes are read when it has its place.
+    """
+    return isinstance(part, Model) and any(isinstance(part._value(name), Deferred) for name in part._settings)
+
+
+def _place(part: Component, data: Any, where: str, put: Callable[[Component], Component]) -> None:
+    """Put a part that was read into its place, and read the changes that had to wait for it."""
+    waits = _depends_on_around(part)
+    placed = put(part)
+    if waits and isinstance(placed, Model):
+        _read_changes(placed, data.get("changes"), where)
 
 
 def _told_apart(values: dict[str, Any], cls: type[Component], where: str) -> dict[str, Any]:
@@ -287,11 +305,15 @@ def _read_changes(model: Model, data: Any, where: str) -> None:
             setattr(model[path], name, _read_value(value, f"{path}.{name}"))
     for path, part in _mapping(changes.get("replaced"), where).items():
         owner, name = _owner(model, path)
-        owner.replace(name, _read(part, path))
+        _place(_read(part, path), part, path, functools.partial(owner.replace, name))
     for path, part in _mapping(changes.get("added"), where).items():
         owner, name = _owner(model, path)
-        if name not in owner._attached:  # a part that was made anew with its parameters is there already
-            owner.add(name, _read_parts(part, path))
+        if name in owner._attached:  # a part that was made anew with its parameters is there already
+            continue
+        if isinstance(part, list):
+            _place_array(owner, name, part, path)
+        else:
+            _place(_read(part, path), part, path, functools.partial(owner.add, name))
     for path, joined in _mapping(changes.get("connections"), where).items():
         owner = _model_at(model, path)
         present = set(owner._connections)
@@ -311,6 +333,15 @@ def _read_changes(model: Model, data: Any, where: str) -> None:
                     target.pop(key, None)
                 else:
                     target[key] = _read_value(value, key)
+
+
+def _place_array(owner: Model, name: str, data: list[Any], where: str) -> None:
+    parts = _read_parts(data, where)
+    waiting = [_depends_on_around(one) for one in parts]
+    owner.add(name, parts)
+    for index, (one, entries) in enumerate(zip(parts, data, strict=True)):
+        if waiting[index]:
+            _read_changes(one, entries.get("changes"), f"{where}[{index}]")
 
 
 def _owner(model: Model, path: str) -> tuple[Model, str]:
