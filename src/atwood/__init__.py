@@ -7,6 +7,8 @@ run them; those are loaded when they are first used.
 from __future__ import annotations
 
 import importlib
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import (
@@ -72,8 +74,10 @@ from atwood.model.vector import Vector, as_vector, cross, dot, norm
 if TYPE_CHECKING:
     from atwood.model.store import from_data, load_scene, save_scene, to_data
     from atwood.pipeline import Assembly, assemble, simulate
+    from atwood.report import MechanismReport, report
     from atwood.result.files import SavedResult, load_result, save_result
     from atwood.result.result import Result
+    from atwood.study import Comparison, compare
 
     __version__: str
 
@@ -81,6 +85,7 @@ __all__ = [
     "Assembly",
     "AtwoodError",
     "BodyInertia",
+    "Comparison",
     "Component",
     "ConnectError",
     "Connector",
@@ -91,6 +96,7 @@ __all__ = [
     "Groove",
     "KernelEvaluationError",
     "Load",
+    "MechanismReport",
     "Model",
     "ParameterError",
     "Placement",
@@ -115,6 +121,7 @@ __all__ = [
     "assemble",
     "atan",
     "atan2",
+    "compare",
     "connect",
     "connector",
     "constraint",
@@ -140,6 +147,7 @@ __all__ = [
     "observable",
     "parameter",
     "potential",
+    "report",
     "save_result",
     "save_scene",
     "select",
@@ -157,12 +165,16 @@ __all__ = [
 
 _LATER = {
     "Assembly": "atwood.pipeline",
+    "Comparison": "atwood.study",
+    "MechanismReport": "atwood.report",
     "Result": "atwood.result.result",
     "SavedResult": "atwood.result.files",
     "assemble": "atwood.pipeline",
+    "compare": "atwood.study",
     "from_data": "atwood.model.store",
     "load_result": "atwood.result.files",
     "load_scene": "atwood.model.store",
+    "report": "atwood.report",
     "save_result": "atwood.result.files",
     "save_scene": "atwood.model.store",
     "simulate": "atwood.pipeline",
@@ -189,3 +201,17 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+class _Package(ModuleType):
+    """The package itself: where a public function and a package within have one name, that name stands for the function.
+
+    `atwood.report` is the function; what else its package holds is had with ``from atwood.report import ...``.
+    """
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in _LATER and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
