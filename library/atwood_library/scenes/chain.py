@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, parameter
+from atwood import Point, Scene, parameter
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.parts.rod import Rod
@@ -24,7 +24,7 @@ class Chain(Scene):
         """Hang one link on the other."""
         rods = self.add("rod", [Rod(length=self.length / self.links) for _ in range(self.links)])
         bobs = self.add("bob", [PointMass(mass=self.mass) for _ in range(self.links)])
-        end = self.ground.frame
+        end: Point = self.ground.frame
         for i, (rod, bob) in enumerate(zip(rods, bobs, strict=True)):
             self.connect(end, rod.a)
             self.connect(rod.b, bob.point)

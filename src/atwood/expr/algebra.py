@@ -42,7 +42,7 @@ def add(a: Expression, b: Expression) -> Expression:
     merged = _merge(a, b, 1.0)
     if merged is not None:
         return merged
-    return graph.node("add", (a, b) if a.index < b.index else (b, a))
+    return graph.node("add", _in_order(a, b))
 
 
 def subtract(a: Expression, b: Expression) -> Expression:
@@ -150,18 +150,23 @@ def multiply(a: Expression, b: Expression) -> Expression:
         if inner is not None:
             return multiply(multiply(known, inner), rest)
         if other.operation == "mul":  # l (c u) is (l c) u where l c is there already
-            for factor, rest in (other.arguments, other.arguments[::-1]):
-                product = graph.find("mul", (known, factor) if known.index < factor.index else (factor, known))
+            for core, rest in (other.arguments, other.arguments[::-1]):
+                product = graph.find("mul", _in_order(known, core))
                 if product is not None:
-                    return graph.node("mul", (product, rest) if product.index < rest.index else (rest, product))
-        return graph.node("mul", (a, b) if a.index < b.index else (b, a))
+                    return graph.node("mul", _in_order(product, rest))
+        return graph.node("mul", _in_order(a, b))
     factor_a, core_a = _split(a)
     factor_b, core_b = _split(b)
     if core_a is not a or core_b is not b:
         factor = factor_a * factor_b
         if _is_safe(factor):
             return multiply(graph.constant(factor), multiply(core_a, core_b))
-    return graph.node("mul", (a, b) if a.index < b.index else (b, a))
+    return graph.node("mul", _in_order(a, b))
+
+
+def _in_order(a: Expression, b: Expression) -> tuple[Expression, Expression]:
+    """Return two operands that may be exchanged in the order in which they are shared."""
+    return (a, b) if a.index < b.index else (b, a)
 
 
 def _parametric_factor(a: Expression) -> tuple[Expression | None, Expression]:

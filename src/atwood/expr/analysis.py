@@ -155,7 +155,10 @@ def _graph_of(outputs: Sequence[Expression | float], mapping: Mapping[Expression
     raise AtwoodError("there is no expression among the outputs")
 
 
-def evaluate(outputs: Sequence[Expression | float], values: Mapping[Expression | str, float]) -> list[float]:
+def evaluate(
+    outputs: Sequence[Expression | float],
+    values: Mapping[Expression, float] | Mapping[str, float] | Mapping[Expression | str, float],
+) -> list[float]:
     """Return the values of expressions, one node at a time: the reference for compiled programs.
 
     Parameters

@@ -25,7 +25,9 @@ class Formula:
         self.expression, self.arguments = expression, tuple(arguments)
         graph = Graph()
         self._symbols = [graph.symbol(str(argument)) for argument in self.arguments]
-        self._value = graph.convert(from_sympy(expression, graph, dict(zip(self.arguments, self._symbols, strict=True))))
+        self._value = graph.convert(
+            from_sympy(expression, graph, dict(zip(self.arguments, self._symbols, strict=True)))
+        )
         self._nodes = live([self._value])
         stray = [n.name for n in self._nodes if n.is_symbol and n not in self._symbols]
         if stray:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, substitute
-from atwood.forms.program import FormProgram, Level, make_form_program, rate_symbols
+from atwood.forms.program import FormProgram, Level, either_sign, make_form_program, rate_symbols
 from atwood.mechanics.equations import Equations
 
 __all__ = ["LEVELS", "dae_form", "keep_constraints"]
@@ -63,6 +63,7 @@ def dae_form(
     else:
         extra = ()
         held = [one.second for one in equations.constraints]
+    held = [either_sign(one) for one in held]
     chosen: Level = "ggl" if level == "ggl" else ("index1" if level == "index1" else "index1-projected")
     residual = tidy(kinematic + dynamic + held)
     return make_form_program(name, "dae", chosen, equations, parameters, residual, multipliers, extra)

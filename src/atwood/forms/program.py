@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, live, substitute
 from atwood.mechanics.equations import Equations
 
-__all__ = ["BalanceProgram", "FormProgram", "Level", "balance_program", "make_form_program"]
+__all__ = ["BalanceProgram", "FormProgram", "Level", "balance_program", "either_sign", "make_form_program"]
 
 Level = Literal["", "ggl", "index1", "index1-projected"]
 
@@ -95,6 +95,11 @@ class BalanceProgram:
 def rate_symbols(equations: Equations) -> tuple[Expression, ...]:
     """Return the symbols of the coordinates' derivatives in y'."""
     return tuple(equations.graph.symbol(f"rate:{c.name}") for c in equations.names)
+
+
+def either_sign(row: Expression) -> Expression:
+    """Return a row that is to be zero, without a minus sign before all of it."""
+    return row.arguments[0] if row.operation == "neg" else row
 
 
 def make_form_program(

@@ -12,7 +12,7 @@ from collections.abc import Collection, Sequence
 import networkx as nx
 
 from atwood.expr import Expression, jacobian, solve
-from atwood.forms.program import FormProgram, make_form_program, rate_symbols
+from atwood.forms.program import FormProgram, either_sign, make_form_program, rate_symbols
 from atwood.mechanics.equations import Equations
 
 __all__ = ["reduced_form"]
@@ -50,9 +50,9 @@ def reduced_form(
     projected = _project(equations, rows, chosen, independent)
     residual = [
         *(kinematic[i] for i in independent),
-        *(one.value for one in equations.constraints),
+        *(either_sign(one.value) for one in equations.constraints),
         *projected,
-        *(one.rate for one in equations.constraints),
+        *(either_sign(one.rate) for one in equations.constraints),
     ]
     return make_form_program(name, "reduced", "", equations, parameters, residual, independent=independent)
 

@@ -305,9 +305,7 @@ def check_closures(mechanism: Mechanism) -> None:
             )
 
 
-def resolve_signals(
-    mechanism: Mechanism, site: Site, kinematics: Kinematics
-) -> dict[Expression, Expression]:
+def resolve_signals(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[Expression, Expression]:
     """Return what each linked input stands for.
 
     Raises
@@ -325,7 +323,9 @@ def resolve_signals(
         if isinstance(value, Vector):
             if axis not in ("x", "y", "z"):
                 raise DeclarationError(
-                    "it is a vector", where=f"{source}.{observable}", advice=f"Connect {observable}.x or {observable}.z."
+                    "it is a vector",
+                    where=f"{source}.{observable}",
+                    advice=f"Connect {observable}.x or {observable}.z.",
                 )
             value = getattr(value, axis)
         placed = put_in_place(site.graph.convert(value), local_map(site, local, kinematics))
@@ -345,4 +345,3 @@ def make_gravity(table: ParameterTable, value: float) -> Vector:
     """Return the acceleration of free fall as a vector."""
     pull = table.scalar("gravity", value)
     return as_vector((0.0, 0.0, -pull))
-

@@ -131,9 +131,7 @@ def inertia_forces(
     at_centers: dict[int, list[Expression]] = {}
     for index, one in masses.bodies.items():
         acceleration = kinematics.reference_accelerations[index]
-        at_centers[index] = [
-            site.graph.convert(one.mass * (a - g)) for a, g in zip(acceleration, pull, strict=True)
-        ]
+        at_centers[index] = [site.graph.convert(one.mass * (a - g)) for a, g in zip(acceleration, pull, strict=True)]
         if index in kinematics.angular_accelerations:
             forces.twist(index, -(one.moment * kinematics.angular_accelerations[index]))
     for spread in masses.coupled:
@@ -226,7 +224,7 @@ def constraint_levels(
     accelerations: Sequence[Expression],
 ) -> tuple[Expression, Expression]:
     """Return the first and second time derivative of a constraint."""
-    first = {time: 1.0, **dict(zip(coordinates, speeds, strict=True))}
+    first: dict[Expression, Expression | float] = {time: 1.0, **dict(zip(coordinates, speeds, strict=True))}
     (rate,) = jvp([value], first)
     (second,) = jvp([rate], {**first, **dict(zip(speeds, accelerations, strict=True))})
     return rate, second

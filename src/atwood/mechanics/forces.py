@@ -83,7 +83,8 @@ class Site:
 
 def local_map(site: Site, local: LocalPart, kinematics: Kinematics) -> dict[Expression, Expression]:
     """Return what the local symbols of a part stand for."""
-    path, found = local.part.path, {}
+    path = local.part.path
+    found: dict[Expression, Expression] = {}
     for name, symbols in local.connectors.items():
         node = site.node(path, name)
         body = site.bodies.body_of[node]

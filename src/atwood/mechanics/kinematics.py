@@ -132,10 +132,11 @@ def _rigid_step(step: RigidStep, offset: Vector, turn: Scalar, space: Space) -> 
 
 def rotate(vector: Vector, angle: Scalar) -> Vector:
     """Return a vector turned by an angle in the plane, counter-clockwise as seen on the page."""
-    if (angle.is_zero if isinstance(angle, Expression) else angle == 0.0):
+    if angle.is_zero if isinstance(angle, Expression) else angle == 0.0:
         return vector
     x_axis, y_axis, z_axis = planar_axes(angle)
-    return x_axis * vector.x + y_axis * vector.y + z_axis * vector.z
+    turned: Vector = x_axis * vector.x + y_axis * vector.y + z_axis * vector.z
+    return turned
 
 
 def place(
@@ -203,9 +204,7 @@ def _locked_angle(
     return graph.convert(angles[b] + turn_b - rotation - turn_a)
 
 
-def _shift(
-    graph: Graph, start: Components, arm: Vector, angle: Expression | None, space: Space
-) -> Components:
+def _shift(graph: Graph, start: Components, arm: Vector, angle: Expression | None, space: Space) -> Components:
     if angle is not None and space.has_rotation:
         arm = rotate(arm, angle)
     return tuple(graph.convert(p + d) for p, d in zip(start, space.components(arm), strict=True))
@@ -279,7 +278,7 @@ def differentiate(
     """
     nodes, bodies, references = placements.positions, placements.angles, placements.references
     flat = [c for p in nodes.values() for c in p] + list(bodies.values()) + [c for p in references.values() for c in p]
-    first = {time: 1.0, **dict(zip(coordinates, speeds, strict=True))}
+    first: dict[Expression, Expression | float] = {time: 1.0, **dict(zip(coordinates, speeds, strict=True))}
     rates = jvp(flat, first)
     second = jvp(rates, {**first, **dict(zip(speeds, accelerations, strict=True))})
 

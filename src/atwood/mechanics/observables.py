@@ -146,7 +146,13 @@ def observe(mechanism: Mechanism, equations: Equations, reactions: Sequence[Reac
 
 
 def _take(
-    mechanism: Mechanism, found: dict[str, Observable], path: str, value: Scalar | Vector, unit: str, doc: str, periodic: bool
+    mechanism: Mechanism,
+    found: dict[str, Observable],
+    path: str,
+    value: Scalar | Vector,
+    unit: str,
+    doc: str,
+    periodic: bool,
 ) -> None:
     graph = mechanism.table.graph
     if isinstance(value, Vector):

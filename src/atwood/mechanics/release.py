@@ -136,9 +136,7 @@ def _through(
 ) -> tuple[list[Scalar], Scalar] | None:
     """Return the force and torque that a rigid joint exerts on its b side; None where it is not unique."""
     part, law, _ = reaction.key
-    joint = next(
-        j for j in mechanism.graph.joints if j.part == part and j.local.law.name == law
-    )
+    joint = next(j for j in mechanism.graph.joints if j.part == part and j.local.law.name == law)
     body = mechanism.bodies.bodies[mechanism.bodies.body_of[joint.b]]
     far = _far_side(body, joint)
     if far is None:

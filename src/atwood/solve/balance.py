@@ -126,9 +126,7 @@ class Balance:
         return float(np.max(np.abs(now.value / rows))), float(np.max(np.abs(now.rate / rows)))
 
 
-def solve_balance(
-    now: BalanceValues, kept: NDArray[np.intp] | None, t: float
-) -> tuple[FloatArray, FloatArray]:
+def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -> tuple[FloatArray, FloatArray]:
     """Return accelerations and multipliers of a balance; see `Balance.accelerate`."""
     n = len(now.bias)
     slope = now.slope if kept is None else now.slope[kept]
@@ -170,8 +168,7 @@ def row_scales(slope: FloatArray, scales: FloatArray) -> FloatArray:
 
 def least_norm(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """Return the shortest solution of a linear system, or the best where there is none."""
-    solution: FloatArray = np.linalg.lstsq(matrix, right, rcond=_RANK)[0]
-    return solution
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=_RANK)[0], dtype=float)
 
 
 def independent_rows(matrix: FloatArray, tolerance: float = 1e-7) -> list[int]:

@@ -12,7 +12,7 @@ from atwood.errors import StartError
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import FormProgram
 from atwood.kernels import BoundKernel
-from atwood.solve.balance import Balance, solve_balance
+from atwood.solve.balance import Balance, least_norm, solve_balance
 from atwood.solve.driver import ImplicitProblem
 from atwood.solve.rank import RankFinding, choose_dependent, dependence, find_rank
 from atwood.solve.scales import Scales, coordinate_scales, find_scales
@@ -220,7 +220,7 @@ def pack_state(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[Floa
             # The solver knows the multipliers of the kept constraints only.
             now = plan.balance.at(t, q, u)
             force = now.mass @ accelerations + now.bias
-            multipliers = np.linalg.lstsq(now.slope[plan.kept].T, force, rcond=None)[0]
+            multipliers = least_norm(now.slope[plan.kept].T, force)
         tail = [multipliers, np.zeros(plan.program.extra)]
     else:
         tail = []

@@ -135,16 +135,17 @@ class _Recorder:
         plan = self.plan
         n = plan.program.coordinates
         q, u = y[:n].copy(), y[n : 2 * n].copy()
-        self.held.append(plan.balance.misses(t, q, u, plan.sizes))
+        held = plan.balance.misses(t, q, u, plan.sizes)
         if plan.is_projected:
             q, u = plan.balance.project(t, q, u, plan.sizes)
         if self.time and self.time[-1] == t:  # an output time that is also an event: keep the state after it
-            for held in (self.time, self.q, self.u, self.shown, self.held):
-                held.pop(-2 if held is self.held else -1)  # type: ignore[attr-defined]
+            for last in (self.time, self.q, self.u, self.shown, self.held):
+                del last[-1]
         self.time.append(t)
         self.q.append(q)
         self.u.append(u)
         self.shown.append(shown)
+        self.held.append(held)
         return q, u
 
     def segment(self) -> Segment:
@@ -199,7 +200,9 @@ def run(
         probe = EventProbe(assembly, t, q, u, plan.scales, options.relative_tolerance)
         recorder = _Recorder(plan)
         left = times > t
-        outcome = _run_mode(plan, probe, recorder, t, q, u, times[left], shown[left], bool(shown[~left][-1]), options, statistics)
+        outcome = _run_mode(
+            plan, probe, recorder, t, q, u, times[left], shown[left], bool(shown[~left][-1]), options, statistics
+        )
         segments.append(recorder.segment())
         statistics = statistics + outcome.statistics
         status, message = outcome.status, outcome.message
@@ -351,5 +354,3 @@ def _sample_times(t: float, options: RunOptions) -> tuple[FloatArray, NDArray[np
     shown = np.concatenate([np.ones(len(asked), dtype=bool), np.zeros(len(filling), dtype=bool)])
     order = np.argsort(times)
     return times[order], shown[order]
-
-

@@ -85,7 +85,7 @@ def find_scales(
     time = min(t for t in times if t > 0.0)
     masses = assembly.equations.masses
     graph = assembly.mechanism.table.graph
-    total = sum(
-        evaluate([graph.convert(one.mass) for one in masses.bodies.values()], parameters), 0.0
-    ) + sum(evaluate([graph.convert(m) for one in masses.coupled for row in one.masses for m in row], parameters), 0.0)
+    total = sum(evaluate([graph.convert(one.mass) for one in masses.bodies.values()], parameters), 0.0) + sum(
+        evaluate([graph.convert(m) for one in masses.coupled for row in one.masses for m in row], parameters), 0.0
+    )
     return Scales(length, time, (total or 1.0) * length / time**2)

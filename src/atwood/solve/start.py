@@ -233,7 +233,9 @@ def _explain_positions(
 
 
 def _raise_contradiction(fixed: Sequence[_Target], missing: FloatArray, equations: Equations) -> None:
-    failing = [f"{target.path} = {target.value:g}" for target, miss in zip(fixed, missing, strict=True) if abs(miss) > _MET]
+    failing = [
+        f"{target.path} = {target.value:g}" for target, miss in zip(fixed, missing, strict=True) if abs(miss) > _MET
+    ]
     names = failing or [f"{target.path} = {target.value:g}" for target in fixed]
     where = next((t.path for t, m in zip(fixed, missing, strict=True) if abs(m) > _MET), fixed[0].path if fixed else "")
     raise StartError(
@@ -264,7 +266,9 @@ def _solve_speeds(
     if missing.size:
         rows = row_scales(matrix, scales)
         speed = max([1e-300, *(abs(x.value) / s for x, s in zip(level.fixed, rows[len(rates) :], strict=True))])
-        if not float(np.max(np.abs(missing / rows))) <= 1e-9 * max(speed, float(np.max(np.abs(u / scales), initial=0.0))):
+        if not float(np.max(np.abs(missing / rows))) <= 1e-9 * max(
+            speed, float(np.max(np.abs(u / scales), initial=0.0))
+        ):
             _raise_contradiction(level.fixed, (missing / rows)[len(rates) :] / speed, equations)
         matrix = matrix * scales / rows[:, None]
     return u, *_counted(equations, level.fixed, len(rates), matrix)
@@ -282,7 +286,7 @@ def _counted(
     _, sizes, directions = np.linalg.svd(matrix)
     rank = int(np.sum(sizes > 1e-9 * max(sizes[0], 1e-300))) if sizes.size else 0
     open_directions = directions[rank:]
-    free = tuple(n for i, n in enumerate(names) if open_directions.size and np.max(np.abs(open_directions[:, i])) > 1e-6)
+    free = tuple(
+        n for i, n in enumerate(names) if open_directions.size and np.max(np.abs(open_directions[:, i])) > 1e-6
+    )
     return free, repeated
-
-

@@ -131,6 +131,7 @@ def _orientations(
     needed: set[int] = set()
     locks: list[tuple[tuple[str, str, int], set[int]]] = []
     for path, local in locals_.items():
+
         def body(name: str, path: str = path) -> int:
             return body_of[graph.node_of[(path, name)]]
 

@@ -149,7 +149,7 @@ def grow_forest(
             if constraint.law.name not in joint.local.law.options.solves:
                 continue
             by_position = reads_position(local, constraint)
-            if (id(joint) in hung if by_position else id(joint) in locked):
+            if id(joint) in hung if by_position else id(joint) in locked:
                 solved.add((joint.part, constraint.law.name, constraint.index))
     cycles: nx.MultiGraph[int] = nx.MultiGraph()
     cycles.add_nodes_from(range(len(bodies.bodies)))
@@ -174,9 +174,7 @@ def _between(joint: Joint, bodies: Bodies) -> bool:
 class _Grower:
     """Collects attachments, orientations and coordinates while a forest grows."""
 
-    def __init__(
-        self, graph: MechanismGraph, bodies: Bodies, locals_: Mapping[str, LocalPart], space: Space
-    ) -> None:
+    def __init__(self, graph: MechanismGraph, bodies: Bodies, locals_: Mapping[str, LocalPart], space: Space) -> None:
         self.graph, self.bodies, self.locals, self.space = graph, bodies, locals_, space
         self.coordinates: list[Coordinate] = []
         self.attachments: list[Attachment] = []
@@ -308,6 +306,4 @@ def _unit_of(local: LocalPart, path: str) -> str:
     for law in local.part.component.laws("observable"):
         if law.name == name:
             return str(law.options.unit)
-    raise DeclarationError(
-        f"the joint coordinate {name!r} is not an observable of the part", where=local.part.path
-    )
+    raise DeclarationError(f"the joint coordinate {name!r} is not an observable of the part", where=local.part.path)

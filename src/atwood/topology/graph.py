@@ -120,9 +120,7 @@ def build_graph(flat: FlatScene, locals_: Mapping[str, LocalPart]) -> MechanismG
         If a connection names a connector that does not exist.
     """
     nodes, node_of = _nodes(flat)
-    joints = tuple(
-        _joint(path, local, joint, node_of) for path, local in locals_.items() for joint in local.joints
-    )
+    joints = tuple(_joint(path, local, joint, node_of) for path, local in locals_.items() for joint in local.joints)
     network: nx.MultiGraph[int] = nx.MultiGraph()
     network.add_nodes_from((node.index, {"name": node.name}) for node in nodes)
     network.add_edges_from((joint.a, joint.b, {"joint": joint}) for joint in joints)
