@@ -1,0 +1,1 @@
+"""Forms: residuals of both forms as programs, and the assembled scene."""
