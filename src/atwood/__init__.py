@@ -204,7 +204,7 @@ def __dir__() -> list[str]:
 
 
 class _Package(ModuleType):
-    """The package itself: where a public function and a package within have one name, that name stands for the function.
+    """The package itself: where a function and a package within share a name, that is the function.
 
     `atwood.report` is the function; what else its package holds is had with ``from atwood.report import ...``.
     """

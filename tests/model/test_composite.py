@@ -1,4 +1,3 @@
-# ruff: noqa: RUF012  (class bodies of models hold lists and dictionaries)
 import copy
 import pickle
 

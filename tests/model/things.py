@@ -1,4 +1,3 @@
-# ruff: noqa: RUF012  (class bodies of models hold lists and dictionaries)
 """Components, models and scenes that the tests of this folder share; at module level, so that they can be stored."""
 
 from itertools import pairwise
