@@ -1,5 +1,6 @@
 """What a chain costs grows linearly with its length."""
 
+import itertools
 import time
 
 import pytest
@@ -16,7 +17,7 @@ def operations(links: int, form: str) -> int:
 def test_operations_grow_linearly(form: str) -> None:
     # well above the size up to which rows are rewritten as by hand
     counts = [operations(links, form) for links in (20, 30, 40, 50)]
-    steps = [b - a for a, b in zip(counts, counts[1:], strict=False)]
+    steps = [b - a for a, b in itertools.pairwise(counts)]
     assert len(set(steps)) == 1
     # a link costs a sine, a cosine, two accelerations and its share of the balance
     assert steps[0] / 10 < (32 if form == "reduced" else 40)
