@@ -1,0 +1,1 @@
+"""Mechanics: placements, inertia, forces, equations of motion, and what can be observed."""

@@ -108,7 +108,7 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
         if solution:
             placements = _substituted(placements, solution)
             values = [(path, c, substitute([v], solution)[0]) for path, c, v in values if v is not _SOLVED]
-            gone = {symbol for symbol in solution}
+            gone = set(solution)
             eliminated = [c.name for c, s in zip(forest.coordinates, q, strict=True) if s in gone]
             names = [c for c, s in zip(forest.coordinates, q, strict=True) if s not in gone]
             q = tuple(s for s in q if s not in gone)

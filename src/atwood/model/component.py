@@ -12,6 +12,7 @@ from atwood.model.binding import Binding
 from atwood.model.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
 from atwood.model.fields import MISSING, Deferred, Field, ParameterSpec, SignalSpec
 from atwood.model.laws import Kind, Law
+from atwood.model.quantities import Quantity
 from atwood.model.vector import Vector, dot, norm
 
 __all__ = ["Binding", "Component", "bind"]
@@ -107,6 +108,16 @@ class Component:
         except Exception:
             object.__setattr__(self, "_settings", before)
             raise
+
+    def __getattr__(self, name: str) -> Quantity:
+        """Return a reaction, which no method computes, as a quantity."""
+        for law in self.laws("constraint") if not name.startswith("_") else ():
+            if name in {reaction.split(".")[0] for reaction in law.options.reactions}:
+                return Quantity(self, name, law.options.unit, law.options.doc)
+        for law in self.laws("joint") if name in ("force", "torque") else ():
+            if law.options.rigid and law.options.reaction_doc:
+                return Quantity(self, name, "N" if name == "force" else "N*m", law.options.reaction_doc)
+        raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
 
     def __delattr__(self, name: str) -> None:
         raise UsageError(f"{name!r} cannot be taken away", where=self.path or type(self).__name__)

@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeVar
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.model.connectors import Frame, Point
+from atwood.model.quantities import ObservableLaw
 from atwood.model.units import parse_si_unit
 from atwood.model.vector import ZERO, Vector
 
@@ -296,7 +297,8 @@ def observable(
             known = self._known_observable(name)
             return function(self) if known is None else known
 
-        return _mark(read, Law("observable", name, ObservableOptions(unit, doc, periodic, tuple(spaces))))  # type: ignore[return-value]
+        law = Law("observable", name, ObservableOptions(unit, doc, periodic, tuple(spaces)))
+        return ObservableLaw(read, law)  # type: ignore[return-value]
 
     return decorate
 

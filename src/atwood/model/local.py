@@ -35,7 +35,7 @@ class ParameterTable:
         """Return the symbol of a parameter, or the plain number if it shapes the program (exact zero, structural)."""
         if structural or value == 0.0:
             return self.graph.constant(float(value))
-        symbol = self.graph.symbol(name)
+        symbol = self.graph.parameter(name)
         self.values[symbol] = float(value)
         return symbol
 

@@ -16,6 +16,7 @@ from atwood.errors import ResultError, suggestion
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.power import applied_power
+from atwood.model.quantities import Quantity
 from atwood.result.angles import unwrap
 from atwood.result.energy import EnergyLedger, make_ledger
 from atwood.solve.driver import Statistics
@@ -112,7 +113,7 @@ class Result:
     def __contains__(self, path: str) -> bool:
         return path in self.assembly.observables
 
-    def __getitem__(self, path: str) -> FloatArray | dict[str, FloatArray]:
+    def __getitem__(self, path: str | Quantity) -> FloatArray | dict[str, FloatArray]:
         """Return a quantity at the output times, or all quantities below a path.
 
         Raises
@@ -120,6 +121,7 @@ class Result:
         ResultError
             If there is nothing at this path.
         """
+        path = str(path)
         if path in self:
             return self.samples(path)[self._shown]
         below = [one for one in self.paths if one.startswith(f"{path}.")]
@@ -228,9 +230,7 @@ class Result:
             kinetic.append(energies[0])
             potential.append(energies[1])
             power.append(self._power(segment, state, idle))
-        return make_ledger(
-            [segment.time for segment in self.run.segments], kinetic, potential, power, self._shown
-        )
+        return make_ledger([segment.time for segment in self.run.segments], kinetic, potential, power, self._shown)
 
     def _power(
         self, segment: Segment, state: tuple[FloatArray, ...], idle: tuple[FloatArray, ...]

@@ -189,7 +189,7 @@ class _Grower:
             at.setdefault(self.bodies.body_of[joint.b], []).append((joint, True))
         dimension = len(self.space.basis)
         cheapest = {body: min(len(j.moves) for j, _ in around) for body, around in at.items()}
-        frontier = [entry for entry in at.get(0, [])]
+        frontier = list(at.get(0, []))
         waiting = [body.index for body in self.bodies.bodies if not body.is_fixed]
         while True:
             best: tuple[tuple[int, int, int], Joint, bool] | None = None
