@@ -1,4 +1,4 @@
-"""The scikit-sundae driver: right answers, exact times, and no way to lose a state."""
+"""Both drivers of IDA: right answers, exact times, and no way to lose a state."""
 
 import math
 import os
@@ -16,11 +16,31 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from atwood.errors import KernelEvaluationError, StartError, UsageError
-from atwood.solve.driver import Budget, ImplicitProblem, SolverOptions, Statistics, Status, choose_linear_solver
-from atwood.solve.ida_sundae import SundaeSession, open_session
+from atwood.solve import ida_native, ida_sundae
+from atwood.solve.driver import (
+    Budget,
+    ImplicitProblem,
+    OpenSession,
+    SolverOptions,
+    Statistics,
+    Status,
+    choose_linear_solver,
+)
 
 TIGHT = SolverOptions(relative_tolerance=1e-9, absolute_tolerances=1e-11)
 LOOSE = SolverOptions(relative_tolerance=1e-5, absolute_tolerances=1e-7)
+
+DRIVERS: dict[str, OpenSession] = {"scikit-sundae": ida_sundae.open_session, "native": ida_native.open_session}
+open_session = DRIVERS["scikit-sundae"]
+
+
+@pytest.fixture(autouse=True, params=DRIVERS)
+def driver(request: Any, monkeypatch: Any) -> str:
+    """Each test runs with each driver."""
+    if request.param == "native" and not ida_native.available():
+        pytest.skip(ida_native.why_not())
+    monkeypatch.setitem(globals(), "open_session", DRIVERS[request.param])
+    return str(request.param)
 
 
 def dense_pattern(size: int) -> tuple[Any, Any]:
@@ -65,7 +85,7 @@ def scalar(rate: Rate, slope: Rate) -> ImplicitProblem:
     )
 
 
-def start(problem: ImplicitProblem, options: SolverOptions, y: Any, yp: Any, **more: Any) -> SundaeSession:
+def start(problem: ImplicitProblem, options: SolverOptions, y: Any, yp: Any, **more: Any) -> Any:
     return open_session(problem, options, 0.0, np.array(y, dtype=float), np.array(yp, dtype=float), **more)
 
 
@@ -351,10 +371,11 @@ class TestLimits:
         assert capfd.readouterr() == ("", "")
 
     @pytest.mark.skipif(os.name == "nt", reason="signals differ")
-    def test_ctrl_c_ends_a_run_in_another_process(self) -> None:
+    def test_ctrl_c_ends_a_run_in_another_process(self, driver: str) -> None:
         here = Path(__file__).resolve()
         script = (
             "import os, signal, sys, threading; sys.path.insert(0, sys.argv[1]); import test_ida_driver as tests\n"
+            "tests.open_session = tests.DRIVERS[sys.argv[2]]\n"
             "session = tests.start(tests.oscillator(), tests.LOOSE, [1, 0], [0, -1])\n"
             "session.advance(1.0)\n"
             f"threading.Timer(0.1, os.kill, (os.getpid(), {int(signal.SIGINT)})).start()\n"
@@ -363,7 +384,7 @@ class TestLimits:
         )
         path = os.pathsep.join(str(here.parents[2] / part) for part in ("src", "library"))
         done = subprocess.run(
-            [sys.executable, "-W", "error", "-c", script, str(here.parent)],
+            [sys.executable, "-W", "error", "-c", script, str(here.parent), driver],
             env={**os.environ, "PYTHONPATH": path},
             capture_output=True,
             text=True,

@@ -1,0 +1,51 @@
+"""How long IDA is left alone, and whether it gets on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import inf
+
+from atwood.solve.event_watch import ROUNDING
+from atwood.solve.ida_sundae import STALLED_STEPS
+
+__all__ = ["Pace"]
+
+MOMENT = 0.02
+"""IDA is left alone for about so long, in seconds."""
+
+FIRST_CHUNK, LARGEST_CHUNK = 20, 1_000_000
+"""How many steps IDA is left alone for: at first, and at most."""
+
+
+@dataclass
+class Pace:
+    """How many steps IDA is left alone for, and whether they still move the time.
+
+    Attributes
+    ----------
+    chunk
+        The number of steps.
+    allowed
+        What IDA was told last.
+    mark
+        A time, and the number of steps until then, from which it is judged whether the time still moves.
+    """
+
+    chunk: int = FIRST_CHUNK
+    allowed: int = 0
+    mark: tuple[float, int] = field(default=(-inf, 0))
+
+    def learn(self, seconds: float, used_up: bool) -> None:
+        """Come closer to a chunk that takes a moment."""
+        if seconds > 2 * MOMENT:
+            self.chunk = max(1, int(self.chunk * MOMENT / seconds))
+        elif used_up and seconds < 0.5 * MOMENT:
+            self.chunk = min(2 * self.chunk, LARGEST_CHUNK)
+
+    def stalls(self, t: float, steps: int) -> bool:
+        """Tell whether the last steps have moved the time by no more than rounding."""
+        since, count = self.mark
+        if t - since > 4 * ROUNDING * abs(t) * (steps - count):
+            self.mark = t, steps
+            return False
+        return steps - count >= STALLED_STEPS

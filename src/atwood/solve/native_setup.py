@@ -1,0 +1,135 @@
+"""From a problem and its options to IDA's memory, ready for the first step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.errors import UsageError
+from atwood.solve.driver import FloatArray, ImplicitProblem, LinearSolver, NativeCallbacks, SolverOptions
+from atwood.solve.event_watch import State
+from atwood.solve.native_callbacks import Record, address, jacobian_function, residual_function, weight_function
+from atwood.solve.native_memory import IdaMemory
+from atwood.solve.sundials_library import library
+
+__all__ = ["IdaTuning", "prepare"]
+
+
+@dataclass(frozen=True, eq=False)
+class IdaTuning:
+    """What IDA can be told beyond the options that all drivers have.
+
+    Parameters
+    ----------
+    suppress_algebraic
+        Leave the algebraic unknowns out of the error test.  They still count in Newton's iteration.
+    newton_coefficient
+        How small the error of Newton's iteration must be, as a share of the error that a step may have.
+    angle_like
+        Unknowns whose error is allowed as a share of `angle_size` instead of their own value: angles that go round
+        and round, or anything else whose zero means nothing.
+    angle_size
+        That size; one for all of these unknowns, or one for each.
+    stop_time
+        A time that IDA never steps over, because the equations end or change there.
+    """
+
+    suppress_algebraic: bool = False
+    newton_coefficient: float = 0.33
+    angle_like: tuple[int, ...] = ()
+    angle_size: FloatArray | float = 1.0
+    stop_time: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.newton_coefficient < np.inf:
+            raise UsageError(f"newton_coefficient must be positive and finite, not {self.newton_coefficient}")
+        if not np.all(np.asarray(self.angle_size) > 0.0):
+            raise UsageError("angle_size must be positive")
+        if self.stop_time is not None and not np.isfinite(self.stop_time):
+            raise UsageError(f"stop_time must be finite, not {self.stop_time}")
+
+
+def prepare(
+    problem: ImplicitProblem,
+    options: SolverOptions,
+    tuning: IdaTuning,
+    linear_solver: LinearSolver,
+    native: NativeCallbacks | None,
+    record: Record,
+    state: State,
+) -> IdaMemory:
+    """Return IDA's memory at a start.
+
+    Parameters
+    ----------
+    problem, options, tuning
+        What to solve, and how.
+    linear_solver
+        The one that was chosen.
+    native
+        Compiled functions; without them the Python functions are called back.
+    record
+        Takes up what goes wrong in Python functions.
+    state
+        The start.
+    """
+    sundials = library()
+    memory = IdaMemory(sundials, problem.size)
+    if native is None:
+        residual = residual_function(problem, record, sundials)
+        jacobian = jacobian_function(problem, record, sundials, linear_solver)
+        memory.keep(residual, jacobian)
+        native = NativeCallbacks(address(residual), address(jacobian))
+    else:
+        memory.keep(native)
+    memory.y[:], memory.yp[:] = state[1:]
+    memory.begin(native.residual, state[0], native.user_data)
+    _set_weights(memory, problem, options, tuning, native, record)
+    memory.set_linear_solver(linear_solver, len(problem.pattern[0]), native.jacobian)
+    if problem.algebraic:
+        kinds = np.ones(problem.size)
+        kinds[list(problem.algebraic)] = 0.0
+        memory.call("IDASetId", memory.vector(kinds)[1])
+        memory.call("IDASetSuppressAlg", int(tuning.suppress_algebraic))
+    memory.call("IDASetNonlinConvCoef", tuning.newton_coefficient)
+    memory.call("IDASetMaxOrd", options.max_order)
+    if options.first_step is not None:
+        memory.call("IDASetInitStep", options.first_step)
+    if options.max_step is not None:
+        memory.call("IDASetMaxStep", options.max_step)
+    return memory
+
+
+def _set_weights(
+    memory: IdaMemory,
+    problem: ImplicitProblem,
+    options: SolverOptions,
+    tuning: IdaTuning,
+    native: NativeCallbacks,
+    record: Record,
+) -> None:
+    """Tell IDA which error each unknown may have."""
+    n, share = problem.size, options.relative_tolerance
+    try:
+        absolute = np.broadcast_to(np.asarray(options.absolute_tolerances, dtype=np.float64), (n,)).copy()
+    except ValueError:
+        raise UsageError(f"give one absolute tolerance, or one for each of the {n} unknowns") from None
+    fixed = list(tuning.angle_like)
+    if not all(0 <= index < n for index in fixed):
+        raise UsageError(f"the angle-like unknowns must lie in 0..{n - 1}")
+    absolute[fixed] += share * np.asarray(tuning.angle_size)
+    if len(set(fixed)) in (0, n):
+        # Then the weights are of the kind that IDA computes itself.
+        memory.call("IDASVtolerances", 0.0 if fixed else share, memory.vector(absolute)[1])
+        return
+    relative = np.full(n, share)
+    relative[fixed] = 0.0
+    weights = native.weights
+    if weights and native.set_weights is not None:
+        native.set_weights(relative, absolute)
+    else:
+        function = weight_function(relative, absolute, record, memory.library)
+        memory.keep(function)
+        weights = address(function)
+    memory.call("IDAWFtolerances", weights)
