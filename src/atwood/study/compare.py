@@ -1,0 +1,248 @@
+"""Speed against error: one scene in both forms, at several tolerances, against a reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from atwood.errors import AtwoodError, UsageError, suggestion
+from atwood.forms.dae import LEVELS
+from atwood.model.composite import Model
+from atwood.model.flatten import FlatScene, flatten
+from atwood.pipeline import FORMS, assemble_flat
+from atwood.result.about import solver_name
+from atwood.study.reference import Reference, find_reference, run_flat, scaled_difference
+from atwood.study.verdict import judge
+
+__all__ = ["Comparison", "ComparisonRow", "Reference", "compare"]
+
+TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
+
+
+@dataclass(frozen=True)
+class ComparisonRow:
+    """One run of a comparison.
+
+    Attributes
+    ----------
+    form, level
+        Form, and level of the dae form.
+    solver
+        Name of the solver.
+    rtol
+        Relative tolerance.
+    error
+        Largest scaled difference from the reference, in positions of bodies and angles.
+    wall_s
+        Time spent integrating, s.
+    steps
+        Steps of the solver.
+    energy_drift
+        See `atwood.result.energy.EnergyLedger`.
+    constraint_drift
+        By how much the constraints are missed by what the run gives, relative to the scene's sizes.
+    constraint_held
+        The same for the solver's own states, before projection.
+    within_reference
+        Whether the error is not larger than ten times the reference's own.
+    reason
+        Why there are no numbers; empty if there are.
+    """
+
+    form: str
+    level: str
+    solver: str
+    rtol: float
+    error: float | None = None
+    wall_s: float | None = None
+    steps: int | None = None
+    energy_drift: float | None = None
+    constraint_drift: float | None = None
+    constraint_held: float | None = None
+    within_reference: bool = False
+    reason: str = ""
+
+    @property
+    def label(self) -> str:
+        """Form and level in words."""
+        return f"{self.form} ({self.level})" if self.level else self.form
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What each form costs for which error.
+
+    Attributes
+    ----------
+    scene
+        Name of the scene.
+    t_end
+        Time of the end, s.
+    reference
+        What the errors are measured against.
+    rows
+        One for each form, level and tolerance.
+    """
+
+    scene: str
+    t_end: float
+    reference: Reference
+    rows: tuple[ComparisonRow, ...]
+
+    @property
+    def verdict(self) -> str:
+        """What the comparison says, in one line."""
+        return judge((row.label, row.error, row.wall_s) for row in self.rows if not row.reason)
+
+    def __str__(self) -> str:
+        head = f"{'form':<24}{'rtol':>8}{'error':>10}{'ms':>10}{'steps':>8}{'energy':>10}{'constraint':>12}"
+        lines = [f"{self.scene} to t = {self.t_end:g} s, against {self.reference.description}", "", head]
+        for row in self.rows:
+            if row.reason:
+                lines.append(f"{row.label:<24}{row.rtol:>8.0e}  {row.reason}")
+                continue
+            numbers = (row.error, 1e3 * (row.wall_s or 0.0), row.steps, row.energy_drift, row.constraint_drift)
+            error, wall, steps, energy, drift = (float(number or 0.0) for number in numbers)
+            mark = "*" if row.within_reference else " "
+            lines.append(
+                f"{row.label:<24}{row.rtol:>8.0e}{error:>9.1e}{mark}{wall:>10.1f}{steps:>8.0f}{energy:>10.1e}{drift:>12.1e}"
+            )
+        return "\n".join([*lines, "", self.verdict])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the comparison as plain data."""
+        reference = self.reference
+        return {
+            "scene": self.scene,
+            "t_end": self.t_end,
+            "reference": {
+                "kind": reference.kind,
+                "description": reference.description,
+                "error": reference.error,
+                "note": reference.note,
+                "quantities": list(reference.quantities),
+            },
+            "rows": [dict(vars(row)) for row in self.rows],
+            "verdict": self.verdict,
+        }
+
+    def plot(self, file: Any = None) -> Any:
+        """Draw the work-precision diagram, and return the figure.
+
+        Parameters
+        ----------
+        file
+            Where to save it; its suffix says how.
+        """
+        from importlib import import_module  # views stand above studies, and are looked up when one is wanted
+
+        return import_module("atwood.view.precision").plot_comparison(self, file)
+
+
+def compare(
+    scene: Model,
+    *,
+    t_end: float | None = None,
+    rtols: Sequence[float] = TOLERANCES,
+    forms: Sequence[str] = FORMS,
+    levels: Sequence[str] = ("ggl", "index1-projected", "index1"),
+    outputs: int = 101,
+    max_seconds: float | None = 60.0,
+    name: str | None = None,
+    progress: Callable[[str, int, int], object] | None = None,
+) -> Comparison:
+    """Run a scene in both forms at several tolerances, and measure what each costs for which error.
+
+    Parameters
+    ----------
+    scene
+        The scene. Where its class has a method ``closed_form(t)`` that gives trajectories by path, and its start is
+        the one that the closed form belongs to, errors are measured against that; else against a solution that is far
+        more accurate.
+    t_end
+        Time of the end, s; the scene's own if not given.
+    rtols
+        Relative tolerances.
+    forms, levels
+        Forms, and levels of the dae form.
+    outputs
+        Number of output times at which errors are measured.
+    max_seconds
+        Limit of each run.
+    name
+        What to call the scene.
+    progress
+        Called with what is being done, how many runs are done, and of how many.
+
+    Returns
+    -------
+    Comparison
+        A row for each run; a run that fails stays in it, with the reason.
+
+    Raises
+    ------
+    SolveError
+        If no reference could be found.
+    UsageError
+        If a form, a level or a tolerance makes no sense.
+    """
+    flat = flatten(scene, name)
+    _check(forms, levels, rtols)
+    kinds = list(_kinds(flat, forms, levels))
+    total = len(kinds) * len(rtols) + 2
+    watch = progress or (lambda what, done, of: None)
+    end = flat.t_end if t_end is None else float(t_end)
+    reference = find_reference(scene, flat, end, outputs, max_seconds, lambda what: watch(what, 0, total))
+    rows: list[ComparisonRow] = []
+    for form, level in kinds:
+        for rtol in sorted(rtols, reverse=True):
+            row = ComparisonRow(form, level, solver_name(), rtol)
+            watch(f"{row.label} at rtol {rtol:g}", len(rows) + 2, total)
+            rows.append(_measure(flat, row, reference, max_seconds))
+    return Comparison(flat.name, float(reference.time[-1]), reference, tuple(rows))
+
+
+def _check(forms: Sequence[str], levels: Sequence[str], rtols: Sequence[float]) -> None:
+    for word, known in [*((form, FORMS) for form in forms), *((level, LEVELS) for level in levels)]:
+        if word not in known:
+            raise UsageError(f"there is no {word!r} to compare", advice=suggestion(word, known))
+    if not rtols or not all(0.0 < rtol < 1.0 for rtol in rtols):
+        raise UsageError("tolerances must lie between 0 and 1")
+
+
+def _kinds(flat: FlatScene, forms: Sequence[str], levels: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield forms with their levels; without constraints the levels of the dae form are all one."""
+    if "reduced" in forms:
+        yield "reduced", ""
+    if "dae" in forms:
+        has_constraints = bool(assemble_flat(flat, form="dae").maximal.constraints)
+        yield from (("dae", level) for level in (levels if has_constraints else levels[:1]))
+
+
+def _measure(flat: FlatScene, row: ComparisonRow, reference: Reference, max_seconds: float | None) -> ComparisonRow:
+    """Make one run, and return its row with numbers, or with the reason why there are none."""
+    blank = (row.form, row.level, row.solver, row.rtol)
+    end = float(reference.time[-1])
+    try:
+        result = run_flat(flat, row.form, row.level or "ggl", row.rtol, end, reference.time, max_seconds)
+    except AtwoodError as problem:
+        return ComparisonRow(*blank, reason=problem.message)
+    if result.status != "finished" or len(result.time) != len(reference.time):
+        return ComparisonRow(*blank, reason=result.message or result.status.replace("_", " "))
+    error = scaled_difference(reference.quantities, result.table(reference.quantities), reference.scales)
+    missed = result.constraint_max
+    if not np.isfinite(error):
+        return ComparisonRow(*blank, reason="the motion is not finite")
+    return ComparisonRow(
+        *blank,
+        error=error,
+        wall_s=result.statistics.seconds,
+        steps=result.statistics.steps,
+        energy_drift=result.energy.max_drift,
+        constraint_drift=max(missed["position"], missed["velocity"]),
+        constraint_held=max(missed["held_position"], missed["held_velocity"]),
+        within_reference=error <= 10.0 * reference.error,
+    )

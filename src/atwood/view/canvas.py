@@ -1,0 +1,114 @@
+"""Figures: how they look, and how they reach a file."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from atwood.errors import UsageError
+from atwood.result.files import check_directory, write_atomically
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["COLOURS", "GREY", "INK", "check_picture", "new_figure", "polish", "save_figure"]
+
+COLOURS = ("#2a6fbb", "#d1495b", "#2e9e6b", "#c98a1b", "#7b5ea7", "#3aa6b9", "#8a6d5a", "#d46ba3")
+"""Told apart by most readers, and in print."""
+
+INK, GREY = "#22303c", "#8d99a6"
+
+SUFFIXES = (".png", ".svg", ".pdf")
+
+
+def check_picture(file: str | os.PathLike[str], suffixes: tuple[str, ...] = SUFFIXES) -> None:
+    """Refuse a picture that could not be made, before the work is done.
+
+    Parameters
+    ----------
+    file
+        Where it would go.
+    suffixes
+        What can be made.
+
+    Raises
+    ------
+    UsageError
+        If matplotlib is missing, the suffix is not known or there is no such directory.
+    """
+    _need_matplotlib()
+    target = Path(file)
+    if target.suffix.lower() not in suffixes:
+        problem = f"the suffix {target.suffix!r} is not known" if target.suffix else "the name has no suffix"
+        raise UsageError(problem, where=str(file), advice=f"Use {' or '.join(suffixes)}.")
+    check_directory(target)
+
+
+def _need_matplotlib() -> None:
+    try:
+        found = importlib.util.find_spec("matplotlib") is not None
+    except ValueError:  # it stands in the table of modules as missing
+        found = False
+    if not found:
+        raise UsageError("pictures need matplotlib, which is not installed", advice="pip install 'atwood[plot]'")
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure that belongs to no window.
+
+    Parameters
+    ----------
+    width, height
+        Size in inches.
+
+    Raises
+    ------
+    UsageError
+        If matplotlib is missing.
+    """
+    _need_matplotlib()
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained", facecolor="white")
+
+
+def polish(axes: Axes, x_label: str = "", y_label: str = "") -> None:
+    """Give axes a quiet frame and their labels.
+
+    Parameters
+    ----------
+    axes
+        The axes.
+    x_label, y_label
+        Labels.
+    """
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(GREY)
+    axes.tick_params(colors=INK, labelsize=9, length=3, color=GREY)
+    axes.grid(True, color="#e6eaee", linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.set_xlabel(x_label, color=INK, fontsize=10)
+    axes.set_ylabel(y_label, color=INK, fontsize=10)
+
+
+def save_figure(figure: Figure, file: str | os.PathLike[str]) -> Path:
+    """Save a figure; the suffix says how.
+
+    Parameters
+    ----------
+    figure
+        The figure.
+    file
+        Where to.
+    """
+    check_picture(file)
+    target = Path(file)
+    # Without a date in it, the same picture is the same file.
+    metadata: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(target.suffix.lower(), {})
+    write_atomically(target, lambda part: figure.savefig(part, dpi=160, metadata=metadata))
+    return target

@@ -1,0 +1,211 @@
+"""The mechanism itself: rods, links, springs, ropes, pulleys and masses, at a few times or moving."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import UsageError
+from atwood.result.files import write_atomically
+from atwood.result.result import Result
+from atwood.view.canvas import INK, check_picture, new_figure, save_figure
+from atwood.view.geometry import Picture, make_picture
+from atwood.view.strokes import Pen, draw_trace
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["animate", "plot_mechanism"]
+
+FloatArray = NDArray[np.float64]
+
+
+def plot_mechanism(
+    result: Result, file: str | os.PathLike[str] | None = None, times: Sequence[float] | None = None
+) -> Figure:
+    """Draw the mechanism at a few times, with the paths of its masses.
+
+    In the plane all times are drawn in one picture, earlier ones fainter; on a line they stand side by side.
+
+    Parameters
+    ----------
+    result
+        The run.
+    file
+        Where to save the picture (``.png``, ``.svg`` or ``.pdf``).
+    times
+        Times, s; four of the run when not given. The output times nearest to them are drawn.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+
+    Raises
+    ------
+    UsageError
+        If matplotlib is missing, a time lies outside the run, or the picture cannot be saved.
+    UnsupportedError
+        If the scene is spatial.
+    """
+    picture = make_picture(result)
+    moments = _moments(result, times)
+    if picture.direction:
+        figure = _draw_apart(result, picture, moments)
+    else:
+        figure = _draw_together(result, picture, moments)
+    if file is not None:
+        save_figure(figure, file)
+    return figure
+
+
+def _moments(result: Result, times: Sequence[float] | None) -> list[int]:
+    """Return the numbers of the output times that are drawn."""
+    if times is None:
+        return sorted({round(share * (len(result.time) - 1)) for share in (0.0, 0.3, 0.65, 1.0)})
+    first, last = float(result.time[0]), float(result.time[-1])
+    slack = 1e-9 * (last - first)
+    for time in times:
+        if not first - slack <= time <= last + slack:
+            raise UsageError(f"t = {time:g} s lies outside the run, {first:g} to {last:g} s")
+    return sorted({int(np.argmin(np.abs(result.time - time))) for time in times})
+
+
+def _draw_together(result: Result, picture: Picture, moments: Sequence[int]) -> Figure:
+    """Draw all times in one picture, with traces."""
+    shown = slice(0, moments[-1] + 1)
+    figure, axes, pen = _page(picture, shown)
+    _draw_traces(axes, picture, pen, shown)
+    for rank, moment in enumerate(moments):
+        share = 1.0 if len(moments) == 1 else rank / (len(moments) - 1)
+        pen.draw(axes, moment, alpha=0.16 + 0.84 * share**1.5, depth=3 + rank)
+    times = ", ".join(f"{result.time[i]:.3g}" for i in moments)
+    axes.set_title(f"{_name(result)}, t = {times} s", loc="left", fontsize=11, color=INK)
+    return figure
+
+
+def _draw_traces(axes: Axes, picture: Picture, pen: Pen, shown: slice) -> None:
+    """Draw the paths of all masses, older parts fainter."""
+    free = [s for s in pen.heavy if s.nodes[0] not in pen.sliding]
+    moving = [s for s in free if np.max(np.ptp(picture.points[s.nodes[0]], axis=0)) > 1e-3 * picture.extent]
+    chosen = moving if len(moving) <= _TRACES else moving[-1:]
+    for shape in chosen:
+        draw_trace(axes, picture.points[shape.nodes[0]][shown], pen.colour(shape))
+
+
+_TRACES = 4
+"""With more moving masses than this, only the last one's path is drawn."""
+
+
+def _draw_apart(result: Result, picture: Picture, moments: Sequence[int]) -> Figure:
+    """Draw times side by side, or one below the other for a line that goes across."""
+    lows, highs = _bounds(picture)
+    width, height = highs - lows
+    count = len(moments)
+    if picture.direction == "up":
+        size = 5.2
+        figure = new_figure(max(2.6, count * size * width / height), size)
+        panels = figure.subplots(1, count, squeeze=False, sharey=True)[0]
+    else:
+        size = 8.0
+        figure = new_figure(size, count * (size * height / width + 0.35))
+        panels = figure.subplots(count, 1, squeeze=False, sharex=True)[:, 0]
+    pen = Pen(picture)
+    for axes, moment in zip(panels, moments, strict=True):
+        _frame(axes, lows, highs)
+        pen.draw(axes, moment, alpha=1.0, depth=3)
+        axes.set_title(f"t = {result.time[moment]:.3g} s", fontsize=10, color=INK)
+    figure.suptitle(_name(result), x=0.01, ha="left", fontsize=11, color=INK)
+    return figure
+
+
+def animate(
+    result: Result, file: str | os.PathLike[str], seconds: float | None = None, frames_per_second: int = 25
+) -> Path:
+    """Save the motion as an animated picture.
+
+    Parameters
+    ----------
+    result
+        The run.
+    file
+        Where to (``.gif``).
+    seconds
+        How long it plays; as long as the run took in its own time when not given, but at most twenty seconds.
+    frames_per_second
+        Frames in a second.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    UsageError
+        If matplotlib is missing or the file cannot be saved.
+    """
+    check_picture(file, (".gif",))
+    from matplotlib.animation import FuncAnimation, PillowWriter
+
+    picture = make_picture(result)
+    lasting = min(float(result.time[-1] - result.time[0]), 20.0) if seconds is None else seconds
+    count = max(2, round(lasting * frames_per_second))
+    wanted = np.linspace(result.time[0], result.time[-1], count)
+    moments = [int(np.argmin(np.abs(result.time - time))) for time in wanted]
+    figure, axes, pen = _page(picture, None)
+    lows, highs = _bounds(picture)
+
+    def show(number: int) -> list[object]:
+        axes.clear()
+        _frame(axes, lows, highs)
+        if not picture.direction:
+            _draw_traces(axes, picture, pen, slice(0, moments[number] + 1))
+        pen.draw(axes, moments[number], alpha=1.0, depth=3)
+        axes.set_title(f"{_name(result)}, t = {wanted[number]:.2f} s", loc="left", fontsize=11, color=INK)
+        return []
+
+    figure.set_layout_engine("none")
+    motion = FuncAnimation(figure, show, frames=count, blit=False)  # type: ignore[arg-type]
+    writer = PillowWriter(fps=frames_per_second)
+    write_atomically(Path(file), lambda part: motion.save(str(part), writer=writer, dpi=80))
+    return Path(file)
+
+
+def _name(result: Result) -> str:
+    return result.assembly.flat.name
+
+
+def _page(picture: Picture, shown: slice | None) -> tuple[Figure, Axes, Pen]:
+    """Return an empty page that what is shown of the motion fits on."""
+    lows, highs = _bounds(picture, shown)
+    width, height = highs - lows
+    scale = 7.0 / max(width, height)
+    figure = new_figure(max(3.6, scale * width), max(2.4, scale * height + 0.4))
+    axes = figure.subplots()
+    _frame(axes, lows, highs)
+    return figure, axes, Pen(picture)
+
+
+def _bounds(picture: Picture, shown: slice | None = None) -> tuple[FloatArray, FloatArray]:
+    """Return the corners of a page that holds all places of the run, or of a part of it."""
+    everything = np.concatenate([points if shown is None else points[shown] for points in picture.points.values()])
+    margin = 0.09 * picture.extent
+    side = max(picture.radii.values(), default=0.0)
+    lows, highs = np.min(everything, axis=0) - margin, np.max(everything, axis=0) + margin
+    lows[0], highs[0] = lows[0] - 0.3 * side, highs[0] + 0.3 * side
+    highs[1] += side
+    return lows, highs
+
+
+def _frame(axes: Axes, lows: FloatArray, highs: FloatArray) -> None:
+    axes.set_xlim(float(lows[0]), float(highs[0]))
+    axes.set_ylim(float(lows[1]), float(highs[1]))
+    axes.set_aspect("equal")
+    axes.set_axis_off()

@@ -1,0 +1,206 @@
+"""Where everything is, and what it looks like: shapes of parts, found from their laws and not from their names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import UnsupportedError
+from atwood.expr import Expression, Scalar, evaluate
+from atwood.mechanics.build import Mechanism
+from atwood.model.connectors import Groove
+from atwood.model.local import LocalPart
+from atwood.result.result import Result
+from atwood.view.columns import spread_columns
+
+__all__ = ["Kind", "Picture", "Shape", "make_picture"]
+
+FloatArray = NDArray[np.float64]
+Kind = Literal["ground", "rod", "link", "spring", "damper", "rope", "mass", "pulley", "rail", "pivot"]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a part looks like.
+
+    Attributes
+    ----------
+    part
+        Its path.
+    kind
+        How it is drawn.
+    nodes
+        Between which nodes, in order.
+    size
+        Mass of a mass, kg; zero otherwise.
+    """
+
+    part: str
+    kind: Kind
+    nodes: tuple[int, ...]
+    size: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A mechanism on the page along a run.
+
+    Attributes
+    ----------
+    time
+        Times, s.
+    points
+        Place of each node on the page, shape (times, 2).
+    shapes
+        What to draw.
+    direction
+        For a scene on a line: ``"across"`` or ``"up"``; empty in the plane.
+    radii
+        On a vertical line: radius of each pulley by its groove's node.
+    """
+
+    time: FloatArray
+    points: Mapping[int, FloatArray]
+    shapes: tuple[Shape, ...]
+    direction: str
+    radii: Mapping[int, float]
+
+    @property
+    def extent(self) -> float:
+        """The larger side of what is drawn."""
+        everything = np.concatenate(list(self.points.values()))
+        return float(np.max(np.ptp(everything, axis=0))) or 1.0
+
+
+def make_picture(result: Result) -> Picture:
+    """Return where everything is on the page along a run.
+
+    Parameters
+    ----------
+    result
+        The run.
+
+    Raises
+    ------
+    UnsupportedError
+        If the scene is spatial.
+    """
+    mechanism = result.assembly.mechanism
+    if mechanism.space.name == "space":
+        raise UnsupportedError("a spatial scene cannot be drawn yet", advice="Plot its quantities over time.")
+    shapes = _shapes(mechanism)
+    points = _node_points(result)
+    used = {node for shape in shapes for node in shape.nodes}
+    points = {node: values for node, values in points.items() if node in used}
+    direction = ""
+    radii: dict[int, float] = {}
+    if mechanism.space.line is not None:
+        axis = mechanism.space.line
+        direction = "up" if abs(float(axis.z)) > abs(float(axis.x)) else "across"
+        if direction == "up":
+            ropes = [shape.nodes for shape in shapes if shape.kind == "rope"]
+            others = [shape.nodes for shape in shapes if shape.kind != "rope" and len(shape.nodes) > 1]
+            heights = np.concatenate([values[:, 1] for values in points.values()])
+            columns, places, radii = spread_columns(
+                ropes, others, mechanism.bodies.body_of, 0.11 * float(np.ptp(heights) or 1.0)
+            )
+            for node, values in points.items():
+                values[:, 0] = places.get(node, columns.get(mechanism.bodies.body_of[node], 0.0))
+            _place_grounds(mechanism, shapes, points, columns)
+    return Picture(result.time, points, tuple(shapes), direction, radii)
+
+
+def _place_grounds(
+    mechanism: Mechanism, shapes: list[Shape], points: dict[int, FloatArray], columns: Mapping[int, float]
+) -> None:
+    """Put what is fixed in the column of what hangs on it."""
+    for shape in shapes:
+        if shape.kind == "pulley" and mechanism.bodies.body_of[shape.nodes[0]] == 0:
+            points[shape.nodes[1]][:, 0] = points[shape.nodes[0]][:, 0]
+            continue
+        for one, other in zip(shape.nodes, shape.nodes[1:], strict=False):
+            for node, partner in ((one, other), (other, one)):
+                body, beside = mechanism.bodies.body_of[node], mechanism.bodies.body_of[partner]
+                if body == 0 and beside != 0 and shape.kind != "rope":
+                    points[node][:, 0] = columns.get(beside, 0.0)
+
+
+def _node_points(result: Result) -> dict[int, FloatArray]:
+    """Return x and z of every node at the output times."""
+    pieces = []
+    for segment in result.run.segments:
+        assembly, mechanism = segment.assembly, segment.assembly.mechanism
+        positions = assembly.equations.kinematics.placements.positions
+        nodes = sorted(positions)
+        expressions = []
+        for node in nodes:
+            where = mechanism.space.vector(tuple(positions[node]))
+            expressions += [mechanism.table.graph.convert(where.x), mechanism.table.graph.convert(where.z)]
+        program = assembly.state_program("places", expressions)
+        idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
+        kernel = assembly.kernel(program, vectorized=True)
+        values = kernel(segment.time[None, :], segment.coordinates, segment.speeds, *idle)[0]
+        pieces.append(np.asarray(values)[:, segment.shown])
+    whole = np.concatenate(pieces, axis=1)
+    return {node: whole[2 * i : 2 * i + 2].T.copy() for i, node in enumerate(nodes)}
+
+
+def _shapes(mechanism: Mechanism) -> list[Shape]:
+    """Return the shapes of all parts, those that are drawn first in front."""
+    found: list[Shape] = []
+    for path, local in mechanism.locals_.items():
+        found += _shapes_of(mechanism, path, local)
+    order: tuple[Kind, ...] = ("ground", "rail", "rope", "spring", "damper", "link", "rod", "pulley", "pivot", "mass")
+    return sorted(found, key=lambda shape: order.index(shape.kind))
+
+
+def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]:
+    """Return what a part looks like, from what its laws do."""
+    kinds = local.part.component.connectors()
+    nodes = {name: mechanism.graph.node_of[path, name] for name in kinds}
+    ends = [nodes[name] for name, one in kinds.items() if not isinstance(one, Groove)]
+    grooves = [nodes[name] for name, one in kinds.items() if isinstance(one, Groove)]
+    masses = [one for one in local.point_inertias if len(one.points) == 1]
+    weight = sum(_value(mechanism, one.masses[0][0]) for one in masses)
+    joints = [joint.law.options for joint in local.joints]
+    if any(options.rigid and options.a == "world" for options in joints):
+        return [Shape(path, "ground", tuple(ends))]
+    if grooves and any(options.rigid for options in joints):
+        return [Shape(path, "pulley", (grooves[0], *ends[:1]), weight)]
+    if len(ends) == 2:
+        return _between(mechanism, path, local, (ends[0], ends[1]), grooves)
+    if masses and ends:
+        rail = [Shape(path, "rail", (0, ends[0]))] if joints and mechanism.space.name == "plane" else []
+        return [*rail, Shape(path, "mass", (ends[0],), weight)]
+    return []
+
+
+def _between(
+    mechanism: Mechanism, path: str, local: LocalPart, ends: tuple[int, int], grooves: list[int]
+) -> list[Shape]:
+    """Return what a part with two ends looks like."""
+    joints = list(local.joints)
+    if grooves or (local.constraints and not joints):
+        return [Shape(path, "rope", (ends[0], *grooves, ends[1]))]
+    if any(joint.law.options.rigid for joint in joints):
+        return [Shape(path, "link", ends)]
+    if local.potentials or local.dissipations:
+        turns = all(symbols.angle is not None for symbols in local.connectors.values())
+        if turns:
+            return []  # a torsion spring acts where its frames meet
+        return [Shape(path, "spring" if local.potentials else "damper", ends)]
+    if joints:
+        shifts = [c for joint in joints for c in joint.placement.displacement]
+        if all(not isinstance(c, Expression) and c == 0.0 for c in shifts):
+            return [Shape(path, "pivot", (ends[1],))]
+        is_rod = any(joint.placement.axes == "world" and joint.placement.rotation is None for joint in joints)
+        return [Shape(path, "rod" if is_rod else "rail", ends)]
+    return []
+
+
+def _value(mechanism: Mechanism, value: Scalar) -> float:
+    return float(evaluate([mechanism.table.graph.convert(value)], mechanism.table.values)[0])
