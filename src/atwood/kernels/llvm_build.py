@@ -1,0 +1,180 @@
+"""From programs to loaded machine code, by way of the cache."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from atwood.expr.operations import ExternalFunction
+from atwood.kernels.cache import Cache, default_cache, make_key
+from atwood.kernels.llvm_engine import (
+    LoadedCode,
+    compile_text,
+    load_code,
+    require_symbols,
+    sincos_name,
+    target_description,
+)
+from atwood.kernels.llvm_module import CodeOptions, ModuleText, Part, write_module
+
+__all__ = ["Built", "Failures", "build_code", "default_options"]
+
+_GENERATOR = 1
+"""Counts changes to the generated code that do not show in the files of this directory."""
+
+_SMALL = 20_000
+"""Beyond so many nodes LLVM's quickest level is used: it takes a sixth of the time, for code that is a tenth slower."""
+
+
+class Failures(threading.local):
+    """The exception that a function in Python raised inside compiled code, in each thread.
+
+    Attributes
+    ----------
+    error
+        The exception, or None.
+    """
+
+    error: BaseException | None = None
+
+    def take(self) -> BaseException | None:
+        """Return the exception and forget it."""
+        error, self.error = self.error, None
+        return error
+
+
+@dataclass(frozen=True)
+class Built:
+    """Code that is ready to be called.
+
+    Attributes
+    ----------
+    code
+        The functions in memory.
+    scratch
+        The length of the scratch array that they need.
+    from_cache
+        Whether nothing had to be compiled.
+    failures
+        What functions in Python raised, if the code calls any.
+    """
+
+    code: LoadedCode
+    scratch: int
+    from_cache: bool
+    failures: Failures | None
+
+
+def default_options(parts: Sequence[Part]) -> CodeOptions:
+    """Return how to compile programs of this size on this machine."""
+    size = sum(part.program.size for part in parts)
+    return CodeOptions(level=1 if size <= _SMALL else 0, sincos=sincos_name())
+
+
+def build_code(
+    parts: Sequence[Part],
+    options: CodeOptions,
+    *,
+    more: str = "",
+    exports: Sequence[str] = (),
+    library: Sequence[str] = (),
+    cached: bool = True,
+) -> Built:
+    """Compile programs, or take them from the cache.
+
+    Parameters
+    ----------
+    parts
+        The programs.
+    options
+        How to compile them.
+    more
+        Further functions in LLVM's language that call these.
+    exports
+        The names of those functions.
+    library
+        The functions of the C library that they call.
+    cached
+        Whether to use the cache.  Programs that call functions in Python are never kept: their names do not say
+        what they do.
+    """
+    names = [*exports, *(name for part in parts for name in (part.name, f"{part.name}_prologue"))]
+    has_externals = any(node.operation == "external" for part in parts for node in part.program.nodes)
+    store = default_cache() if cached and not has_externals else None
+    key = _key(parts, options, more) if store else ""
+    if store is not None:
+        found = _from_cache(store, key, names)
+        if found is not None:
+            return found
+    module = write_module(parts, options, more)
+    functions = (*module.library, *library)
+    code = compile_text(module.text, options.level)
+    failures = Failures() if module.externals else None
+    callbacks = _callbacks(module, failures) if failures is not None else {}
+    addresses = {name: ctypes.cast(call, ctypes.c_void_p).value or 0 for name, call in callbacks.items()}
+    loaded = load_code(code, names, require_symbols(functions) | addresses, tuple(callbacks.values()))
+    if store is not None:
+        about = {"scratch": module.scratch, "library": functions}
+        store.write(key, json.dumps(about).encode() + b"\n" + code)
+    return Built(loaded, module.scratch, False, failures)
+
+
+def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
+    """Return what the cache holds, or None if it holds nothing that can be used."""
+    content = store.read(key)
+    if content is None:
+        return None
+    line, _, code = content.partition(b"\n")
+    try:
+        about = json.loads(line)
+        loaded = load_code(code, names, require_symbols(about["library"]))
+        return Built(loaded, int(about["scratch"]), True, None)
+    except (ValueError, KeyError, TypeError, RuntimeError):
+        return None
+
+
+def _key(parts: Sequence[Part], options: CodeOptions, more: str) -> str:
+    programs = [(part.name, part.program.digest, part.positions) for part in parts]
+    return make_key([_GENERATOR, _sources(), programs, options, more, target_description()])
+
+
+@cache
+def _sources() -> str:
+    """Return a hash of the files that write code, so that no change to them goes unnoticed."""
+    total = sha256()
+    for path in sorted(Path(__file__).parent.glob("llvm_*.py")):
+        try:
+            total.update(path.read_bytes())
+        except OSError:
+            continue
+    return total.hexdigest()
+
+
+def _callbacks(module: ModuleText, failures: Failures) -> dict[str, Any]:
+    """Return the functions in Python as functions in C."""
+    found: dict[str, Any] = {}
+    for position, (function, count) in enumerate(module.externals):
+        signature = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * count)
+        found[f"external.{position}"] = signature(_guard(function, failures))
+    return found
+
+
+def _guard(function: ExternalFunction, failures: Failures) -> Callable[..., float]:
+    """Return a function that raises nothing: an exception cannot pass through compiled code."""
+    call = function.function
+
+    def guarded(*arguments: float) -> float:
+        try:
+            return float(call(*arguments))
+        except BaseException as error:
+            failures.error = error
+            return float("nan")
+
+    return guarded

@@ -1,0 +1,181 @@
+"""LLVM itself: from a module's text to object code, and from object code to functions that can be called.
+
+Object code is what the cache keeps; loading it needs none of LLVM's work on code.  Names of the C library are bound
+to addresses when code is loaded, so that object code holds nothing of the process that made it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import itertools
+import sys
+import threading
+from collections.abc import Iterable, Mapping
+from functools import cache
+
+import llvmlite
+from llvmlite import binding
+
+from atwood.errors import UnsupportedError
+
+__all__ = [
+    "LoadedCode",
+    "compile_text",
+    "find_symbol",
+    "load_code",
+    "require_symbols",
+    "sincos_name",
+    "target_description",
+]
+
+_lock = threading.Lock()
+_numbers = itertools.count()
+
+
+class LoadedCode:
+    """Machine code in memory; it stays there as long as this object lives.
+
+    Parameters
+    ----------
+    tracker
+        What keeps the code in memory.
+    kept
+        What else the code needs: functions of Python that it calls.
+
+    Attributes
+    ----------
+    addresses
+        The addresses of the exported functions.
+    """
+
+    def __init__(
+        self, tracker: binding.ResourceTracker, addresses: Mapping[str, int], kept: tuple[object, ...]
+    ) -> None:
+        self._tracker = tracker
+        self._kept = kept
+        self.addresses = dict(addresses)
+
+
+def compile_text(text: str, level: int) -> bytes:
+    """Return the object code of a module.
+
+    Parameters
+    ----------
+    text
+        The module in LLVM's language.
+    level
+        How hard LLVM works on the machine code, from 0 to 3.
+    """
+    with _lock:
+        context = binding.create_context()
+        module = binding.parse_assembly(text, context)
+        found: bytes = _machine(level).emit_object(module)
+        return found
+
+
+def load_code(
+    code: bytes, names: Iterable[str], imports: Mapping[str, int], kept: tuple[object, ...] = ()
+) -> LoadedCode:
+    """Put object code into memory, ready to be called.
+
+    Parameters
+    ----------
+    code
+        The object code.
+    names
+        The functions to export.
+    imports
+        The addresses of the functions that it calls.
+    kept
+        Kept alive together with the code.
+
+    Raises
+    ------
+    RuntimeError
+        If the code is no object code of this machine, or lacks one of the functions.
+    """
+    names = tuple(names)
+    builder = binding.JITLibraryBuilder().add_object_img(code)
+    for name, address in imports.items():
+        builder.import_symbol(name, address)
+    for name in names:
+        builder.export_symbol(name)
+    with _lock:
+        tracker = builder.link(_linker(), f"atwood.{next(_numbers)}")
+    return LoadedCode(tracker, {name: tracker[name] for name in names}, kept)
+
+
+@cache
+def find_symbol(name: str) -> int | None:
+    """Return the address of a function of the C library, or None if there is none of that name."""
+    found = binding.address_of_symbol(name)
+    if found:
+        return int(found)
+    for library in _libraries():
+        try:
+            return ctypes.cast(getattr(library, name), ctypes.c_void_p).value
+        except AttributeError:
+            continue
+    return None
+
+
+def require_symbols(names: Iterable[str]) -> dict[str, int]:
+    """Return the addresses of functions of the C library.
+
+    Raises
+    ------
+    UnsupportedError
+        If one of them is not there.
+    """
+    addresses: dict[str, int] = {}
+    for name in names:
+        address = find_symbol(name)
+        if address is None:
+            raise UnsupportedError(f"the C library of this system has no function {name}")
+        addresses[name] = address
+    return addresses
+
+
+@cache
+def sincos_name() -> str:
+    """Return the C library's function for sine and cosine together, or an empty text if it has none."""
+    name = "__sincos" if sys.platform == "darwin" else "sincos"
+    return name if find_symbol(name) else ""
+
+
+@cache
+def target_description() -> tuple[str, ...]:
+    """Return everything about this machine and LLVM that changes object code."""
+    version = ".".join(map(str, binding.llvm_version_info))
+    features = binding.get_host_cpu_features().flatten()
+    return (llvmlite.__version__, version, binding.get_process_triple(), binding.get_host_cpu_name(), features)
+
+
+@cache
+def _machine(level: int) -> binding.TargetMachine:
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    _, _, triple, cpu, features = target_description()
+    target = binding.Target.from_triple(triple)
+    return target.create_target_machine(cpu=cpu, features=features, opt=level, jit=True, codemodel="jitdefault")
+
+
+@cache
+def _linker() -> binding.LLJIT:
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    return binding.create_lljit_compiler()
+
+
+@cache
+def _libraries() -> tuple[ctypes.CDLL, ...]:
+    """Return the libraries in which the C library's functions can be, where the process itself does not export them."""
+    names = ["ucrtbase", "msvcrt"] if sys.platform == "win32" else [ctypes.util.find_library("m") or ""]
+    found: list[ctypes.CDLL] = []
+    for name in names:
+        try:
+            found.append(ctypes.CDLL(name))
+        except OSError:
+            continue
+    return tuple(found)

@@ -1,0 +1,245 @@
+"""A module in LLVM's language from programs: a function for each chunk, and one that calls them in turn.
+
+Every function of a program has one signature in C::
+
+    int kernel(const double *const *inputs, const double *derived, double *scratch, double *const *outputs);
+
+with a pointer for each input and output group, and returns 1 if a result is not finite, else 0.  ``derived`` is
+what the program's second function computes once a run from the parameters::
+
+    void prologue(const double *parameters, double *derived, double *scratch);
+
+No array may overlap another.  Nothing is kept between calls, so that many threads can call one function at once,
+each with arrays of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from atwood.expr.graph import Expression
+from atwood.expr.operations import ExternalFunction
+from atwood.expr.program import Program
+from atwood.kernels.llvm_layout import Body, Layout, Unit, lay_out, main_body, prologue_body
+from atwood.kernels.llvm_solve import ROUTINES, Solver
+from atwood.kernels.llvm_text import LIBRARY_FUNCTIONS, Needs, Writer
+
+__all__ = ["CodeOptions", "ModuleText", "Part", "write_module"]
+
+_ARGUMENTS = (
+    "ptr noalias readonly %inputs, ptr noalias readonly %derived, ptr noalias %scratch, ptr noalias readonly %outputs"
+)
+_PASSED = "ptr %inputs, ptr %derived, ptr %scratch, ptr %outputs"
+
+
+@dataclass(frozen=True)
+class CodeOptions:
+    """What the generated code depends on besides the program.
+
+    Attributes
+    ----------
+    longest_chunk
+        The number of operations in one function.
+    level
+        How hard LLVM works on the machine code, from 0 to 3.
+    sincos
+        The C library's function for sine and cosine together, empty where it has none.
+    """
+
+    longest_chunk: int = 150
+    level: int = 1
+    sincos: str = ""
+
+
+@dataclass(frozen=True)
+class ModuleText:
+    """A module in LLVM's language.
+
+    Attributes
+    ----------
+    text
+        The module.
+    scratch
+        The length of the scratch array that suits all its functions.
+    library
+        The functions of the C library that it calls.
+    externals
+        The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
+    """
+
+    text: str
+    scratch: int
+    library: tuple[str, ...]
+    externals: tuple[tuple[ExternalFunction, int], ...]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One program of a module.
+
+    Attributes
+    ----------
+    name
+        Its functions are called ``name`` and ``name_prologue``.
+    program
+        What it computes.
+    positions
+        Where the results of the only output group go, if not one after the other.
+    """
+
+    name: str
+    program: Program
+    positions: tuple[int, ...] | None = None
+
+
+def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "") -> ModuleText:
+    """Write the two functions of each program.
+
+    Parameters
+    ----------
+    programs
+        What to compute.
+    options
+        What the code depends on.
+    more
+        Further functions, already written, that call these.
+    """
+    needs = Needs()
+    parts: list[str] = []
+    scratch = 0
+    for part in programs:
+        name, program = part.name, part.program
+        bodies = ((name, main_body(program, part.positions)), (f"{name}_values", prologue_body(program)))
+        for function, body in bodies:
+            layout = lay_out(body, options.longest_chunk)
+            scratch = max(scratch, layout.scratch)
+            parts.extend(_write_function(function, body, layout, options, needs))
+        parts.append(_write_prologue(name))
+    parts.append(more)
+    if needs.elimination:
+        parts.append(ROUTINES)
+    parts.extend(_declarations(needs, options.sincos))
+    return ModuleText("\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals))
+
+
+def _write_function(name: str, body: Body, layout: Layout, options: CodeOptions, needs: Needs) -> list[str]:
+    """Write the chunks of a body, and the function that calls them."""
+    places = {node.index: (pointer, k) for pointer, nodes in body.given for k, node in enumerate(nodes)}
+    places |= {index: ("scratch", slot) for index, slot in layout.slots.items()}
+    targets: dict[int, list[tuple[str, int]]] = {}
+    results: dict[int, Expression] = {}
+    for node, pointer, position in body.results:
+        targets.setdefault(node.index, []).append((pointer, position))
+        results[node.index] = node
+    solver = Solver(layout.regions)
+    parts: list[str] = []
+    for number, chunk in enumerate(layout.chunks):
+        writer = Writer(places, options.sincos, needs)
+        solver.start_chunk()
+        for unit in chunk:
+            _write_unit(writer, solver, unit)
+            for node in unit:
+                if node.index in layout.slots:
+                    writer.store(writer.value(node), "scratch", layout.slots[node.index])
+                if results.pop(node.index, None) is not None:
+                    _write_result(writer, node, targets[node.index])
+        if number == len(layout.chunks) - 1:
+            for node in results.values():
+                _write_result(writer, node, targets[node.index])
+        if len(layout.chunks) == 1:
+            return [_as_function(name, writer)]
+        parts.append(_as_chunk(f"{name}.{number}", writer))
+    parts.append(_write_calls(name, len(layout.chunks)))
+    return parts
+
+
+def _write_unit(writer: Writer, solver: Solver, unit: Unit) -> None:
+    node = unit[0]
+    if node.operation == "solve":
+        solver.write(writer, node, unit[1:])
+    elif len(unit) == 2:
+        sine, cosine = unit if node.operation == "sin" else (unit[1], node)
+        writer.write_wave(sine, cosine)
+    else:
+        writer.write(node)
+
+
+def _write_result(writer: Writer, node: Expression, targets: Sequence[tuple[str, int]]) -> None:
+    value = writer.value(node)
+    for pointer, position in targets:
+        writer.store(value, pointer, position)
+    writer.check(value)
+
+
+def _as_chunk(name: str, writer: Writer) -> str:
+    """Return a chunk as a function of its own, which returns zero if its results are finite."""
+    checked = writer.checked()
+    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *_opening(writer)]
+    return "\n".join([*start, *writer.lines, f"  ret double {checked}", "}"])
+
+
+def _as_function(name: str, writer: Writer) -> str:
+    """Return the only chunk of a body as the whole function."""
+    checked = writer.checked()
+    start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *_opening(writer)]
+    return "\n".join([*start, *writer.lines, *_ending(checked)])
+
+
+def _opening(writer: Writer) -> list[str]:
+    """Return the instructions that fetch the pointers that a chunk uses."""
+    lines = ["  %sine = alloca double", "  %cosine = alloca double"] if writer.waves else []
+    for pointer in sorted(writer.pointers):
+        for prefix, table in (("in", "inputs"), ("out", "outputs")):
+            if pointer.startswith(prefix):
+                place = f"%{pointer}.place"
+                lines.append(f"  {place} = getelementptr ptr, ptr %{table}, i64 {pointer.removeprefix(prefix)}")
+                lines.append(f"  %{pointer} = load ptr, ptr {place}, !invariant.load !0")
+    return lines
+
+
+def _ending(checked: str) -> list[str]:
+    """Return the end of a function: 1 if the sum of the checks is not zero."""
+    return [
+        f"  %undefined = fcmp une double {checked}, 0.0",
+        "  %code = zext i1 %undefined to i32",
+        "  ret i32 %code",
+        "}",
+    ]
+
+
+def _write_calls(name: str, count: int) -> str:
+    """Write the function that calls all chunks of a body."""
+    lines = [f"define i32 @{name}({_ARGUMENTS}) #0 {{"]
+    total = "0.0"
+    for k in range(count):
+        lines.append(f"  %c{k} = call double @{name}.{k}({_PASSED})")
+        lines.append(f"  %s{k} = fadd double {total}, %c{k}")
+        total = f"%s{k}"
+    return "\n".join([*lines, *_ending(total)])
+
+
+def _write_prologue(name: str) -> str:
+    """Write the function that computes what depends on parameters alone."""
+    return f"""define void @{name}_prologue(ptr noalias %parameters, ptr noalias %derived, ptr noalias %scratch) #0 {{
+  %inputs = alloca ptr
+  %outputs = alloca ptr
+  store ptr %parameters, ptr %inputs
+  store ptr %derived, ptr %outputs
+  %code = call i32 @{name}_values(ptr %inputs, ptr null, ptr %scratch, ptr %outputs)
+  ret void
+}}"""
+
+
+def _declarations(needs: Needs, sincos: str) -> list[str]:
+    """Return the declarations of what the module calls."""
+    arguments = dict(LIBRARY_FUNCTIONS.values())
+    lines = ["declare double @llvm.sqrt.f64(double)", "declare double @llvm.fabs.f64(double)"]
+    for name in sorted(needs.library):
+        if name == sincos:
+            lines.append(f"declare void @{name}(double, ptr, ptr) #0")
+        else:
+            lines.append(f"declare double @{name}({', '.join(['double'] * arguments[name])}) #0")
+    for position, (_, count) in enumerate(needs.externals):
+        lines.append(f"declare double @external.{position}({', '.join(['double'] * count)}) #0")
+    return [*lines, "attributes #0 = { nounwind }", "!0 = !{}"]
