@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,6 +149,15 @@ class _Recorder:
         self.held.append(held)
         return q, u
 
+    def close(self) -> float:
+        """Drop a sample that was not recorded to its end, show the last one, and return its time."""
+        lists: tuple[list[Any], ...] = (self.time, self.q, self.u, self.shown, self.held)
+        complete = min(len(one) for one in lists)
+        for one in lists:
+            del one[complete:]
+        self.shown[-1] = True
+        return self.time[-1]
+
     def segment(self) -> Segment:
         """Return what was recorded."""
         return Segment(
@@ -263,6 +273,24 @@ def _run_mode(
     if already is not None:
         return _Outcome(t, "event", "", already, Statistics())
     session = _open(plan, probe, options, t, y, yp, spent)
+    try:
+        return _integrate(plan, probe, recorder, session, times, shown, options)
+    except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
+        t = recorder.close()
+        return _Outcome(t, "interrupted", f"interrupted (at t = {t:.9g})", None, session.statistics)
+
+
+def _integrate(
+    plan: Plan,
+    probe: EventProbe,
+    recorder: _Recorder,
+    session: Session,
+    times: FloatArray,
+    shown: NDArray[np.bool_],
+    options: RunOptions,
+) -> _Outcome:
+    """Advance from sample to sample."""
+    n = plan.program.coordinates
     for moment, show in zip(times, shown, strict=True):
         advance = session.advance(float(moment))
         if advance.status is Status.FAILED and plan.review_dependent(advance.t, advance.y[:n]):
