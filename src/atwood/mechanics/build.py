@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from atwood.errors import DeclarationError, TopologyError, UnsupportedError
 from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, substitute
@@ -319,7 +319,8 @@ def resolve_signals(mechanism: Mechanism, site: Site, kinematics: Kinematics) ->
             continue  # a function of time, which is in place already
         local = mechanism.locals_[source]
         law, _, axis = observable.partition(".")
-        value = getattr(bind(local.part.component, local.binding), law)()
+        inputs = replace(local.binding, values={**local.binding.values, **local.signal_symbols})
+        value = getattr(bind(local.part.component, inputs), law)()
         if isinstance(value, Vector):
             if axis not in ("x", "y", "z"):
                 raise DeclarationError(
