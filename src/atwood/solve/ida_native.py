@@ -265,7 +265,7 @@ class NativeSession:
     def _arrive(self, t_out: float) -> Advance:
         if t_out > self._here[0]:
             state = self._interpolate(t_out)
-            if not (np.isfinite(state[1]).all() and np.isfinite(state[2]).all()):
+            if not _finite(state[1], state[2]):
                 self._stale = True
                 return self._stopped(Status.FAILED, "the solution is no longer finite")
             self._here = state
@@ -331,13 +331,15 @@ class NativeSession:
             pace.allowed = allowed
         began = time.perf_counter()
         flag, t = self._solve(t_out, TO_TIME)
-        pace.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
         self._newest, self._behind = None, True
+        pace.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
+        if flag >= 0:
+            self._reached = self._memory.time()
+            return None
         failure = self._judge(0 if flag == TOO_MUCH_WORK else flag, t)
         if failure is None:
-            self._reached = self._memory.time()
-            if flag == TOO_MUCH_WORK:
-                self._here = t, self._memory.y.copy(), self._memory.yp.copy()
+            self._reached = t
+            self._here = t, self._memory.y.copy(), self._memory.yp.copy()
         return failure
 
     def _solve(self, t_out: float, task: int) -> tuple[int, float]:
@@ -348,29 +350,44 @@ class NativeSession:
 
     def _judge(self, flag: int, t: float) -> Advance | None:
         """Return an answer if IDA has failed, or does not get on, after it went to a time."""
-        finite = bool(np.isfinite(self._memory.y).all() and np.isfinite(self._memory.yp).all())
+        finite = _finite(self._memory.y, self._memory.yp)
         if flag < 0:
             self._stale = True
             if finite and t > self._here[0]:
                 self._here = t, self._memory.y.copy(), self._memory.yp.copy()
             self._record.raise_again()
             if self._native is not None:
-                explain(self._problem, self._record, self._here[0], *self._memory.last_tried())
+                explain(self._problem, self._record, [(self._here[0], *self._memory.last_tried()), *self._ahead()])
             return self._stopped(Status.FAILED, REASONS.get(flag, f"IDA stopped with flag {flag}"))
         if not finite:
             self._stale = True
             return self._stopped(Status.FAILED, "the solution is no longer finite")
         if self._pace.stalls(t, self._memory.steps()):
             self._stale = True
-            return self._stopped(Status.FAILED, "the steps became too small to move the time")
+            if self._native is not None:
+                explain(self._problem, self._record, self._ahead())
+            return self._stopped(Status.FAILED, "the steps became too small to move the time", self._pace.mark[0])
         return None
 
-    def _stopped(self, status: Status, reason: str) -> Advance:
+    def _ahead(self) -> list[State]:
+        """Return states a little ahead on the tangent, where a wall that ended the run may be found."""
+        t, y, yp = self._here
+        return [(t + h, y + h * yp, yp) for h in (1e-9 * self._horizon, 1e-6 * self._horizon)]
+
+    def _stopped(self, status: Status, reason: str, since: float = inf) -> Advance:
+        """Return where the run ended, with a complaint that came after the last good step, or since a time."""
         t, record = self._here[0], self._record
         message, equation = f"{reason} (at t = {t:.9g})", None
-        if status is Status.FAILED and record.complaint and record.time >= t:
+        if status is Status.FAILED and record.complaint and record.time >= min(t, since):
             message, equation = f"{message}; {record.complaint}", record.equation
         return Advance(*_copied(self._here), status, self._no_events, message, equation)
+
+
+def _finite(y: FloatArray, yp: FloatArray) -> bool:
+    """Tell whether all values are finite; a sum of squares says so quickly, unless it overflows."""
+    if np.dot(y, y) + np.dot(yp, yp) < inf:
+        return True
+    return bool(np.isfinite(y).all() and np.isfinite(yp).all())
 
 
 def _copied(state: State) -> State:

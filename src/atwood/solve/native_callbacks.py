@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from ctypes import CFUNCTYPE, c_double, c_int, c_int32, c_int64, c_void_p
 from dataclasses import dataclass
 from math import inf
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from atwood.errors import KernelEvaluationError
 from atwood.solve.driver import FloatArray, ImplicitProblem, LinearSolver
+from atwood.solve.event_watch import State
 from atwood.solve.sundials_library import SundialsLibrary
 
 __all__ = [
@@ -297,7 +298,7 @@ class InterruptLater:
         self._record.interrupted = True
 
 
-def explain(problem: ImplicitProblem, record: Record, t: float, y: FloatArray, yp: FloatArray) -> None:
+def explain(problem: ImplicitProblem, record: Record, states: Iterable[State]) -> None:
     """Ask the Python residual what compiled functions cannot say: which equation has no value.
 
     Parameters
@@ -306,17 +307,19 @@ def explain(problem: ImplicitProblem, record: Record, t: float, y: FloatArray, y
         The equations.
     record
         Takes up the answer.
-    t, y, yp
-        Where to ask.
+    states
+        Where to ask; the first answer counts.
     """
     missing = record.missing
-    try:
-        values = np.asarray(problem.residual(t, y, yp), dtype=np.float64)
-    except NO_VALUE as error:
-        record.note(t, f"the residual has no value: {error}")
-    else:
+    for t, y, yp in states:
+        try:
+            values = np.asarray(problem.residual(t, y, yp), dtype=np.float64)
+        except NO_VALUE as error:
+            record.note(t, f"the residual has no value: {error}")
+            break
         finite = np.isfinite(values)
         if not finite.all():
             equation = int(finite.argmin())
             record.note(t, f"the residual of equation {equation} is {values[equation]}", equation)
+            break
     record.missing = missing
