@@ -151,7 +151,7 @@ def _as_scene(value: Any, file: Path, where: str) -> Model:
             value = value()
     if not isinstance(value, Model):
         raise UsageError(
-            f"it is a {type(value).__name__} and no scene",
+            f"this is no scene but of type {type(value).__name__}",
             where=where,
             advice="Name a Scene class, a scene, or a function without arguments that returns one.",
         )

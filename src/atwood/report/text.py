@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -51,11 +52,35 @@ def count_of(number: int, one: str, many: str = "") -> str:
 
 
 def shorten(names: Iterable[str], shown: int = _SHOWN) -> str:
-    """Return names with commas; of a long list the first ones, the last, and how many there are."""
+    """Return names with commas: arrays as ``rod[0..9]``, and of a long list the first ones, the last, and how many."""
     listed = list(names)
-    if len(listed) <= shown:
-        return ", ".join(listed)
-    return f"{', '.join(listed[: shown - 2])}, ... {listed[-1]} ({len(listed)} in all)"
+    short = list(_arrays(listed))
+    if len(short) <= shown:
+        return ", ".join(short)
+    return f"{', '.join(short[: shown - 2])}, ... {short[-1]} ({len(listed)} in all)"
+
+
+def _arrays(names: Sequence[str]) -> Iterator[str]:
+    """Yield names with the elements of an array that follow each other as one."""
+    run: list[tuple[str, int, str]] = []
+    for name in [*names, ""]:
+        match = _ELEMENT.match(name)
+        entry = (match[1], int(match[2]), match[3]) if match else None
+        if run and entry != (run[0][0], run[0][1] + len(run), run[0][2]):
+            if len(run) >= _ARRAY:
+                yield f"{run[0][0]}[{run[0][1]}..{run[-1][1]}]{run[0][2]}"
+            else:
+                yield from (f"{before}[{number}]{after}" for before, number, after in run)
+            run = []
+        if entry is not None:
+            run.append(entry)
+        elif name:
+            yield name
+
+
+_ELEMENT = re.compile(r"(.*?)\[(\d+)\](.*)$")
+_ARRAY = 4
+"""So many elements of an array are written as one."""
 
 
 def facts(report: MechanismReport) -> Iterator[tuple[str, str]]:

@@ -1,0 +1,34 @@
+"""Scenes that the tests of the command line give as files."""
+
+from atwood import Scene, connect
+from atwood_library import Ground, PointMass, Rod
+
+
+class Swing(Scene):
+    """A bob on a rod."""
+
+    ground: Ground = Ground()
+    rod: Rod = Rod(length=2.0)
+    bob: PointMass = PointMass(mass=3.0)
+    connections = [connect(ground.frame, rod.a), connect(rod.b, bob.point)]
+    start = {"rod.angle": 0.5, "rod.angular_velocity": 0.0}
+    t_end = 1.0
+
+
+def make():
+    print("this goes to standard error")
+    return Swing(gravity=1.0)
+
+
+def broken():
+    scene = Scene()
+    scene.add("rod", Rod(length=-1.0))  # line 25
+    return scene
+
+
+def raises():
+    return {}["missing"]  # line 30
+
+
+instance = Swing()
+number = 3

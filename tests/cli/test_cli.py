@@ -1,0 +1,321 @@
+"""The command line, mostly in this process."""
+
+import json
+import subprocess
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from atwood.cli import main
+from atwood.cli.output import strict
+from atwood.cli.scenes import GROUP
+from atwood.cli.summary import sparkline
+from atwood.result.files import load_result
+
+FILE = Path(__file__).with_name("scenes_for_tests.py")
+
+installed = pytest.mark.skipif(not entry_points(group=GROUP), reason="the library makes itself known when installed")
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, arguments, catch_exceptions=False)
+
+
+def run_json(*arguments: str) -> dict:
+    def refuse(name: str) -> float:
+        raise AssertionError(f"{name} is not strict JSON")
+
+    done = run(*arguments, "--json")
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout, parse_constant=refuse)
+
+
+# -- run ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("form", "level", "states", "multipliers"),
+    [("reduced", "", 2, []), ("dae", "ggl", 6, ["rod.fixed_distance"]), ("dae", "index1", 5, ["rod.fixed_distance"])],
+)
+def test_run_as_json(form: str, level: str, states: int, multipliers: list[str]) -> None:
+    choice = ["--form", form, *(["--level", level] if level else [])]
+    data = run_json("run", f"{FILE}:Swing", "--outputs", "11", *choice)
+    assert {
+        "scene", "form", "level", "degrees_of_freedom", "coordinates", "speeds", "multipliers", "states", "solver",
+        "start", "end", "energy", "constraint_max",
+    } <= data.keys()  # fmt: skip
+    assert (data["scene"], data["form"], data["level"]) == ("Swing", form, level)
+    assert data["degrees_of_freedom"] == 1
+    assert data["states"] == states
+    assert data["multipliers"] == multipliers
+    assert len(data["coordinates"]) == len(data["speeds"])
+    assert set(data["solver"]) == {"name", "steps", "residual_evaluations", "jacobian_evaluations", "wall_s"}
+    assert data["solver"]["steps"] > 10
+    assert set(data["energy"]) >= {"start", "end", "max_drift"}
+    assert data["energy"]["max_drift"] < 1e-5
+    assert data["constraint_max"] < (1e-12 if level != "index1" else 1e-5)
+    assert data["start"]["rod.angle"] == pytest.approx(0.5)
+    assert data["asked"]["rtol"] == 1e-8
+    assert {"atwood", "scikit-sundae", "sundials", "numpy", "python"} <= data["versions"].keys()
+
+
+def test_both_forms_give_the_same_paths_and_agree() -> None:
+    one = run_json("run", f"{FILE}:Swing", "--rtol", "1e-10")
+    other = run_json("run", f"{FILE}:Swing", "--rtol", "1e-10", "--form", "dae")
+    assert one["end"].keys() == other["end"].keys()
+    for path, value in one["end"].items():
+        assert other["end"][path] == pytest.approx(value, abs=1e-6), path
+
+
+def test_parameters_and_start_values_can_be_set_with_units() -> None:
+    data = run_json(
+        "run", f"{FILE}:Swing", "--set", "rod.length=50 cm", "--set", "gravity=0", "--start", "rod.angle=30 deg",
+        "--start", "rod.angular_velocity=2", "--t-end", "1.5",
+    )  # fmt: skip
+    assert data["end"]["rod.angle"] == pytest.approx(np.pi / 6.0 + 3.0, abs=1e-6)
+    assert data["end"]["rod.tension"] == pytest.approx(3.0 * 0.5 * 4.0, rel=1e-6)
+    assert data["t_end"] == 1.5
+    assert data["asked"]["set"] == ["rod.length=50 cm", "gravity=0"]
+
+
+def test_a_run_is_shown_as_text() -> None:
+    done = run("run", f"{FILE}:Swing", "--form", "dae")
+    assert done.exit_code == 0
+    for word in ("Swing, dae form (ggl)", "1 degree of freedom", "SUNDIALS IDA", "rod.tension", "before projection"):
+        assert word in done.stdout
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("suffix", ["nc", "npz", "csv"])
+def test_a_run_is_saved(tmp_path: Path, suffix: str) -> None:
+    file = tmp_path / f"swing.{suffix}"
+    data = run_json("run", f"{FILE}:Swing", "--outputs", "5", "--save", str(file))
+    saved = load_result(file)
+    assert len(saved.time) == 5
+    assert saved["rod.angle"][-1] == data["end"]["rod.angle"]
+
+
+def test_a_run_is_plotted(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    file = tmp_path / "swing.svg"
+    assert run("run", f"{FILE}:Swing", "--plot", str(file)).exit_code == 0
+    assert "<svg" in file.read_text(encoding="utf-8")
+
+
+def test_a_limit_ends_a_run_early_and_says_so() -> None:
+    data = run_json("run", f"{FILE}:Swing", "--max-steps", "10")
+    assert data["status"] == "step_limit"
+    assert data["t_end"] < 1.0
+    assert "out of steps" in run("run", f"{FILE}:Swing", "--max-steps", "10").stdout
+
+
+# -- where scenes come from --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["Swing", "make", "instance"])
+def test_a_scene_can_be_a_class_a_function_or_an_instance(name: str) -> None:
+    data = run_json("run", f"{FILE}:{name}", "--outputs", "2")
+    assert data["scene"] == name
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("broken", [":25", "-1", "length"]),
+        ("raises", [":30", "KeyError"]),
+        ("number", ["no scene"]),
+        ("Swng", ["Swng", "'Swing'"]),
+    ],
+)
+def test_errors_in_a_file_are_placed(name: str, parts: list[str]) -> None:
+    done = run("run", f"{FILE}:{name}")
+    assert done.exit_code == 1
+    assert done.stdout == ""
+    assert done.stderr.startswith("Error: ")
+    assert len(done.stderr.splitlines()) == 1
+    for part in parts:
+        assert part in done.stderr
+
+
+def test_a_file_that_is_not_python(tmp_path: Path) -> None:
+    file = tmp_path / "bad.py"
+    file.write_text("x = 1\ny = (\n", encoding="utf-8")
+    done = run("info", f"{file}:x")
+    assert done.exit_code == 1
+    assert "bad.py:2" in done.stderr
+
+
+def test_a_file_with_two_scenes_must_say_which(tmp_path: Path) -> None:
+    file = tmp_path / "two.py"
+    file.write_text("from atwood import Scene\nclass A(Scene): ...\nclass B(Scene): ...\n", encoding="utf-8")
+    done = run("info", str(file))
+    assert done.exit_code == 1
+    assert "A, B" in done.stderr
+    assert run("info", str(FILE.with_name("nothing.py"))).exit_code == 1
+
+
+@installed
+def test_an_unknown_scene_gets_a_near_match() -> None:
+    done = run("run", "simple-pendlum")
+    assert done.exit_code == 1
+    assert "simple-pendulum" in done.stderr
+    assert "atwood list" in run("run", "xyzzy").stderr
+
+
+def test_errors_are_json_too() -> None:
+    done = run("run", f"{FILE}:Swing", "--set", "bob.mas=1", "--json")
+    assert done.exit_code == 1
+    error = json.loads(done.stdout)["error"]
+    assert set(error) == {"message", "where", "advice"}
+    assert "mas" in error["message"]
+    assert "mass" in error["advice"]
+    assert done.stderr.startswith("Error: ")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--t-end", "-1"],
+        ["--rtol", "2"],
+        ["--set", "rod.length=nan"],
+        ["--set", "rod.length=-1"],
+        ["--set", "rod.length"],
+        ["--start", "rod.angle=x"],
+        ["--start", "rod.angel=1"],
+        ["--start", "bob.position.x=7"],
+        ["--save", "result.xyz"],
+        ["--save", "no/such/directory/result.nc"],
+        ["--plot", "result"],
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_one(arguments: list[str]) -> None:
+    done = run("run", f"{FILE}:Swing", *arguments)
+    assert done.exit_code == 1
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("arguments", [["run"], ["rnu"], ["run", "x", "--form", "dea"], ["run", "x", "--outputs", "1"]])
+def test_bad_usage_is_exit_code_two(arguments: list[str]) -> None:
+    assert run(*arguments).exit_code == 2
+
+
+# -- list, info, compare -----------------------------------------------------------------------------------------------
+
+
+@installed
+def test_list() -> None:
+    assert "double-pendulum" in run("list").stdout
+    scenes = run_json("list")["scenes"]
+    assert {"simple-pendulum", "four-bar"} <= {one["name"] for one in scenes}
+    assert all(one["summary"] for one in scenes)
+
+
+def test_info() -> None:
+    data = run_json("info", f"{FILE}:Swing")
+    assert data["degrees_of_freedom"] == 1
+    assert data["constraints"] == 1
+    assert data["loops"] == 0
+    assert data["bodies"] == ["bob"]
+    assert data["joints"] == ["rod"]
+    assert data["coordinates"] == ["rod.angle"]
+    assert data["redundant"] == data["merged"] == data["dropped"] == []
+    assert data["states"] == {"reduced": 2, "dae": 6}
+    assert data["operations"]["reduced"]["sin"] == 1
+    text = run("info", f"{FILE}:Swing").stdout
+    assert "1 degree of freedom" in text
+    assert "rod.length" in text
+
+
+def test_compare(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    file = tmp_path / "compare.png"
+    arguments = ["compare", f"{FILE}:Swing", "--t-end", "0.5", "--rtol", "1e-4", "--rtol", "1e-6"]
+    data = run_json(*arguments, "--plot", str(file))
+    assert len(data["rows"]) == 8
+    for row in data["rows"]:
+        assert {
+            "form", "level", "solver", "rtol", "error", "wall_s", "steps", "energy_drift", "constraint_drift",
+        } <= row.keys()  # fmt: skip
+    assert file.stat().st_size > 1000
+    text = run(*arguments).stdout
+    assert "Errors are against" in text
+    assert "index1-projected" in text
+
+
+# -- the process -------------------------------------------------------------------------------------------------------
+
+
+def python(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, check=False, env=environment())
+
+
+def environment() -> dict[str, str]:
+    import os
+
+    root = Path(__file__).resolve().parents[2]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(root / "src"), str(root / "library")])}
+
+
+HEAVY = ("sympy", "scipy", "matplotlib", "sksundae", "networkx")
+
+
+def test_starting_imports_nothing_heavy() -> None:
+    done = python("-c", f"import sys, atwood.cli; print([m for m in {HEAVY} if m in sys.modules])")
+    assert done.stdout.strip() == "[]", done.stderr
+
+
+@pytest.mark.parametrize("command", [["--help"], ["run", "--help"], ["--version"], ["list"]])
+def test_help_imports_nothing_heavy(command: list[str]) -> None:
+    done = python("-X", "importtime", "-m", "atwood.cli", *command)
+    assert done.returncode == 0, done.stderr
+    loaded = {line.rpartition("|")[2].strip().split(".")[0] for line in done.stderr.splitlines()}
+    assert "click" in loaded
+    assert not loaded & set(HEAVY)
+
+
+def test_the_package_is_a_command() -> None:
+    done = python("-m", "atwood", "--help")
+    assert done.returncode == 0
+    assert done.stdout.startswith("Usage: atwood ")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
+def test_ctrl_c_shows_and_saves_what_is_done(tmp_path: Path) -> None:
+    file = tmp_path / "part.npz"
+    script = (
+        "import os, signal, threading\n"
+        "from atwood.cli import main\n"
+        "import atwood.pipeline as pipeline\n"
+        "inner = pipeline.run\n"
+        "def run(*arguments):\n"
+        "    threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()\n"
+        "    return inner(*arguments)\n"
+        "pipeline.run = run\n"
+        f"main(['run', {str(FILE) + ':Swing'!r}, '--t-end', '1e6', '--json', '--save', {str(file)!r}])\n"
+    )
+    done = python("-c", script)
+    assert done.returncode == 130, done.stderr
+    data = json.loads(done.stdout)
+    assert data["status"] == "interrupted"
+    assert 0.0 < data["t_end"] < 1e6
+    assert load_result(file).time[-1] == data["t_end"]
+    assert "Interrupted" in done.stderr
+
+
+# -- small things ------------------------------------------------------------------------------------------------------
+
+
+def test_numbers_that_json_does_not_know_become_null() -> None:
+    data = {"a": float("nan"), "b": [np.float64(1.5), float("inf")], "c": np.int64(2), "d": np.bool_(True), "e": None}
+    assert strict(data) == {"a": None, "b": [1.5, None], "c": 2, "d": True, "e": None}
+    assert json.dumps(strict(data), allow_nan=False)
+
+
+def test_sparklines() -> None:
+    assert sparkline(np.linspace(0.0, 1.0, 8), 8) == "▁▂▃▄▅▆▇█"
+    assert set(sparkline(np.ones(5))) == {"─"}
+    assert sparkline(np.array([np.nan])) == ""
