@@ -102,6 +102,7 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     placements = place(graph, mechanism.graph, bodies, forest, shape_of, mechanism.locals_, q, space)
     left = _unsolved(mechanism, forest)
     values = _constraint_values(mechanism, site, placements, left)
+    _check_held(mechanism, masses, forest, q, values)
     names, eliminated = list(forest.coordinates), []
     if forest.form == "reduced":
         solution = _eliminate(mechanism, masses, forest, q, values)
@@ -177,6 +178,23 @@ def _constraint_values(
     return [(path, c, put_in_place(c.value, maps[path])) for path, c in left]
 
 
+def _check_held(
+    mechanism: Mechanism, masses: Masses, forest: Forest, q: tuple[Expression, ...], values: Values
+) -> None:
+    """Refuse a body that has no mass and that no joint or constraint holds."""
+    weightless = _weightless(mechanism, masses, forest)
+    for one in forest.attachments:
+        if one.joint is not None or not weightless.issuperset(one.coordinates):
+            continue
+        own = [q[number] for number in one.coordinates]
+        if not any(depends_on(value, own) for _, _, value in values):
+            raise TopologyError(
+                "it hangs free and has no mass: a force would accelerate it without bound",
+                where=mechanism.bodies.bodies[one.body].name,
+                advice="Connect it to something that has a mass or holds it, give it a mass, or remove it.",
+            )
+
+
 class _Solved:
     """Marks a constraint that elimination has used up."""
 
@@ -193,7 +211,7 @@ def _eliminate(
     stay.
     """
     parameters = mechanism.table.values
-    weightless = _weightless(masses, forest)
+    weightless = _weightless(mechanism, masses, forest)
     solution: dict[Expression, Expression] = {}
     for number, (path, constraint, original) in enumerate(values):
         value = substitute([original], solution)[0]
@@ -220,13 +238,13 @@ def _eliminate(
     return solution
 
 
-def _weightless(masses: Masses, forest: Forest) -> set[int]:
+def _weightless(mechanism: Mechanism, masses: Masses, forest: Forest) -> set[int]:
     """Return the numbers of the coordinates that only place a body without mass."""
-    spread = {node for one in masses.coupled for node in one.nodes}
+    massive = {mechanism.bodies.body_of[node] for one in masses.coupled for node in one.nodes} | set(masses.bodies)
     return {
         number
         for one in forest.attachments
-        if one.body not in masses.bodies and one.node not in spread
+        if one.body not in massive
         for number in one.coordinates
     }
 
