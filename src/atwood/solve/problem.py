@@ -178,12 +178,25 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     now = balance.at(t, q, u)
     slope = now.slope[list(finding.kept)] if finding.kept else now.slope[:0]
     _check_inertia(assembly, now.mass, slope, sizes)
+    if finding.starts_singular:
+        raise _singular_start(assembly, finding)
     dependent = choose_dependent(slope, sizes) if assembly.form == "reduced" else ()
     program = assembly.form_program(_kept_or_none(finding), dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = solve_balance(now, kept, t)
     scales = find_scales(assembly, length, u, accelerations, sizes, span)
     return Plan(assembly, balance, finding, scales, sizes, program, dependent)
+
+
+def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
+    constraints = assembly.equations.constraints
+    lost = [constraints[i].label for i in finding.lost_at_start]
+    return StartError(
+        "the start is a singular position, from which the mechanism could go on in more than one way: "
+        f"{', '.join(lost)} {'follows' if len(lost) == 1 else 'follow'} from the other constraints here, and nowhere near",
+        where=constraints[finding.lost_at_start[0]].key[0],
+        advice="Start a little away from it, on the side that you mean.",
+    )
 
 
 def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, sizes: FloatArray) -> None:

@@ -32,12 +32,15 @@ class RankFinding:
         Number of independent constraints.
     rank_at_start
         The same at the start position alone.
+    lost_at_start
+        Numbers of independent constraints that follow from the others at the start position.
     """
 
     kept: tuple[int, ...]
     redundant: tuple[int, ...]
     rank: int
     rank_at_start: int
+    lost_at_start: tuple[int, ...] = ()
 
     @property
     def starts_singular(self) -> bool:
@@ -85,7 +88,8 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
         if len(found) > len(best):
             best = found
     redundant = tuple(i for i in range(count) if i not in set(best))
-    return RankFinding(tuple(best), redundant, len(best), len(at_start))
+    lost = tuple(i for i in best if i not in set(at_start)) if len(at_start) < len(best) else ()
+    return RankFinding(tuple(best), redundant, len(best), len(at_start), lost)
 
 
 def choose_dependent(slope: FloatArray, scales: FloatArray) -> tuple[int, ...]:
