@@ -153,7 +153,7 @@ class NativeKernel:
             target[:] = group
         code = self.compiled.call(*space.arguments)
         if code or self.compiled.built.failures is not None:
-            self._look_into(code, groups)
+            self._look_into(code, groups, space)
         results = tuple(output.tolist() for output in space.outputs)
         self._spaces.append(space)
         return results
@@ -199,7 +199,7 @@ class NativeKernel:
         except IndexError:
             return _Space(self)
 
-    def _look_into(self, code: int, groups: Sequence[Any]) -> None:
+    def _look_into(self, code: int, groups: Sequence[Any], space: _Space) -> None:
         """Raise the error that explains a result that is not finite."""
         program = self.compiled.program
         failures = self.compiled.built.failures
@@ -209,7 +209,12 @@ class NativeKernel:
             return
         _raise_failure(program.name, error)
         compile_program(program).bind(self.parameter_values)(*groups)
-        raise KernelEvaluationError("an output has no finite value", where=program.name)
+        for group, values in zip(program.outputs, space.outputs, strict=True):
+            for position in np.flatnonzero(~np.isfinite(values)):
+                raise KernelEvaluationError(
+                    f"the output {group.name}[{position}] has no finite value: it is {values[position]:g}",
+                    where=program.name,
+                )
 
     def _refuse(self, found: list[int]) -> None:
         program = self.compiled.program

@@ -12,6 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from atwood.errors import UnsupportedError
 from atwood.expr.operations import ExternalFunction
 from atwood.kernels.cache import Cache, default_cache, make_key
 from atwood.kernels.llvm_engine import (
@@ -136,7 +137,7 @@ def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
         about = json.loads(line)
         loaded = load_code(code, names, require_symbols(about["library"]))
         return Built(loaded, int(about["scratch"]), True, None)
-    except (ValueError, KeyError, TypeError, RuntimeError):
+    except (ValueError, KeyError, TypeError, RuntimeError, UnsupportedError):
         return None
 
 
