@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -38,7 +39,7 @@ def _print(found: MechanismReport) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from atwood.report.text import facts, title
+    from atwood.report.text import facts, shorten, title
 
     out = console()
     out.print(Text(title(found), style="bold"))
@@ -48,20 +49,22 @@ def _print(found: MechanismReport) -> None:
     for label, text in facts(found):
         table.add_row(label, Text(text))
     out.print(table)
-    parameters = [one for one in found.parameters if isinstance(one.value, float)]
-    if not parameters:
-        return
+    groups: dict[tuple[str, float, str, str], list[str]] = {}
+    for one in found.parameters:
+        if isinstance(one.value, (int, float)):
+            alike = (re.sub(r"\[\d+\]", "[]", one.path), one.value, one.unit, one.meaning)
+            groups.setdefault(alike, []).append(one.path)
     out.print()
     listing = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
     listing.add_column("parameter", no_wrap=True)
     listing.add_column("value", justify="right")
     listing.add_column("unit")
     listing.add_column("meaning", overflow="ellipsis", no_wrap=True)
-    for one in parameters[:_SHOWN]:
-        listing.add_row(one.path, f"{one.value:g}", "" if one.unit == "1" else one.unit, one.meaning)
+    for (_, value, unit, meaning), paths in list(groups.items())[:_SHOWN]:
+        listing.add_row(shorten(paths, 3), f"{value:g}", "" if unit == "1" else unit, meaning)
     out.print(listing)
-    if len(parameters) > _SHOWN:
-        out.print(f"... and {len(parameters) - _SHOWN} more; --json shows all", style="dim")
+    if len(groups) > _SHOWN:
+        out.print(f"... and {len(groups) - _SHOWN} more; --json shows all", style="dim")
 
 
 _SHOWN = 16

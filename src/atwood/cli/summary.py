@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from atwood.cli.output import console
 from atwood.cli.running import RunRequest, degrees_of_freedom, multiplier_labels
 from atwood.report.text import count_of
+from atwood.result.about import solver_name
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -102,7 +103,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     yield from (("event", one.describe()) for one in result.happenings if one.target != "stop")
     yield (
         "solver",
-        f"SUNDIALS IDA, {count_of(statistics.steps, 'step')}, {statistics.residual_evaluations} residuals, "
+        f"{solver_name()}, {count_of(statistics.steps, 'step')}, {statistics.residual_evaluations} residuals, "
         f"{statistics.jacobian_evaluations} Jacobians, {duration(statistics.seconds)}",
     )
     yield "energy", _energy(result)

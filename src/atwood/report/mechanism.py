@@ -220,7 +220,7 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
         repeated=start.repeated,
         states={form: plan.program.size for form, plan in plans.items()},
         operations={form: plan.program.operations for form, plan in plans.items()},
-        parameters=list_parameters(reduced),
+        parameters=list_parameters(reduced, None if isinstance(scene, Assembly) else scene),
     )
 
 

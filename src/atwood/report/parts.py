@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.build import Mechanism
+from atwood.model.composite import Model
 from atwood.model.local import LocalPart
+from atwood.model.scene import Scene
 from atwood.topology.forest import Forest
 from atwood.topology.graph import Joint
 
@@ -271,18 +273,32 @@ def _is_nothing(value: Scalar) -> bool:
     return value.is_zero if isinstance(value, Expression) else value == 0.0
 
 
-def list_parameters(assembly: Assembly) -> tuple[ParameterEntry, ...]:
-    """Return every parameter of every part with its value, by path.
+def list_parameters(assembly: Assembly, scene: Model | None = None) -> tuple[ParameterEntry, ...]:
+    """Return every parameter with its value, by path: those of the scene and its models, then those of the parts.
 
     Parameters
     ----------
     assembly
         The scene.
+    scene
+        The same as it was declared; without it the parameters of models are not known.
     """
-    found = []
+    found = [] if scene is None else list(_of_model(scene))
     for path, part in assembly.flat.parts.items():
         for name, spec in part.component.parameter_specs().items():
             value = part.values[name]
             if value is not None:
                 found.append(ParameterEntry(f"{path}.{name}", value, spec.unit.text, spec.doc))
     return tuple(found)
+
+
+def _of_model(model: Model) -> Iterator[ParameterEntry]:
+    """Yield the parameters of a model and of the models in it; of their settings as scenes only the outermost's."""
+    prefix = f"{model.path}." if model.path else ""
+    values = model.parameters()
+    for name, spec in model.parameter_specs().items():
+        if values[name] is not None and not (prefix and name in Scene.parameter_specs()):
+            yield ParameterEntry(f"{prefix}{name}", values[name], spec.unit.text, spec.doc)
+    for part in model.parts.values():
+        if isinstance(part, Model):
+            yield from _of_model(part)
