@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
+import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import StartError, suggestion
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, evaluate, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.kernels import compile_program
 from atwood.mechanics.equations import Equations
@@ -114,6 +116,14 @@ def _sort_targets(assembly: Assembly, equations: Equations, length: float) -> tu
                 )
             scale = length if one.unit.startswith("m") else 1.0
             level = levels[1] if depends_on(one.value, equations.speeds) else levels[0]
+            if level is levels[1] and any(
+                depends_on(slope, equations.speeds) for slope in jacobian([one.value], list(equations.speeds)).entries
+            ):
+                raise StartError(
+                    "it is not linear in the speeds and cannot be chosen at the start",
+                    where=path,
+                    advice="Give velocities.",
+                )
             (level.fixed if is_fixed else level.guessed).append(_Target(path, value, one, scale))
     return levels
 
@@ -218,18 +228,48 @@ def _explain_positions(
     """Raise the error that says whether a loop cannot close or the start contradicts itself."""
     constraints = [one.value for one in equations.constraints]
     if constraints:
-        _, alone, _ = _newton(_System(assembly, equations, [], constraints, equations.coordinates), scales, t, q)
+        system = _System(assembly, equations, [], constraints, equations.coordinates)
+        nearest, alone, _ = _newton(system, scales, t, q)
         if not float(np.max(np.abs(alone))) <= _MET:
-            worst = int(np.argmax(np.abs(alone)))
-            one = equations.constraints[worst]
-            involved = sorted({c.key[0] for c in equations.constraints})
-            raise StartError(
-                f"the loop cannot close here: the nearest position found misses by {np.max(np.abs(alone)):.3g} "
-                f"of the scene's size (constraints of {', '.join(involved)})",
-                where=one.key[0],
-                advice="Check the lengths of the loop, or guess a start nearer to a position in which it closes.",
-            )
+            _raise_open_loop(assembly, equations, t, nearest, alone)
     _raise_contradiction(level.fixed, missing[len(constraints) :], equations)
+
+
+def _raise_open_loop(
+    assembly: Assembly, equations: Equations, t: float, nearest: FloatArray, missing: FloatArray
+) -> None:
+    """Raise the error that names the loop that cannot close."""
+    worst = equations.constraints[int(np.argmax(np.abs(missing)))]
+    values = [one.value for one in equations.constraints if one.key[0] == worst.key[0]]
+    place = {equations.time: t, **dict(zip(equations.coordinates, nearest.tolist(), strict=True))}
+    miss = max(abs(v) for v in evaluate(values, {**assembly.mechanism.table.values, **place}))
+    loop = _loop_through(assembly, worst.key[0])
+    raise StartError(
+        f"the loop cannot close here: the nearest position found misses by {miss:.3g}"
+        + (f" (the loop of {', '.join(loop)})" if loop else ""),
+        where=worst.key[0],
+        advice="Check the lengths of the loop, or guess a start nearer to a position in which it closes.",
+    )
+
+
+def _loop_through(assembly: Assembly, part: str) -> list[str]:
+    """Return the parts of the shortest loop through a joint, in order, with the bodies between them."""
+    graph, bodies = assembly.mechanism.graph, assembly.mechanism.bodies
+    others: nx.Graph[int] = nx.Graph()
+    ends: tuple[int, int] | None = None
+    for joint in graph.joints:
+        pair = (bodies.body_of[joint.a], bodies.body_of[joint.b])
+        if joint.part == part:
+            ends = pair
+        elif not joint.is_rigid:
+            others.add_edge(*pair, part=joint.part)
+    if ends is None or not all(end in others for end in ends) or not nx.has_path(others, *ends):
+        return []
+    way = nx.shortest_path(others, *ends)
+    found = [part]
+    for here, there in pairwise(way):
+        found += [*([bodies.bodies[here].name] if here else []), others.edges[here, there]["part"]]
+    return [*found, *([bodies.bodies[way[-1]].name] if way[-1] else [])]
 
 
 def _raise_contradiction(fixed: Sequence[_Target], missing: FloatArray, equations: Equations) -> None:
@@ -237,11 +277,12 @@ def _raise_contradiction(fixed: Sequence[_Target], missing: FloatArray, equation
         f"{target.path} = {target.value:g}" for target, miss in zip(fixed, missing, strict=True) if abs(miss) > _MET
     ]
     names = failing or [f"{target.path} = {target.value:g}" for target in fixed]
+    freedom = len(equations.coordinates) - len(equations.constraints)
     where = next((t.path for t, m in zip(fixed, missing, strict=True) if abs(m) > _MET), fixed[0].path if fixed else "")
     raise StartError(
         f"the start values contradict each other or the constraints: {', '.join(names)} cannot all hold",
         where=where,
-        advice=f"The mechanism has {len(equations.coordinates) - len(equations.constraints)} free coordinates; "
+        advice=f"The mechanism has {freedom} free coordinate{'s' if freedom != 1 else ''}; "
         "fix fewer values, or give some as guesses.",
     )
 
