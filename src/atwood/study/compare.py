@@ -171,7 +171,7 @@ def compare(
     outputs
         Number of output times at which errors are measured.
     max_seconds
-        Limit of each run.
+        Limit of each run; the reference may take ten times as long.
     name
         What to call the scene.
     progress
@@ -195,7 +195,8 @@ def compare(
     total = len(kinds) * len(rtols) + 2
     watch = progress or (lambda what, done, of: None)
     end = flat.t_end if t_end is None else float(t_end)
-    reference = find_reference(scene, flat, end, outputs, max_seconds, lambda what: watch(what, 0, total))
+    patience = None if max_seconds is None else 10.0 * max_seconds
+    reference = find_reference(scene, flat, end, outputs, patience, lambda what: watch(what, 0, total))
     rows: list[ComparisonRow] = []
     for form, level in kinds:
         for rtol in sorted(rtols, reverse=True):
