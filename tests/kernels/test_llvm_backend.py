@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from atwood import expr as ex
-from atwood.errors import KernelEvaluationError, UsageError
+from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.kernels import compile_native, compile_program
 from atwood.kernels.llvm_engine import sincos_name
 from atwood.kernels.llvm_module import CodeOptions
@@ -86,25 +86,12 @@ def make(function, size=1, **options):
     return compile_native(program, cache=False, **options)
 
 
-_UNARY = ["sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "absolute", "sign"]
-_BINARY = [
-    "add",
-    "sub",
-    "mul",
-    "div",
-    "pow",
-    "atan2",
-    "minimum",
-    "maximum",
-    "less",
-    "less_equal",
-    "logical_and",
-    "logical_or",
-]
+_UNARY = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh")
+_BINARY = ("add", "sub", "mul", "div", "pow", "atan2", "minimum", "maximum", "less", "less_equal")
 _EDGES = (0.0, -0.0, 0.5, -0.75, 1.0, 3.0, -2.0, 800.0, -800.0, 1e300, math.inf, -math.inf, math.nan)
 
 
-@pytest.mark.parametrize("operation", [*_UNARY, "neg", "logical_not"])
+@pytest.mark.parametrize("operation", [*_UNARY, "absolute", "sign", "neg", "logical_not"])
 def test_every_function_of_one_number_keeps_its_corner_cases(operation):
     graph = ex.Graph()
     x = graph.symbol("x")
@@ -118,7 +105,7 @@ def test_every_function_of_one_number_keeps_its_corner_cases(operation):
         np.testing.assert_allclose(found, expected, rtol=4e-16)
 
 
-@pytest.mark.parametrize("operation", _BINARY)
+@pytest.mark.parametrize("operation", [*_BINARY, "logical_and", "logical_or"])
 def test_every_function_of_two_numbers_keeps_its_corner_cases(operation):
     graph = ex.Graph()
     x, y = graph.symbol("x"), graph.symbol("y")
@@ -218,7 +205,12 @@ def test_wrong_sizes_and_arrays_are_explained():
         with pytest.raises(KernelEvaluationError, match="takes the groups x of 2"):
             kernel(*groups)
     good, out = np.ones(2), np.ones(1)
-    assert kernel.into([out], good)
+    for good[0] in (2.0, 3.0):
+        assert kernel.into([out], good)
+        assert out[0] == good[0]
+    other, elsewhere = np.array([4.0, 5.0]), np.zeros(1)
+    assert kernel.into([elsewhere], other)
+    assert [out[0], elsewhere[0]] == [3.0, 20.0]
     frozen = np.ones(1)
     frozen.flags.writeable = False
     for outputs, inputs in (
@@ -254,6 +246,24 @@ def test_external_functions_are_called_with_floats_and_their_failure_is_reported
         kernel.compiled.bind([6.0])
     choice = make(lambda x, p: [ex.select(x > 5, 1.0, ex.external(function, x))]).bind([2.0])
     assert choice([6.0]) == ([1.0],)
+
+
+def test_an_operation_without_machine_code_is_named():
+    graph = ex.Graph()
+    x = graph.symbol("rope.stretch")
+    out = (1.0 + graph.node("airy", (x,)),)
+    program = ex.Program("crane residual", (ex.InputGroup("x", (x,)),), (), (ex.OutputGroup("out", out),))
+    with pytest.raises(UnsupportedError, match=r"crane residual: .* operation airy in airy\(rope.stretch\)"):
+        compile_native(program, cache=False)
+
+
+def test_nothing_to_compute_is_no_special_case():
+    empty = ex.Program("empty", (), (), ())
+    assert compile_native(empty, cache=False).bind([])() == ()
+    graph = ex.Graph()
+    p = graph.symbol("p")
+    fixed = ex.Program("fixed", (), (p,), (ex.OutputGroup("out", (graph.constant(2.0), p, ex.sin(p))),))
+    assert compile_native(fixed, cache=False).bind([0.5])() == ([2.0, 0.5, math.sin(0.5)],)
 
 
 def long_program(steps):

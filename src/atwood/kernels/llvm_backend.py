@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from ctypes import c_void_p
+from operator import is_
 from typing import Any
 
 import numpy as np
@@ -22,8 +24,8 @@ __all__ = ["NativeKernel", "NativeProgram", "compile_native"]
 
 FloatArray = NDArray[np.float64]
 
-_KERNEL = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 4)
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
+_KERNEL = ctypes.CFUNCTYPE(ctypes.c_int, *[c_void_p] * 4)
+_PROLOGUE = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
 
 
 def compile_native(program: Program, *, cache: bool = True, options: CodeOptions | None = None) -> NativeProgram:
@@ -171,26 +173,34 @@ class NativeKernel:
         Returns
         -------
         bool
-            Whether every result is finite.
+            Whether every result is finite, and not so large that their sum is not.
 
         Raises
         ------
         UsageError
             If an array has the wrong size, does not hold floats of 64 bits one after the other, or cannot be written.
         """
+        space = self._take_space()
+        arrays = (*inputs, *outputs)
+        if len(arrays) != len(space.known) or not all(map(is_, arrays, space.known)):
+            self._point_to(space, outputs, inputs)
+        code = self.compiled.call(*space.elsewhere)
+        self._spaces.append(space)
+        if self.compiled.built.failures is not None:
+            _raise_serious(self.compiled.built.failures.take())
+        return bool(code == 0)
+
+    def _point_to(self, space: _Space, outputs: Sequence[FloatArray], inputs: Sequence[FloatArray]) -> None:
+        """Take arrays of the caller's, if they are as they must be; the next call can then do with a glance."""
         program = self.compiled.program
         where = program.name
         _check_arrays(where, "input", inputs, [len(group.symbols) for group in program.inputs])
         _check_arrays(where, "output", outputs, [len(group.expressions) for group in program.outputs])
         if not all(output.flags.writeable for output in outputs):
             raise UsageError("an output array is read-only", where=where)
-        space = self._take_space()
-        given, filled = _pointers(inputs), _pointers(outputs)
-        code = self.compiled.call(given, space.arguments[1], space.arguments[2], filled)
-        self._spaces.append(space)
-        if self.compiled.built.failures is not None:
-            _raise_serious(self.compiled.built.failures.take())
-        return bool(code == 0)
+        _, derived, scratch, _ = space.arguments
+        space.elsewhere = (_pointers(inputs), derived, scratch, _pointers(outputs))
+        space.known = (*inputs, *outputs)
 
     def _take_space(self) -> _Space:
         """Return arrays that no other call uses at the moment."""
@@ -222,8 +232,11 @@ class NativeKernel:
         raise KernelEvaluationError(f"takes the groups {names}; got groups of {found}", where=program.name)
 
 
+_Arguments = tuple[ctypes.Array[c_void_p], c_void_p, c_void_p, ctypes.Array[c_void_p]]
+
+
 class _Space:
-    """Arrays for one call at a time, with the pointers to them.
+    """Arrays for one call at a time, with the pointers to them; also those to the arrays that a caller last used.
 
     Parameters
     ----------
@@ -237,11 +250,14 @@ class _Space:
         self.outputs = [np.empty(len(group.expressions)) for group in program.outputs]
         self._scratch = np.empty(kernel.compiled.scratch)
         given, filled = _pointers(self.inputs), _pointers(self.outputs)
-        self.arguments = (given, kernel.derived.ctypes.data, self._scratch.ctypes.data, filled)
+        derived, scratch = c_void_p(kernel.derived.ctypes.data), c_void_p(self._scratch.ctypes.data)
+        self.arguments: _Arguments = (given, derived, scratch, filled)
+        self.elsewhere: _Arguments = self.arguments
+        self.known: tuple[FloatArray, ...] = ()
 
 
-def _pointers(arrays: Sequence[FloatArray]) -> ctypes.Array[ctypes.c_void_p]:
-    return (ctypes.c_void_p * len(arrays))(*[array.ctypes.data for array in arrays])
+def _pointers(arrays: Sequence[FloatArray]) -> ctypes.Array[c_void_p]:
+    return (c_void_p * len(arrays))(*[array.__array_interface__["data"][0] for array in arrays])
 
 
 def _check_arrays(where: str, kind: str, arrays: Sequence[FloatArray], sizes: Sequence[int]) -> None:

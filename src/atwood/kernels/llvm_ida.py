@@ -143,7 +143,7 @@ class IdaCallbacks:
     sparse
         Whether the matrix is sparse.
     built
-        The code.
+        The code; its ``failures`` hold what a function in Python raised, which IDA only sees as a missing value.
 
     Attributes
     ----------

@@ -4,8 +4,9 @@ Every function of a program has one signature in C::
 
     int kernel(const double *const *inputs, const double *derived, double *scratch, double *const *outputs);
 
-with a pointer for each input and output group, and returns 1 if a result is not finite, else 0.  ``derived`` is
-what the program's second function computes once a run from the parameters::
+with a pointer for each input and output group, and returns 1 if a result is not finite (or the results are so large
+that their sum is not), else 0.  ``derived`` is what the program's second function computes once a run from the
+parameters::
 
     void prologue(const double *parameters, double *derived, double *scratch);
 
@@ -18,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from atwood.errors import UnsupportedError
 from atwood.expr.graph import Expression
 from atwood.expr.operations import ExternalFunction
 from atwood.expr.program import Program
@@ -104,6 +106,11 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
         What the code depends on.
     more
         Further functions, already written, that call these.
+
+    Raises
+    ------
+    UnsupportedError
+        If there is an operation without machine code.
     """
     needs = Needs()
     parts: list[str] = []
@@ -114,7 +121,10 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
         for function, body in bodies:
             layout = lay_out(body, options.longest_chunk)
             scratch = max(scratch, layout.scratch)
-            parts.extend(_write_function(function, body, layout, options, needs))
+            try:
+                parts.extend(_write_function(function, body, layout, options, needs))
+            except UnsupportedError as error:
+                raise UnsupportedError(error.message, where=program.name) from None
         parts.append(_write_prologue(name))
     parts.append(more)
     if needs.elimination:
@@ -173,7 +183,7 @@ def _write_result(writer: Writer, node: Expression, targets: Sequence[tuple[str,
 
 
 def _as_chunk(name: str, writer: Writer) -> str:
-    """Return a chunk as a function of its own, which returns zero if its results are finite."""
+    """Return a chunk as a function of its own, which returns the sum of its results."""
     checked = writer.checked()
     start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *_opening(writer)]
     return "\n".join([*start, *writer.lines, f"  ret double {checked}", "}"])
@@ -199,9 +209,10 @@ def _opening(writer: Writer) -> list[str]:
 
 
 def _ending(checked: str) -> list[str]:
-    """Return the end of a function: 1 if the sum of the checks is not zero."""
+    """Return the end of a function: 1 if the sum of all results is not finite."""
     return [
-        f"  %undefined = fcmp une double {checked}, 0.0",
+        f"  %nothing = fsub double {checked}, {checked}",
+        "  %undefined = fcmp une double %nothing, 0.0",
         "  %code = zext i1 %undefined to i32",
         "  ret i32 %code",
         "}",

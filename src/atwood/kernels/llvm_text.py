@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from atwood.errors import UnsupportedError
 from atwood.expr.graph import Expression
 from atwood.expr.operations import ExternalFunction
 
@@ -161,8 +162,10 @@ class Writer:
             self.values[node.index] = self._call_library(node)
         elif operation == "external":
             self.values[node.index] = self._call_external(node)
-        else:
+        elif operation in _OTHER:
             self.values[node.index] = _OTHER[operation](self, node)
+        else:
+            raise UnsupportedError(f"there is no machine code for the operation {operation} in {node!r}")
 
     def write_wave(self, sine: Expression, cosine: Expression) -> None:
         """Write the sine and the cosine of one argument."""
@@ -178,15 +181,14 @@ class Writer:
         self.values[cosine.index] = self.put("load double, ptr %cosine")
 
     def check(self, value: str) -> None:
-        """Take a result into the check that all are finite: zero times a number is zero, or else not a number."""
-        term = self.put(f"fmul double {value}, 0.0")
+        """Take a result into the sums that show whether all are finite: one that is not makes its sum so too."""
         if len(self._checks) < _CHECKS:
-            self._checks.append(term)
+            self._checks.append(value)
         else:
-            self._checks.append(self.put(f"fadd double {self._checks.pop(0)}, {term}"))
+            self._checks.append(self.put(f"fadd double {self._checks.pop(0)}, {value}"))
 
     def checked(self) -> str:
-        """Return what is zero if all results so far are finite."""
+        """Return the sum of all results so far, which is finite only if they are."""
         if not self._checks:
             return "0.0"
         total = self._checks[0]
