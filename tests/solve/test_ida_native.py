@@ -478,14 +478,32 @@ class TestLife:
         def some(count: int) -> None:
             for k in range(count):
                 self.open().advance(0.01)
-                if k % 10 == 0:
-                    ida_native.open_session(problem, TIGHT, 0.0, y, yp).advance(1e-6)
+                if k % 20 == 0:
+                    sparse = ida_native.open_session(problem, TIGHT, 0.0, y, yp)
+                    for _ in range(k % 3):
+                        sparse.advance(1e-6)
+                        sparse.reinitialize(0.0, y, yp)
 
         some(300)
         before = resident_kilobytes()
         some(3000)
-        # One session alone takes more than ten kilobytes.
+        # One session alone takes more than ten kilobytes, its sparse factors a hundred.
         assert resident_kilobytes() - before < 3000
+
+    def test_a_sparse_session_goes_on_from_other_states(self) -> None:
+        problem, y, yp = chain(80)
+        session = ida_native.open_session(problem, TIGHT, 0.0, y, yp)
+        expected = session.advance(0.02).y
+        for k in range(1, 20):
+            session.reinitialize(0.0, k * y, k * yp)
+            assert_allclose(session.advance(0.02).y / k, expected, rtol=1e-6)
+
+    def test_a_sparse_session_that_never_had_a_matrix_can_be_closed(self) -> None:
+        problem, y, yp = chain(80)
+        ida_native.open_session(problem, TIGHT, 0.0, y, yp).close()
+        wall = replace(problem, residual=lambda t, y, yp: np.full(80, math.nan))
+        with ida_native.open_session(wall, TIGHT, 0.0, y, yp) as session:
+            assert session.advance(1.0).status is Status.FAILED
 
     @pytest.mark.parametrize("linear_solver", ["dense", "sparse"])
     def test_threads_give_the_same_answers(self, linear_solver: Any) -> None:

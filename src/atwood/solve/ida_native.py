@@ -111,7 +111,7 @@ class NativeSession:
             problem, options, tuning or IdaTuning(), linear_solver, self._native, self._record, state
         )
         self._stop_time = None if tuning is None else tuning.stop_time
-        self._lock = self._memory.library.sparse_lock if linear_solver == "sparse" else nullcontext()
+        self._guard = self._memory.library.sparse_guard if linear_solver == "sparse" else nullcontext()
         self._watch = EventWatch(problem, options.horizon) if problem.events is not None else None
         self._no_events = (0,) * problem.event_count
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
@@ -343,7 +343,7 @@ class NativeSession:
         return failure
 
     def _solve(self, t_out: float, task: int) -> tuple[int, float]:
-        with self._lock:
+        with self._guard:
             flag, t = self._memory.solve(t_out, task)
         self._is_first = False
         return flag, t

@@ -13,14 +13,12 @@ import numpy as np
 from atwood.errors import UsageError
 from atwood.solve.driver import FloatArray, LinearSolver
 from atwood.solve.sundials_library import SundialsLibrary
+from atwood.solve.sundials_sparse import SparseSolver
 
 __all__ = ["ONE_STEP", "TO_TIME", "Counts", "IdaMemory"]
 
 TO_TIME, ONE_STEP = 1, 2
 """What `IdaMemory.solve` does: go on until a time is reached or passed, or take one step."""
-
-_SPARSE_BY_COLUMNS = 0
-_THREADS = 1
 
 
 @dataclass(frozen=True)
@@ -57,6 +55,7 @@ class _Parts:
         self.context = c_void_p()
         self.ida = c_void_p()
         self.solver: int | None = None
+        self.sparse: SparseSolver | None = None
         self.matrix: int | None = None
         self.vectors: list[int] = []
         self.keep: list[object] = []
@@ -65,17 +64,22 @@ class _Parts:
         library = self.library
         if self.ida.value is not None:
             library.IDAFree(ctypes.byref(self.ida))
-        if self.solver:
-            library.SUNLinSolFree(self.solver)
-        if self.matrix:
-            library.SUNMatDestroy(self.matrix)
+        self.free_solver()
         for vector in self.vectors:
             library.N_VDestroy(vector)
         if self.context.value is not None:
             library.SUNContext_Free(ctypes.byref(self.context))
-        self.solver = self.matrix = None
         self.vectors.clear()
         self.keep.clear()
+
+    def free_solver(self) -> None:
+        if self.sparse is not None:
+            self.sparse.free()
+        if self.solver:
+            self.library.SUNLinSolFree(self.solver)
+        if self.matrix:
+            self.library.SUNMatDestroy(self.matrix)
+        self.solver = self.matrix = self.sparse = None
 
 
 class IdaMemory:
@@ -107,6 +111,7 @@ class IdaMemory:
         self.yp, self._yp = self.vector(np.zeros(size))
         parts.ida.value = self._made(library.IDACreate(parts.context), "IDACreate")
         self._ida = parts.ida
+        self._jacobian = 0
         self._time = c_double()
         self._count = c_long()
         self._time_place, self._count_place = ctypes.byref(self._time), ctypes.byref(self._count)
@@ -138,22 +143,30 @@ class IdaMemory:
 
     def begin_again(self, t: float) -> None:
         """Restart from `y` and `yp`."""
+        sparse = self._parts.sparse
+        if sparse is not None:
+            # A sparse solver that starts anew would lose the memory of its factors.
+            old = sparse.renew()
+            self._use_solver(sparse.solver, sparse.matrix)
+            sparse.free_solver(old)
         self.call("IDAReInit", t, self._y, self._yp)
 
     def set_linear_solver(self, kind: LinearSolver, entries: int, jacobian: int) -> None:
         """Make the matrix and the linear solver."""
         library, parts, n = self.library, self._parts, self.size
         if kind == "sparse":
-            solver = library.superlu()
-            matrix = library.SUNSparseMatrix(n, n, entries, _SPARSE_BY_COLUMNS, parts.context)
-            parts.matrix = self._made(matrix, "SUNSparseMatrix")
-            parts.solver = self._made(solver(self._y, matrix, _THREADS, parts.context), "SUNLinSol_SuperLUMT")
+            parts.sparse = sparse = SparseSolver(library, n, entries, self._y, parts.context)
+            matrix, solver = sparse.matrix, sparse.solver
         else:
-            matrix = library.SUNDenseMatrix(n, n, parts.context)
-            parts.matrix = self._made(matrix, "SUNDenseMatrix")
-            parts.solver = self._made(library.SUNLinSol_Dense(self._y, matrix, parts.context), "SUNLinSol_Dense")
-        self.call("IDASetLinearSolver", parts.solver, parts.matrix)
-        self.call("IDASetJacFn", jacobian)
+            parts.matrix = matrix = self._made(library.SUNDenseMatrix(n, n, parts.context), "SUNDenseMatrix")
+            made = library.SUNLinSol_Dense(self._y, matrix, parts.context)
+            parts.solver = solver = self._made(made, "SUNLinSol_Dense")
+        self._jacobian = jacobian
+        self._use_solver(solver, matrix)
+
+    def _use_solver(self, solver: int, matrix: int) -> None:
+        self.call("IDASetLinearSolver", solver, matrix)
+        self.call("IDASetJacFn", self._jacobian)
 
     def call(self, name: str, *arguments: Any) -> None:
         """Call a function of IDA that must not fail."""

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from atwood.errors import AtwoodError
+from atwood.solve.sundials_sparse import BY_COLUMNS, OneAtATime, SparseSolver
 
 __all__ = ["SundialsLibrary", "SundialsMissing", "available", "library", "why_not"]
 
@@ -25,7 +26,6 @@ OLDEST = 7
 
 _ENDINGS = r"\.(?:so(?:\.[0-9]+)*|(?:[0-9]+\.)*dylib|dll)$"
 _INDEX_TYPES = {"int": 32, "int32_t": 32, "long int": 64, "long long int": 64, "int64_t": 64}
-_COLUMNS = 0  # SUNDIALS' CSC_MAT: a sparse matrix by columns
 
 _FREE_OF_CHARGE = ("sundials_core", "sundials_ida")
 _MATRIX_LIBRARIES = (
@@ -55,6 +55,8 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
     "SUNSparseMatrix_IndexPointers": (_P, _P),
     "SUNMatDestroy": (None, _P),
     "SUNLinSol_Dense": (_P, _P, _P, _P),
+    "SUNLinSolInitialize": (c_int, _P),
+    "SUNLinSolSetup": (c_int, _P, _P),
     "SUNLinSolFree": (c_int, _P),
     "IDACreate": (_P, _P),
     "IDAFree": (None, POINTER(_P)),
@@ -106,8 +108,10 @@ class SundialsLibrary:
         SUNDIALS' version.
     index_type
         The C type of its indices.
-    sparse_lock
-        Held while a sparse matrix can be factorised: SuperLU_MT keeps its work space in global variables.
+    sparse_guard
+        To be entered while a sparse matrix can be factorised.
+    tells_factors
+        Whether a sparse solver tells if it has been used.
     """
 
     def __init__(self) -> None:
@@ -123,24 +127,46 @@ class SundialsLibrary:
         self.index_type = self._read_index_type(package)
         for name in _SIGNATURES:
             self._bind(name)
-        self.sparse_lock = threading.RLock()
+        self.sparse_guard = OneAtATime(None)
+        self.tells_factors = False
         self._superlu: Any = None
+        self._superlu_lock = threading.RLock()
 
     def superlu(self) -> Any:
         """Return the function that makes a sparse linear solver; its library is large and opened when first used."""
-        if self._superlu is None:
-            try:
-                opened = self._open("sundials_sunlinsolsuperlumt")
-            except SundialsMissing:
-                # Where a library does not know where its neighbours are, they have to be there before it.
-                for name in _BELOW_SUPERLU:
-                    if name in self._files:
-                        ctypes.CDLL(str(self._files[name]), mode=ctypes.RTLD_GLOBAL)
-                opened = self._open("sundials_sunlinsolsuperlumt")
-            function = opened.SUNLinSol_SuperLUMT
-            function.restype, function.argtypes = _P, [_P, _P, c_int, _P]
-            self._superlu = function
+        with self._superlu_lock:
+            if self._superlu is None:
+                try:
+                    opened = self._open("sundials_sunlinsolsuperlumt")
+                except SundialsMissing:
+                    # Where a library does not know where its neighbours are, they have to be there before it.
+                    for name in _BELOW_SUPERLU:
+                        if name in self._files:
+                            ctypes.CDLL(str(self._files[name]), mode=ctypes.RTLD_GLOBAL)
+                    opened = self._open("sundials_sunlinsolsuperlumt")
+                function = opened.SUNLinSol_SuperLUMT
+                function.restype, function.argtypes = _P, [_P, _P, c_int, _P]
+                self._superlu = function
+                openmp = next((name for name in ("gomp", "omp") if name in self._files), None)
+                self.sparse_guard = OneAtATime(self._open(openmp) if openmp else None)
+                self.tells_factors = self._try_sparse_solver()
         return self._superlu
+
+    def _try_sparse_solver(self) -> bool:
+        """Solve something small; return whether a solver tells if it has factors."""
+        context = c_void_p()
+        self.SUNContext_Create(0, ctypes.byref(context))
+        self.SUNContext_ClearErrHandlers(context)
+        numbers = (c_double * 2)()
+        vector = self.N_VMake_Serial(2, ctypes.addressof(numbers), context)
+        solver = SparseSolver(self, 2, 2, vector, context)
+        with self.sparse_guard:
+            tells = solver.tells_factors()
+            self.SUNLinSolFree(solver.solver)
+        self.SUNMatDestroy(solver.matrix)
+        self.N_VDestroy(vector)
+        self.SUNContext_Free(ctypes.byref(context))
+        return tells
 
     def __getattr__(self, name: str) -> Any:
         # Only so that type checkers know that further attributes exist; what was found is an attribute itself.
@@ -211,7 +237,7 @@ class SundialsLibrary:
         dense = self.SUNDenseMatrix(2, 2, context)
         numbers = (c_double * 4).from_address(self.SUNDenseMatrix_Data(dense))
         numbers[:] = [1.0, 0.0, 0.0, 1.0]
-        sparse = self.SUNSparseFromDenseMatrix(dense, 0.0, _COLUMNS)
+        sparse = self.SUNSparseFromDenseMatrix(dense, 0.0, BY_COLUMNS)
         starts = (c_int32 * 3).from_address(self.SUNSparseMatrix_IndexPointers(sparse))
         width = {(0, 1, 2): 32, (0, 0, 1): 64}.get((starts[0], starts[1], starts[2]))
         self.SUNMatDestroy(sparse)
