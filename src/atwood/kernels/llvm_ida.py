@@ -80,15 +80,8 @@ def compile_ida_callbacks(
     if at_columns.shape != at_rows.shape or not _inside(at_rows, size) or not _inside(at_columns, size):
         raise UsageError(f"the entries of the Jacobian are not all inside {size} x {size}", where=jacobian.name)
     layout = layout or sundials_layout()
-    order = np.lexsort((at_rows, at_columns))
-    if sparse:
-        positions = np.empty(len(order), dtype=np.int64)
-        positions[order] = np.arange(len(order))
-        more = sparse_text(layout, at_rows[order], np.searchsorted(at_columns[order], np.arange(size + 1)))
-    else:
-        positions = at_rows + size * at_columns
-        more = dense_text(layout)
-    parts = [Part("residual", residual), Part("jacobian", jacobian, tuple(positions.tolist()))]
+    positions, more = _jacobian_for(layout, at_rows, at_columns, size, sparse)
+    parts = [Part("residual", residual), Part("jacobian", jacobian, positions)]
     built = build_code(
         parts,
         default_options(parts),
@@ -97,7 +90,20 @@ def compile_ida_callbacks(
         library=("memcpy",) if sparse else (),
         cached=cache,
     )
-    return IdaCallbacks(residual, jacobian, size, len(order), sparse, built)
+    return IdaCallbacks(residual, jacobian, size, len(positions), sparse, built)
+
+
+def _jacobian_for(
+    layout: SundialsLayout, rows: NDArray[np.int64], columns: NDArray[np.int64], size: int, sparse: bool
+) -> tuple[tuple[int, ...], str]:
+    """Return where each entry goes in the matrix's array, and the Jacobian with IDA's signature."""
+    if not sparse:
+        return tuple((rows + size * columns).tolist()), dense_text(layout)
+    order = np.lexsort((rows, columns))
+    positions = np.empty(len(order), dtype=np.int64)
+    positions[order] = np.arange(len(order))
+    starts = np.searchsorted(columns[order], np.arange(size + 1))
+    return tuple(positions.tolist()), sparse_text(layout, rows[order], starts)
 
 
 class IdaData(ctypes.Structure):
