@@ -15,7 +15,7 @@ from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion
         ("crane.rope", "mass is negative", "", "crane.rope: mass is negative"),
         ("", "mass is negative", "Give a positive one.", "mass is negative. Give a positive one."),
         ("crane.rope", "mass is negative.", "Give one.", "crane.rope: mass is negative. Give one."),
-        ("a", "no parameter 'mas'", "did you mean 'mass'?", "a: no parameter 'mas'. did you mean 'mass'?"),
+        ("a", "no parameter 'mas'", "Did you mean 'mass'?", "a: no parameter 'mas'. Did you mean 'mass'?"),
         ("a", "is it a rope?", "Say so.", "a: is it a rope? Say so."),
     ],
 )
@@ -50,12 +50,12 @@ def test_near_matches_ignore_case_and_keep_the_spelling() -> None:
 
 
 def test_a_suggestion_names_what_looks_alike() -> None:
-    assert suggestion("mas", ["mass", "length"]) == "did you mean 'mass'?"
-    assert suggestion("Frame_", ["frame_a", "frame_b"]) == "did you mean 'frame_b' or 'frame_a'?"
+    assert suggestion("mas", ["mass", "length"]) == "Did you mean 'mass'?"
+    assert suggestion("Frame_", ["frame_a", "frame_b"]) == "Did you mean 'frame_b' or 'frame_a'?"
     assert suggestion("ab", ["abc", "abd", "abe"]).count("'") == 6
 
 
 def test_a_suggestion_lists_a_short_choice_and_says_nothing_of_a_long_one() -> None:
-    assert suggestion("zzz", ["mass", "length"]) == "there is 'length', 'mass'"
+    assert suggestion("zzz", ["mass", "length"]) == "There is 'length', 'mass'"
     assert suggestion("zzz", [f"parameter{i}" for i in range(40)]) == ""
     assert suggestion("zzz", []) == ""

@@ -7,8 +7,6 @@ run them; those are loaded when they are first used.
 from __future__ import annotations
 
 import importlib
-import sys
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import (
@@ -72,12 +70,14 @@ from atwood.model.scene import Scene
 from atwood.model.vector import Vector, as_vector, cross, dot, norm
 
 if TYPE_CHECKING:
+    from atwood.expr.formula import Formula, formula
     from atwood.model.store import from_data, load_scene, save_scene, to_data
     from atwood.pipeline import Assembly, assemble, simulate
-    from atwood.report import MechanismReport, report
+    from atwood.reporting import MechanismReport, report
     from atwood.result.files import SavedResult, load_result, save_result
     from atwood.result.result import Result
-    from atwood.study import Comparison, compare
+    from atwood.study import Comparison, ComparisonRow, compare
+    from atwood.view import animate, plot, plot_comparison, plot_mechanism
 
     __version__: str
 
@@ -86,12 +86,14 @@ __all__ = [
     "AtwoodError",
     "BodyInertia",
     "Comparison",
+    "ComparisonRow",
     "Component",
     "ConnectError",
     "Connector",
     "DeclarationError",
     "Expression",
     "ExternalFunction",
+    "Formula",
     "Frame",
     "Groove",
     "KernelEvaluationError",
@@ -116,6 +118,7 @@ __all__ = [
     "__version__",
     "absolute",
     "acos",
+    "animate",
     "as_vector",
     "asin",
     "assemble",
@@ -134,6 +137,7 @@ __all__ = [
     "exp",
     "external",
     "force",
+    "formula",
     "from_data",
     "hypot",
     "inertia",
@@ -146,6 +150,9 @@ __all__ = [
     "norm",
     "observable",
     "parameter",
+    "plot",
+    "plot_comparison",
+    "plot_mechanism",
     "potential",
     "report",
     "save_result",
@@ -166,15 +173,22 @@ __all__ = [
 _LATER = {
     "Assembly": "atwood.pipeline",
     "Comparison": "atwood.study",
-    "MechanismReport": "atwood.report",
+    "ComparisonRow": "atwood.study",
+    "Formula": "atwood.expr.formula",
+    "MechanismReport": "atwood.reporting",
     "Result": "atwood.result.result",
     "SavedResult": "atwood.result.files",
+    "animate": "atwood.view",
     "assemble": "atwood.pipeline",
     "compare": "atwood.study",
+    "formula": "atwood.expr.formula",
     "from_data": "atwood.model.store",
     "load_result": "atwood.result.files",
     "load_scene": "atwood.model.store",
-    "report": "atwood.report",
+    "plot": "atwood.view",
+    "plot_comparison": "atwood.view",
+    "plot_mechanism": "atwood.view",
+    "report": "atwood.reporting",
     "save_result": "atwood.result.files",
     "save_scene": "atwood.model.store",
     "simulate": "atwood.pipeline",
@@ -201,17 +215,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
-
-
-class _Package(ModuleType):
-    """The package itself: where a function and a package within share a name, that is the function.
-
-    `atwood.report` is the function; what else its package holds is had with ``from atwood.report import ...``.
-    """
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in _LATER and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

@@ -134,15 +134,15 @@ def suggestion(word: str, choices: Iterable[str]) -> str:
     Returns
     -------
     str
-        ``"did you mean 'mass'?"`` where something looks alike; else a list of what exists where that is
+        ``"Did you mean 'mass'?"`` where something looks alike; else a list of what exists where that is
         short; else an empty string.
     """
     known = list(dict.fromkeys(choices))
     close = near_matches(word, known)
     if close:
-        return f"did you mean {_either([repr(name) for name in close])}?"
+        return f"Did you mean {_either([repr(name) for name in close])}?"
     if 0 < len(known) <= _SHORT_LIST:
-        return f"there is {', '.join(repr(name) for name in sorted(known))}"
+        return f"There is {', '.join(repr(name) for name in sorted(known))}"
     return ""
 
 

@@ -48,7 +48,7 @@ def refuses(scene, error, attempt, words=None):
 
 
 REFUSED = {
-    "unknown part": (aw.UsageError, lambda s: s.set("bat.length", 1.0), "did you mean 'bar'"),
+    "unknown part": (aw.UsageError, lambda s: s.set("bat.length", 1.0), "Did you mean 'bar'"),
     "a part of a leaf": (aw.UsageError, lambda s: s.set("bar.a.x", 1.0), "no part 'a'"),
     "element beyond the array": (aw.UsageError, lambda s: s.set("bobs[2].mass", 1.0), "bobs\\[2\\]"),
     "bad value": (aw.ParameterError, lambda s: s.set("bar.length", "-1 m"), "^bar.length"),
@@ -75,9 +75,9 @@ REFUSED = {
     "part of another": (aw.ConnectError, lambda s: s.connect(Bar(length=1.0).a, s.bar.b), "Add the part first"),
     "connector of a class": (aw.ConnectError, lambda s: s.connect(Pendulum.top, s.bar.b), "another class"),
     "replace by unlike": (aw.DeclarationError, lambda s: s.replace("bar", Bob()), "no connector 'a'"),
-    "replace nothing": (aw.DeclarationError, lambda s: s.replace("baar", Bob()), "did you mean 'bar'"),
+    "replace nothing": (aw.DeclarationError, lambda s: s.replace("baar", Bob()), "Did you mean 'bar'"),
     "replace by nothing": (aw.DeclarationError, lambda s: s.replace("bar", None), "no component"),
-    "unknown attribute": (aw.ParameterError, lambda s: setattr(s, "gravty", 1.0), "did you mean 'gravity'"),
+    "unknown attribute": (aw.ParameterError, lambda s: setattr(s, "gravty", 1.0), "Did you mean 'gravity'"),
     "start of nan": (aw.StartError, lambda s: s.start.update({"bar.angle": float("nan")}), "bar.angle"),
     "start as a list": (aw.StartError, lambda s: setattr(s, "start", [1]), "by path"),
 }

@@ -37,7 +37,9 @@ BAD_NUMBERS = [
 ]
 
 
-@pytest.mark.parametrize("bad", BAD_NUMBERS, ids=repr)
+@pytest.mark.parametrize(
+    "bad", BAD_NUMBERS, ids=lambda bad: f"{type(bad).__name__}-{str(bad)[:8]}" if type(bad) is not object else "object"
+)
 def test_what_is_no_finite_number_is_refused_everywhere(bad):
     with pytest.raises(aw.ParameterError, match=r"^Bar\.length: "):
         Bar(length=bad)
@@ -129,22 +131,22 @@ def test_a_parameter_without_default_is_required():
 
 
 def test_an_unknown_name_gets_a_near_match_however_it_is_given():
-    with pytest.raises(aw.ParameterError, match="did you mean 'length'"):
+    with pytest.raises(aw.ParameterError, match="Did you mean 'length'"):
         Bar(lenght=1.0)
-    with pytest.raises(aw.ParameterError, match="did you mean 'mass'"):
+    with pytest.raises(aw.ParameterError, match="Did you mean 'mass'"):
         Bob(Mass=1.0)
     bob = Bob()
-    with pytest.raises(aw.ParameterError, match="did you mean 'mass'"):
+    with pytest.raises(aw.ParameterError, match="Did you mean 'mass'"):
         bob.mas = 1.0
     scene = aw.Scene()
     scene.add("pendulum", Pendulum())
-    with pytest.raises(aw.ParameterError, match=r"^pendulum\.bar: .*did you mean 'length'"):
+    with pytest.raises(aw.ParameterError, match=r"^pendulum\.bar: .*Did you mean 'length'"):
         scene.set("pendulum.bar.lengthh", 1.0)
-    with pytest.raises(aw.UsageError, match="did you mean 'pendulum'"):
+    with pytest.raises(aw.UsageError, match="Did you mean 'pendulum'"):
         scene.set("pendulun.bar.length", 1.0)
     with pytest.raises(aw.ParameterError, match="Use replace"):
         scene.pendulum = Pendulum()
-    with pytest.raises(aw.ParameterError, match="did you mean 'gravity'"):
+    with pytest.raises(aw.ParameterError, match="Did you mean 'gravity'"):
         scene.set("gravit", 1.0)
     with pytest.raises(aw.UsageError):
         del bob.mass

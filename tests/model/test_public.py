@@ -46,8 +46,8 @@ def test_every_public_name_is_there():
 def test_public_names_stay_what_they_are_when_everything_is_loaded():
     """A module of the package must not take the place of a function of the same name."""
     code = """
-import types, atwood, atwood.report.mechanism, atwood.pipeline, atwood.study
-from atwood.report import MechanismReport
+import types, atwood, atwood.reporting.mechanism, atwood.pipeline, atwood.study
+from atwood.reporting import MechanismReport
 print([name for name in atwood.__all__ if isinstance(getattr(atwood, name), types.ModuleType)])
 """
     assert fresh_python(code) == "[]"

@@ -40,7 +40,7 @@ def test_what_is_no_unit_is_refused(text):
 
 
 def test_a_misspelled_unit_gets_a_hint():
-    with pytest.raises(DeclarationError, match="did you mean"):
+    with pytest.raises(DeclarationError, match="Did you mean"):
         parse_unit("kgg")
 
 

@@ -10,7 +10,7 @@ from atwood.cli.output import console, print_json
 from atwood.cli.scenes import prepare
 
 if TYPE_CHECKING:
-    from atwood.report import MechanismReport
+    from atwood.reporting import MechanismReport
 
 __all__ = ["show_info"]
 
@@ -25,7 +25,7 @@ def show_info(scene: str, settings: Sequence[str], starts: Sequence[str], as_jso
     as_json
         Whether to write JSON.
     """
-    from atwood.report import report
+    from atwood.reporting import report
 
     model, name = prepare(scene, settings, starts)
     found = report(model, name)
@@ -39,7 +39,7 @@ def _print(found: MechanismReport) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from atwood.report.text import facts, shorten, title
+    from atwood.reporting.text import facts, shorten, title
 
     out = console()
     out.print(Text(title(found), style="bold"))

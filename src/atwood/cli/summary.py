@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from atwood.cli.output import console
 from atwood.cli.running import RunRequest, degrees_of_freedom, multiplier_labels
-from atwood.report.text import count_of
+from atwood.reporting.text import count_of
 from atwood.result.about import solver_name
 
 if TYPE_CHECKING:

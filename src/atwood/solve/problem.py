@@ -193,7 +193,8 @@ def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
     lost = [constraints[i].label for i in finding.lost_at_start]
     return StartError(
         "the start is a singular position, from which the mechanism could go on in more than one way: "
-        f"{', '.join(lost)} {'follows' if len(lost) == 1 else 'follow'} from the other constraints here, and nowhere near",
+        f"{', '.join(lost)} {'follows' if len(lost) == 1 else 'follow'} from the other constraints here "
+        "and nowhere near",
         where=constraints[finding.lost_at_start[0]].key[0],
         advice="Start a little away from it, on the side that you mean.",
     )
@@ -219,7 +220,8 @@ def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, size
     moving = np.abs(vectors[:, 0] @ free)
     names = [c.name for c, size in zip(assembly.equations.names, moving, strict=True) if size > 0.1 * np.max(moving)]
     raise StartError(
-        f"something without inertia is free to move along {', '.join(names)}: a force would accelerate it without bound",
+        f"something without inertia is free to move along {', '.join(names)}: "
+        "a force would accelerate it without bound",
         where=names[0].rpartition(".")[0],
         advice="Give it a mass, or hold it with a joint.",
     )

@@ -377,7 +377,9 @@ def _sample_times(t: float, options: RunOptions) -> tuple[FloatArray, NDArray[np
             raise UsageError(f"output times must lie between {t:g} and {options.t_end:g}")
     filling = np.linspace(t, options.t_end, _SAMPLES + 1)
     near = 1e-9 * (options.t_end - t)
-    filling = filling[np.min(np.abs(filling[:, None] - asked[None, :]), axis=1) > near]
+    next_asked = np.minimum(np.searchsorted(asked, filling), len(asked) - 1)
+    distance = np.minimum(np.abs(asked[next_asked] - filling), np.abs(asked[np.maximum(next_asked - 1, 0)] - filling))
+    filling = filling[distance > near]
     times = np.concatenate([asked, filling])
     shown = np.concatenate([np.ones(len(asked), dtype=bool), np.zeros(len(filling), dtype=bool)])
     order = np.argsort(times)

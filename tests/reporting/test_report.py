@@ -5,8 +5,8 @@ import json
 import pytest
 
 from atwood import Scene, StartError, connect
-from atwood.report import MechanismReport, report
-from atwood.report.text import shorten
+from atwood.reporting import MechanismReport, report
+from atwood.reporting.text import shorten
 from atwood_library import Damper, Ground, Link, Pivot, PointMass, PositionSensor, Rod, Spring, Weld
 from atwood_library.scenes import SCENES
 

@@ -1,6 +1,6 @@
 """The mechanism report: what Atwood made of a scene, before anything runs."""
 
-from atwood.report.mechanism import (
+from atwood.reporting.mechanism import (
     BodyEntry,
     DroppedPart,
     JointEntry,

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from atwood.report.mechanism import MechanismReport
+    from atwood.reporting.mechanism import MechanismReport
 
 __all__ = ["as_text", "count_of", "facts", "shorten", "title"]
 

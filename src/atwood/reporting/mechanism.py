@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from atwood.forms.assembly import Assembly
 from atwood.model.composite import Model
 from atwood.pipeline import assemble, assemble_flat
-from atwood.report.parts import (
+from atwood.reporting.parts import (
     BodyEntry,
     DroppedPart,
     JointEntry,
@@ -111,7 +111,7 @@ class MechanismReport:
     parameters: tuple[ParameterEntry, ...]
 
     def __str__(self) -> str:
-        from atwood.report.text import as_text
+        from atwood.reporting.text import as_text
 
         return as_text(self)
 
