@@ -1,0 +1,360 @@
+"""Accelerations as a program of (t, q, u), for methods that need ``u'`` itself.
+
+Three ways of solving the balance of forces are written out, and the cheapest is kept:
+
+- the mass matrix of the generalized coordinates, which is short for few of them, or where they hardly touch;
+- the bodies' own coordinates with the forces of the joints as further unknowns, masses first: what is left is one
+  equation for each joint force, which touches only those of neighbouring joints;
+- the same, one body after the other from the leaves of the mechanism to its root.
+
+The last two grow with the number of bodies; the bodies' accelerations are projected back on the generalized
+coordinates, in terms of which everything is written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from atwood.expr import (
+    Expression,
+    InputGroup,
+    OutputGroup,
+    Program,
+    collect,
+    jacobian,
+    live,
+    solve,
+    substitute,
+)
+from atwood.expr.collect import cost
+from atwood.mechanics.augmented import (
+    Step,
+    SymmetricSystem,
+    back_substitute,
+    difference,
+    eliminate,
+    fill_of,
+    minimum_degree,
+    place_differences,
+)
+from atwood.mechanics.equations import Equations
+
+if TYPE_CHECKING:
+    from atwood.forms.assembly import Assembly
+
+__all__ = ["AccelerationProgram", "Method", "acceleration_program"]
+
+Method = Literal["mass matrix", "joint forces", "leaves to root", "numeric"]
+
+_LARGEST_FILL = 20_000
+"""More products than these are left to a loop when the program runs."""
+
+_FEW = 6
+"""Up to so many coordinates all ways are tried; beyond, a mass matrix that is full costs more than it can save."""
+
+_PAIR = 8
+"""What is saved where a sine and a cosine are of the same angle, in additions."""
+
+_MUCH = 400
+"""More products than these for each unknown are no gain over a mass matrix."""
+
+_SMALL = 300
+"""Expressions of up to so many nodes are rewritten."""
+
+
+@dataclass(frozen=True)
+class AccelerationProgram:
+    """The accelerations of the reduced form without loops.
+
+    Attributes
+    ----------
+    program
+        Program of (t, q, u) with the accelerations.
+    method
+        How the balance of forces is solved.
+    """
+
+    program: Program
+    method: Method
+
+
+def acceleration_program(assembly: Assembly, method: Method | None = None) -> AccelerationProgram | None:
+    """Return the accelerations of a scene in generalized coordinates.
+
+    Parameters
+    ----------
+    assembly
+        The scene, assembled in either form.
+    method
+        How to solve for them; None takes what costs least.
+
+    Returns
+    -------
+    AccelerationProgram or None
+        None where constraints are left among the generalized coordinates, or the method asked for does not apply.
+    """
+    equations = assembly.reduced
+    if equations.constraints:
+        return None
+    best: tuple[int, Method, list[Expression]] | None = None
+    for name, found in _candidates(assembly, method):
+        price = _price(found, assembly.parameters)
+        if best is None or price < best[0]:
+            best = price, name, found
+    if best is None:
+        return None
+    groups = (
+        InputGroup("t", (equations.time,)),
+        InputGroup("q", equations.coordinates),
+        InputGroup("u", equations.speeds),
+    )
+    title = f"{assembly.flat.name} (accelerations)"
+    outputs = (OutputGroup("accelerations", tuple(best[2])),)
+    return AccelerationProgram(Program(title, groups, assembly.parameters, outputs), best[1])
+
+
+def _price(values: Sequence[Expression], parameters: Sequence[Expression]) -> int:
+    """Return what an evaluation costs, where a sine comes with the cosine of the same angle for little more."""
+    return cost(values, parameters) - _PAIR * (_waves(values) - _waves(values, in_pairs=True))
+
+
+def _waves(values: Sequence[Expression], in_pairs: bool = False) -> int:
+    """Return how many sines and cosines there are; `in_pairs` counts one for both of an angle."""
+    waves = [n for n in live(values) if n.operation in ("sin", "cos") and not n.is_parametric]
+    return len({wave.arguments[0] for wave in waves}) if in_pairs else len(waves)
+
+
+def _candidates(assembly: Assembly, method: Method | None) -> Iterator[tuple[Method, list[Expression]]]:
+    """Yield the accelerations in the ways that apply."""
+    equations = assembly.reduced
+    if not equations.coordinates:
+        yield "mass matrix", []
+        return
+    tree: _Tree | None = None
+    if method in (None, "joint forces", "leaves to root") and _is_tree(assembly):
+        tree = _Tree(assembly)
+        for name, order in tree.orders():
+            for differences in (True, False) if method in (None, name) else ():
+                found = tree.accelerations(order, differences)
+                if found is None:
+                    return
+                yield name, found
+                if _waves(found) <= 2 * len(tree.angles):
+                    if name == "joint forces" and len(tree.u) > _FEW:
+                        return  # nothing can be much shorter
+                    break
+    if method == "numeric":
+        yield _by_mass_matrix(equations, assembly.rows, True)
+    elif method == "mass matrix" or (method is None and (tree is None or not tree.works or len(tree.u) <= _FEW)):
+        yield _by_mass_matrix(equations, assembly.rows, False)
+
+
+# -- the mass matrix ----------------------------------------------------------------------------------------------
+
+
+def _by_mass_matrix(equations: Equations, rows: Sequence[Expression], numeric: bool) -> tuple[Method, list[Expression]]:
+    """Return the accelerations from ``M a + bias = 0``."""
+    n = len(rows)
+    found = jacobian(list(rows), list(equations.accelerations))
+    bias = substitute(list(rows), dict.fromkeys(equations.accelerations, 0.0))
+    full = {(r, c): e for r, c, e in zip(found.rows, found.columns, found.entries, strict=True)}
+    entries = {place: entry for place, entry in full.items() if place[0] <= place[1]}
+    order = minimum_degree(list(entries), n, [i for i in range(n) if (i, i) in full and full[i, i].is_parametric])
+    if numeric or fill_of(list(entries), order) > _LARGEST_FILL or any((i, i) not in full for i in range(n)):
+        zero = equations.graph.zero
+        matrix = [[entries.get((min(r, c), max(r, c)), zero) for c in range(n)] for r in range(n)]
+        return "numeric", solve(matrix, [-b for b in bias])
+    steps = eliminate(SymmetricSystem(entries, bias, [1] * n), order)
+    known: dict[int, Expression] = {}
+    for step in reversed(steps):
+        known[step.unknown] = back_substitute(step, known)
+    return "mass matrix", [-known[i] for i in range(n)]
+
+
+# -- the augmented system -----------------------------------------------------------------------------------------
+
+
+def _is_tree(assembly: Assembly) -> bool:
+    """Return whether the joints of a mechanism form a tree in which each takes away freedom of its own."""
+    reduced, maximal = assembly.reduced, assembly.maximal
+    return (
+        not reduced.eliminated
+        and not reduced.forest.cuts
+        and len(maximal.constraints) > 0
+        and len(reduced.coordinates) == len(maximal.coordinates) - len(maximal.constraints)
+    )
+
+
+class _Tree:
+    """The balance of forces of a tree in the coordinates of its bodies, at a state of the generalized coordinates."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.reduced, self.maximal = assembly.reduced, assembly.maximal
+        self.graph = self.reduced.graph
+        self.parameters = assembly.parameters
+        self.u = self.reduced.speeds
+        self.differences = True
+        self.angles = [q for q, c in zip(self.reduced.coordinates, self.reduced.names, strict=True) if c.unit == "rad"]
+        outputs = assembly.to_maximal.outputs
+        symbols = (*self.maximal.coordinates, *self.maximal.speeds)
+        self.places = dict(zip(symbols, (*outputs[0].expressions, *outputs[1].expressions), strict=True))
+        self.bodies = self._bodies_of_coordinates()
+        self.depth = {one.body: i for i, one in enumerate(self.reduced.forest.attachments, 1)}
+        self.system = self._system()
+        self.works = all(not self.system.entries.get((i, i), self.graph.zero).is_zero for i in range(self.masses))
+
+    @property
+    def masses(self) -> int:
+        """Number of the bodies' coordinates."""
+        return len(self.maximal.coordinates)
+
+    def tidy(self, values: list[Expression]) -> list[Expression]:
+        """Rewrite expressions of few neighbours as by hand."""
+        nodes = live(values)
+        if len(nodes) > _SMALL:
+            return values
+        used = {node.index for node in nodes}
+        angles = [a for a in self.angles if a.index in used] if self.differences else []
+        parameters = [node for node in nodes if node.is_symbol and node.is_parametric]
+        return collect(values, angles, parameters)
+
+    def _bodies_of_coordinates(self) -> list[int]:
+        forest = self.maximal.forest
+        bodies = [0] * len(forest.coordinates)
+        for one in forest.attachments:
+            for number in one.coordinates:
+                bodies[number] = one.body
+        for turn in forest.orientations:
+            if turn.coordinate is not None:
+                bodies[turn.coordinate] = turn.body
+        return bodies
+
+    def _system(self) -> SymmetricSystem:
+        """Return ``M a - G^T lambda = -bias``, ``G a = -gamma``."""
+        maximal, n = self.maximal, self.masses
+        at_rest = dict.fromkeys(maximal.accelerations, 0.0)
+        mass = jacobian(list(maximal.rows), list(maximal.accelerations))
+        slope = jacobian([one.rate for one in maximal.constraints], list(maximal.speeds))
+        sides = [*maximal.rows, *(one.second for one in maximal.constraints)]
+        sides = [-side for side in substitute(sides, at_rest)]
+        made = place_differences([*mass.entries, *slope.entries, *sides], self.places)
+        places = [(r, c) for r, c in zip(mass.rows, mass.columns, strict=True)]
+        places += [(c, n + r) for r, c in zip(slope.rows, slope.columns, strict=True)]
+        entries = {(i, j): entry for (i, j), entry in zip(places, made, strict=False) if i <= j}
+        return SymmetricSystem(entries, made[len(places) :], [1] * n + [-1] * len(maximal.constraints))
+
+    def orders(self) -> Iterator[tuple[Method, list[int]]]:
+        """Yield the orders of elimination in which every pivot is positive and little is added."""
+        if not self.works:
+            return
+        n = self.masses
+        held: dict[int, list[int]] = {n + k: [] for k in range(len(self.maximal.constraints))}
+        inside = True
+        for i, j in self.system.entries:
+            if j >= n:
+                held[j].append(self.bodies[i])
+            elif self.bodies[i] != self.bodies[j]:
+                inside = False
+        if any(len(set(bodies)) not in (1, 2) for bodies in held.values()):
+            return
+        child = {number: max(self.depth[body] for body in bodies) for number, bodies in held.items()}
+        last = sorted(held, key=lambda number: -child[number])
+        depths = [self.depth[body] for body in self.bodies]
+        both = [(-depths[i], 0, i) for i in range(n)] + [(-child[j], 1, j) for j in held]
+        masses_first: list[tuple[Method, list[int]]] = [("joint forces", [*range(n), *last])] if inside else []
+        for name, order in (*masses_first, ("leaves to root", [number for _, _, number in sorted(both)])):
+            if fill_of(list(self.system.entries), order) <= _MUCH * len(order):
+                yield name, order
+
+    def accelerations(self, order: Sequence[int], differences: bool) -> list[Expression] | None:
+        """Return the accelerations of the generalized coordinates, by elimination in an order.
+
+        With `differences` there may be sines and cosines of differences of angles: in a chain these take the place of
+        those of the angles, but where many parts meet there is a difference for each pair.
+        """
+        self.differences = differences
+        steps = eliminate(self.system, order, self.tidy)
+        true: dict[Expression, Expression] = {}
+        exact: dict[int, Expression] = {}
+        short: dict[int, Expression] = {}
+        for step in reversed(steps):
+            self._find(step, exact, short, true)
+        return self._project({i: short[i] for i in range(self.masses)}, true)
+
+    def _find(
+        self, step: Step, exact: dict[int, Expression], short: dict[int, Expression], true: dict[Expression, Expression]
+    ) -> None:
+        """Find one unknown: exactly, and in terms of symbols for those that are worked out by themselves."""
+        p = step.unknown
+        if step.is_near and p < self.masses:
+            short[p] = back_substitute(step, short)
+            exact[p] = back_substitute(step, exact)
+            return
+        exact[p] = back_substitute(step, exact)
+        short[p] = self.graph.symbol(f"unknown {p}")
+        true[short[p]] = exact[p]
+
+    def _project(
+        self, found: Mapping[int, Expression], true: Mapping[Expression, Expression]
+    ) -> list[Expression] | None:
+        """Return the accelerations of the generalized coordinates from those of the bodies."""
+        reduced, maximal = self.reduced, self.maximal
+        a = reduced.accelerations
+        known: dict[Expression, Expression] = {}
+        own = {turn.body: turn.coordinate for turn in maximal.forest.orientations}
+        for turn in reduced.forest.orientations:
+            if turn.coordinate is not None:
+                number = own.get(turn.body)
+                if number is None:
+                    return None
+                known[a[turn.coordinate]] = found[number]
+        joints = [one for one in reduced.forest.attachments if one.coordinates]
+        here = [_relative(reduced, one.node, one.parent) for one in joints]
+        there = [value for one in joints for value in _relative(maximal, one.node, one.parent)]
+        places = {**self.places, **{maximal.accelerations[i]: value for i, value in found.items()}}
+        there = place_differences(there, places)
+        for k, one in enumerate(joints):
+            wanted = [a[i] for i in one.coordinates]
+            d = len(here[k])
+            solution = self._solve_joint(substitute(here[k], known), there[k * d : k * d + d], wanted)
+            if solution is None:
+                return None
+            known.update(zip(wanted, solution, strict=True))
+        if any(symbol not in known for symbol in a):
+            return None
+        return substitute([known[symbol] for symbol in a], true)
+
+    def _solve_joint(
+        self, here: Sequence[Expression], there: Sequence[Expression], wanted: Sequence[Expression]
+    ) -> list[Expression] | None:
+        """Solve ``here = there``, which is affine in what is wanted, in the sense of least squares."""
+        slopes = jacobian(list(here), list(wanted))
+        zero = self.graph.zero
+        entry = {(r, c): e for r, c, e in zip(slopes.rows, slopes.columns, slopes.entries, strict=True)}
+        rest = substitute(list(here), dict.fromkeys(wanted, 0.0))
+        gaps = [t - r for t, r in zip(there, rest, strict=True)]
+        k = len(wanted)
+        columns = [[entry.get((r, c), zero) for r in range(len(here))] for c in range(k)]
+        squares = {(i, j): _dot(columns[i], columns[j]) for i in range(k) for j in range(i, k)}
+        if any(squares[i, i].is_zero for i in range(k)):
+            return None
+        steps = eliminate(SymmetricSystem(squares, [_dot(c, gaps) for c in columns], [1] * k), range(k), self.tidy)
+        solution: dict[int, Expression] = {}
+        for step in reversed(steps):
+            solution[step.unknown] = back_substitute(step, solution)
+        return self.tidy([solution[i] for i in range(k)])
+
+
+def _relative(equations: Equations, node: int, parent: int) -> list[Expression]:
+    """Return the acceleration of a node less that of the node that it hangs on."""
+    accelerations = equations.kinematics.accelerations
+    return [difference(p, q) for p, q in zip(accelerations[node], accelerations[parent], strict=True)]
+
+
+def _dot(a: Sequence[Expression], b: Sequence[Expression]) -> Expression:
+    total = a[0] * b[0]
+    for p, q in zip(a[1:], b[1:], strict=True):
+        total = total + p * q
+    return total
