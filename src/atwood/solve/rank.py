@@ -17,6 +17,9 @@ __all__ = ["RankFinding", "find_rank"]
 
 FloatArray = NDArray[np.float64]
 
+_ADMISSIBLE = 1e-9
+"""How well a position near the start must fulfil the constraints to be asked for their rank."""
+
 
 @dataclass(frozen=True)
 class RankFinding:
@@ -82,8 +85,12 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
         along = random.standard_normal(len(admissible)) @ admissible
         moved = q + step * scales * along / np.linalg.norm(along)
         nearby, _ = balance.project(t, moved, still, scales)
-        if max(balance.misses(t, nearby, still, scales)[:1]) > 1e-9:
-            continue
+        if balance.misses(t, nearby, still, scales)[0] > _ADMISSIBLE:
+            # From a singular position, Newton's method falls back into it unless something holds it away.
+            held = np.where(np.arange(len(q)) == np.argmax(np.abs(along)), 0.0, scales)
+            nearby, _ = balance.project(t, moved, still, held, iterations=30)
+            if balance.misses(t, nearby, still, scales)[0] > _ADMISSIBLE:
+                continue
         found = independent_rows(scaled(nearby))
         if len(found) > len(best):
             best = found
