@@ -8,13 +8,13 @@ from math import inf
 from atwood.solve.event_watch import ROUNDING
 from atwood.solve.ida_sundae import STALLED_STEPS
 
-__all__ = ["Pace"]
+__all__ = ["FIRST_CHUNK", "FIRST_COMPILED_CHUNK", "Pace"]
 
 MOMENT = 0.02
 """IDA is left alone for about so long, in seconds."""
 
-FIRST_CHUNK, LARGEST_CHUNK = 20, 1_000_000
-"""How many steps IDA is left alone for: at first, and at most."""
+FIRST_CHUNK, FIRST_COMPILED_CHUNK, LARGEST_CHUNK = 20, 500, 1_000_000
+"""How many steps IDA is left alone for: at first, at first with compiled functions, and at most."""
 
 
 @dataclass
