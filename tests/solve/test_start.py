@@ -93,7 +93,7 @@ def test_contradictions_name_their_paths(start: dict[str, float], named: list[st
 
 
 def test_unknown_paths_have_near_matches() -> None:
-    with pytest.raises(StartError, match=r"rod1\.angel.*did you mean 'rod1\.angle'"):
+    with pytest.raises(StartError, match=r"rod1\.angel.*Did you mean 'rod1\.angle'"):
         found(double({"rod1.angel": 0.3}))
     with pytest.raises(StartError, match=r"bob2\.position\.x"):
         found(double({"bob2.positon.x": 0.3}))
@@ -223,9 +223,9 @@ def test_tolerances_make_sense(rtol: float) -> None:
 
 
 def test_forms_and_levels_have_near_matches() -> None:
-    with pytest.raises(UsageError, match="did you mean 'reduced'"):
+    with pytest.raises(UsageError, match="Did you mean 'reduced'"):
         assemble(SimplePendulum(), form="redcued")
-    with pytest.raises(UsageError, match="did you mean 'index1'"):
+    with pytest.raises(UsageError, match="Did you mean 'index1'"):
         assemble(SimplePendulum(), form="dae", level="index3")
 
 
