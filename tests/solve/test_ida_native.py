@@ -110,6 +110,16 @@ def turning() -> ImplicitProblem:
     )
 
 
+EVENTS = ctypes.CFUNCTYPE(
+    ctypes.c_int,
+    ctypes.c_double,
+    ctypes.c_void_p,
+    ctypes.c_void_p,
+    ctypes.POINTER(ctypes.c_double),
+    ctypes.c_void_p,
+)
+
+
 def with_c_functions(problem: ImplicitProblem, record: Record, weights: bool = False) -> ImplicitProblem:
     """The same problem, handing over addresses of C functions."""
     sundials = sundials_library.library()
@@ -120,16 +130,28 @@ def with_c_functions(problem: ImplicitProblem, record: Record, weights: bool = F
         tables = np.zeros(problem.size), np.zeros(problem.size)
         own = weight_function(*tables, record, sundials)
 
+        def find(t: float, y: int, yp: int, out: Any, _: Any) -> int:
+            assert problem.events is not None
+            state = [
+                np.array((ctypes.c_double * problem.size).from_address(sundials.N_VGetArrayPointer(v))) for v in (y, yp)
+            ]
+            values = problem.events(t, *state)
+            for k, value in enumerate(values):
+                out[k] = value
+            return int(not np.isfinite(values).all())
+
         def set_weights(relative: Any, absolute: Any) -> None:
             tables[0][:], tables[1][:] = relative, absolute
 
+        events = EVENTS(find) if problem.events is not None else None
         return NativeCallbacks(
             address(residual),
             address(jacobian),
+            events=address(events) if events is not None else 0,
             weights=address(own) if weights else 0,
             set_weights=set_weights if weights else None,
             missing_values=lambda: record.missing,
-            keep=(residual, jacobian, own),
+            keep=(residual, jacobian, own, events),
         )
 
     return replace(problem, native=native)
@@ -367,6 +389,46 @@ class TestCompiled:
         reference = ida_sundae.open_session(oscillator(), TIGHT, 0.0, np.array([1.0, 0]), np.array([0, -1.0]))
         assert_allclose(end.y, reference.advance(5.0).y, rtol=1e-12)
         assert session.statistics.steps == reference.statistics.steps
+
+    @pytest.mark.parametrize("polled", [False, True])
+    @pytest.mark.parametrize("outputs", [2, 7, 200])
+    def test_compiled_events_are_the_same_events(self, polled: bool, outputs: int) -> None:
+        """IDA says in which steps something happens; the answers are those of looking at every step."""
+        options = SolverOptions(1e-6, 1e-8)
+        events = {
+            "events": lambda t, y, yp: (y[0], y[1] - 0.9, y[0] - 0.3, y[0] + 0.1, 1.0),
+            "event_count": 5,
+            "event_directions": (0, 1, -1, 0, 0),
+        }
+        plain = oscillator(**events)
+        found: list[list[Any]] = []
+        evaluations = []
+        for problem in (plain, with_c_functions(plain, Record())):
+            session = ida_native.open_session(problem, options, 0.0, np.array([1.0, 0]), np.array([0, -1.0]))
+            session.budget = Budget(poll=lambda t: None) if polled else Budget()
+            ends = []
+            for t in np.linspace(0.0, 15.0, outputs):
+                while (end := session.advance(t)).status is Status.EVENT:
+                    ends.append((end.t, end.events, *end.y))
+                    if len(ends) % 4 == 0:
+                        session.reinitialize(end.t, end.y, end.yp)
+                assert (end.status, end.t) == (Status.REACHED, t)
+            found.append(ends)
+            evaluations.append(session.statistics.event_evaluations)
+        assert [end[1] for end in found[0]] == [end[1] for end in found[1]]
+        assert_allclose([end[0] for end in found[0]], [end[0] for end in found[1]], rtol=1e-12)
+        assert len(found[0]) > 14
+        if not polled and outputs == 2:
+            assert evaluations[1] < 0.9 * evaluations[0]
+
+    def test_a_compiled_event_without_a_value_ends_the_run(self) -> None:
+        plain = oscillator(events=lambda t, y, yp: (math.nan if t > 1.0 else 1.0,), event_count=1)
+        session = ida_native.open_session(
+            with_c_functions(plain, Record()), TIGHT, 0.0, np.array([1.0, 0]), np.array([0, -1.0])
+        )
+        end = session.advance(5.0)
+        assert end.status is Status.FAILED
+        assert "event function" in end.message
 
 
 def _machine_code() -> tuple[tuple[int, int], object]:

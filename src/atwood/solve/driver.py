@@ -66,6 +66,10 @@ class NativeCallbacks:
     set_weights
         ``set_weights(relative, absolute)``, called once before `weights` is used: it makes it give
         ``1 / (relative[i] * |y[i]| + absolute[i])``.
+    events
+        An ``IDARootFn``: ``int (double t, N_Vector y, N_Vector yp, double *values, void *data)``, with the values of
+        the problem's event functions; 0 for none.  It tells in which steps something happens; what happens there,
+        and when, is then found out with the problem's own functions.
     missing_values
         How often residual and Jacobian had no finite value so far, if somebody counts it.
     keep
@@ -77,6 +81,7 @@ class NativeCallbacks:
     user_data: int = 0
     weights: int = 0
     set_weights: Callable[[FloatArray, FloatArray], None] | None = None
+    events: int = 0
     missing_values: Callable[[], int] | None = None
     keep: object = None
 

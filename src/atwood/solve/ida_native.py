@@ -13,11 +13,11 @@ from __future__ import annotations
 import time
 from contextlib import nullcontext
 from dataclasses import replace
-from math import inf, isfinite
+from math import inf
 
 import numpy as np
 
-from atwood.errors import KernelEvaluationError, StartError, UsageError
+from atwood.errors import KernelEvaluationError, UsageError
 from atwood.solve.driver import (
     Advance,
     Budget,
@@ -34,9 +34,15 @@ from atwood.solve.native_callbacks import InterruptLater, Record, explain
 from atwood.solve.native_memory import ONE_STEP, TO_TIME, Counts
 from atwood.solve.native_pace import FIRST_CHUNK, FIRST_COMPILED_CHUNK, Pace
 from atwood.solve.native_setup import IdaTuning, prepare
+from atwood.solve.native_states import checked_state, copied, is_finite
 from atwood.solve.sundials_library import available, why_not
 
 __all__ = ["IdaTuning", "NativeSession", "available", "open_session", "why_not"]
+
+ROOT_RETURN = 2
+"""IDA's flag when an event function has changed its sign."""
+
+EVENT_REASONS = {-10: "an event function has no value"}
 
 TOO_MUCH_WORK = -1
 """IDA's flag when it has taken as many steps as it was allowed to."""
@@ -104,7 +110,7 @@ class NativeSession:
         self._problem = problem
         self._horizon = options.horizon
         self._record = Record()
-        state = self._checked(t, y, yp)
+        state = checked_state(problem.size, t, y, yp)
         linear_solver = choose_linear_solver(problem, options)
         self._native = None if problem.native is None else problem.native(linear_solver)
         self._memory = prepare(
@@ -113,6 +119,8 @@ class NativeSession:
         self._stop_time = None if tuning is None else tuning.stop_time
         self._guard = self._memory.library.sparse_guard if linear_solver == "sparse" else nullcontext()
         self._watch = EventWatch(problem, options.horizon) if problem.events is not None else None
+        # Whether IDA itself can tell in which steps something happens.
+        self._finds_events = self._native is not None and self._native.events != 0
         self._no_events = (0,) * problem.event_count
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
         self._starts = 0
@@ -154,7 +162,7 @@ class NativeSession:
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray) -> None:
         """Go on from another consistent state, after an event, a change of mode, or a projection."""
         self._check_open()
-        self._restart(self._checked(t, y, yp))
+        self._restart(checked_state(self._problem.size, t, y, yp))
 
     def advance(self, t_out: float) -> Advance:
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
@@ -193,16 +201,6 @@ class NativeSession:
             raise
         finally:
             self._seconds += time.perf_counter() - began
-
-    def _checked(self, t: float, y: FloatArray, yp: FloatArray) -> State:
-        state = (float(t), np.array(y, dtype=np.float64), np.array(yp, dtype=np.float64))
-        size = self._problem.size
-        for part in state[1:]:
-            if part.shape != (size,):
-                raise UsageError(f"the state has {size} unknowns, but was given values of shape {part.shape}")
-        if not (isfinite(t) and np.isfinite(state[1]).all() and np.isfinite(state[2]).all()):
-            raise StartError(f"the start values at t = {t} are not all finite numbers")
-        return state
 
     def _check_open(self) -> None:
         if self._memory.is_closed:
@@ -244,13 +242,12 @@ class NativeSession:
     def _run(self, t_out: float, began: float) -> Advance:
         if self._stale:
             self._restart(self._here)
-        by_steps = self._watch is not None or self.budget.poll is not None
+        by_steps = self.budget.poll is not None or (self._watch is not None and not self._finds_events)
         while True:
-            if by_steps:
-                root = self._find_root()
-                if root is not None and root.state[0] <= t_out:
-                    self._root, self._here = None, root.state
-                    return Advance(*_copied(root.state), Status.EVENT, root.events)
+            root = self._find_root()
+            if root is not None and root.state[0] <= t_out:
+                self._root, self._here = None, root.state
+                return Advance(*copied(root.state), Status.EVENT, root.events)
             if t_out <= self._reached:
                 return self._arrive(t_out)
             if by_steps:
@@ -265,11 +262,11 @@ class NativeSession:
     def _arrive(self, t_out: float) -> Advance:
         if t_out > self._here[0]:
             state = self._interpolate(t_out)
-            if not _finite(state[1], state[2]):
+            if not is_finite(state[1], state[2]):
                 self._stale = True
                 return self._stopped(Status.FAILED, "the solution is no longer finite")
             self._here = state
-        return Advance(*_copied(self._here), Status.REACHED, self._no_events)
+        return Advance(*copied(self._here), Status.REACHED, self._no_events)
 
     def _find_root(self) -> Root | None:
         """Return the first root in the part of the last step that has not been handed out."""
@@ -311,14 +308,15 @@ class NativeSession:
         """Take one internal step, and return an answer only if that failed."""
         before = self._reached
         flag, t = self._solve(before + self._horizon, ONE_STEP)
-        if self._behind and flag >= 0 and t <= before:
-            # IDA first hands out the end of the step that it has already taken.
+        while self._behind and flag >= 0 and t <= before:
+            # IDA first hands out what it has not yet handed out of the step that it has already taken.
+            self._behind = flag == ROOT_RETURN
             flag, t = self._solve(before + self._horizon, ONE_STEP)
-        self._behind = False
         failure = self._judge(flag, t)
         if failure is None:
-            self._reached = t
-            self._newest = t, self._memory.y.copy(), self._memory.yp.copy()
+            self._behind = flag == ROOT_RETURN
+            self._reached = self._memory.time() if self._behind else t
+            self._newest = None if self._behind else (t, self._memory.y.copy(), self._memory.yp.copy())
         return failure
 
     def _stride(self, t_out: float) -> Advance | None:
@@ -335,10 +333,14 @@ class NativeSession:
         pace.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
         if flag >= 0:
             self._reached = self._memory.time()
+            if self._watch is not None:
+                # IDA has looked for events: up to where it was sent, or not up to the end of a step that has one.
+                begin = self._memory.begin_of_step()
+                self._searched = max(self._searched, begin if flag == ROOT_RETURN else t)
             return None
         failure = self._judge(0 if flag == TOO_MUCH_WORK else flag, t)
         if failure is None:
-            self._reached = t
+            self._reached = self._searched = t
             self._here = t, self._memory.y.copy(), self._memory.yp.copy()
         return failure
 
@@ -350,7 +352,7 @@ class NativeSession:
 
     def _judge(self, flag: int, t: float) -> Advance | None:
         """Return an answer if IDA has failed, or does not get on, after it went to a time."""
-        finite = _finite(self._memory.y, self._memory.yp)
+        finite = is_finite(self._memory.y, self._memory.yp)
         if flag < 0:
             self._stale = True
             if finite and t > self._here[0]:
@@ -358,7 +360,9 @@ class NativeSession:
             self._record.raise_again()
             if self._native is not None:
                 explain(self._problem, self._record, [(self._here[0], *self._memory.last_tried()), *self._ahead()])
-            return self._stopped(Status.FAILED, REASONS.get(flag, f"IDA stopped with flag {flag}"))
+            return self._stopped(
+                Status.FAILED, REASONS.get(flag) or EVENT_REASONS.get(flag, f"IDA stopped with flag {flag}")
+            )
         if not finite:
             self._stale = True
             return self._stopped(Status.FAILED, "the solution is no longer finite")
@@ -380,17 +384,4 @@ class NativeSession:
         message, equation = f"{reason} (at t = {t:.9g})", None
         if status is Status.FAILED and record.complaint and record.time >= min(t, since):
             message, equation = f"{message}; {record.complaint}", record.equation
-        return Advance(*_copied(self._here), status, self._no_events, message, equation)
-
-
-def _finite(y: FloatArray, yp: FloatArray) -> bool:
-    """Tell whether all values are finite; a sum of squares says so quickly, unless it overflows."""
-    if np.dot(y, y) + np.dot(yp, yp) < inf:
-        return True
-    return bool(np.isfinite(y).all() and np.isfinite(yp).all())
-
-
-def _copied(state: State) -> State:
-    """Return a state whose arrays the caller may keep and change."""
-    t, y, yp = state
-    return t, y.copy(), yp.copy()
+        return Advance(*copied(self._here), status, self._no_events, message, equation)

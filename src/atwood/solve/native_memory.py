@@ -187,6 +187,12 @@ class IdaMemory:
         self.library.IDAGetCurrentTime(self._ida, self._time_place)
         return self._time.value
 
+    def begin_of_step(self) -> float:
+        """Return the time at the begin of the last step."""
+        end = self.time()
+        self.library.IDAGetLastStep(self._ida, self._time_place)
+        return end - self._time.value
+
     def steps(self) -> int:
         """Return the number of steps since the last start."""
         self.library.IDAGetNumSteps(self._ida, self._count_place)

@@ -99,6 +99,9 @@ def prepare(
         memory.call("IDASetSuppressAlg", int(tuning.suppress_algebraic))
     newton = tuning.newton_coefficient or (TIGHT_NEWTON if problem.algebraic else LOOSE_NEWTON)
     memory.call("IDASetNonlinConvCoef", newton)
+    if native.events:
+        memory.call("IDARootInit", problem.event_count, native.events)
+        memory.call("IDASetNoInactiveRootWarn")
     memory.call("IDASetMaxOrd", options.max_order)
     if options.first_step is not None:
         memory.call("IDASetInitStep", options.first_step)
