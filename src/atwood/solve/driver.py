@@ -67,9 +67,9 @@ class NativeCallbacks:
         ``set_weights(relative, absolute)``, called once before `weights` is used: it makes it give
         ``1 / (relative[i] * |y[i]| + absolute[i])``.
     events
-        An ``IDARootFn``: ``int (double t, N_Vector y, N_Vector yp, double *values, void *data)``, with the values of
-        the problem's event functions, which returns 0, or 1 where one is not a number; 0 for none.  It tells in which steps something happens; what happens there,
-        and when, is then found out with the problem's own functions.
+        An ``IDARootFn``: ``int (double t, N_Vector y, N_Vector yp, double *values, void *data)``; 0 for none.  It
+        writes the values of the problem's event functions and returns 0, or 1 where one is not a number.  It tells
+        in which steps something happens; what and when is then found out with the problem's own functions.
     missing_values
         How often residual and Jacobian had no finite value so far, if somebody counts it.
     keep
