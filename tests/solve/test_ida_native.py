@@ -138,7 +138,7 @@ def with_c_functions(problem: ImplicitProblem, record: Record, weights: bool = F
             values = problem.events(t, *state)
             for k, value in enumerate(values):
                 out[k] = value
-            return int(np.isnan(values).any())
+            return int(not np.isfinite(values).all())
 
         def set_weights(relative: Any, absolute: Any) -> None:
             tables[0][:], tables[1][:] = relative, absolute

@@ -68,7 +68,7 @@ class NativeCallbacks:
         ``1 / (relative[i] * |y[i]| + absolute[i])``.
     events
         An ``IDARootFn``: ``int (double t, N_Vector y, N_Vector yp, double *values, void *data)``; 0 for none.  It
-        writes the values of the problem's event functions and returns 0, or 1 where one is not a number.  It tells
+        writes the values of the problem's event functions and returns 0, or 1 where one is not finite.  It tells
         in which steps something happens; what and when is then found out with the problem's own functions.
     missing_values
         How often residual and Jacobian had no finite value so far, if somebody counts it.
