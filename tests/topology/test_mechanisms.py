@@ -16,6 +16,7 @@ from atwood_library import (
     PointMass,
     Pulley,
     Rod,
+    RotaryDrive,
     Slider,
     Spring,
     Torque,
@@ -298,3 +299,56 @@ def test_a_failed_scene_can_be_mended() -> None:
     scene["two"].position = (2.0, 0.0, 0.0)
     assert assemble(scene).reduced.coordinates
     assert math.isfinite(simulate(scene, t_end=0.1, outputs=2).array("mass.position.z")[-1])
+
+
+def truss(reach: float, rods: int = 2) -> Scene:
+    scene = Scene(t_end=0.5)
+    mass = scene.add("mass", PointMass(mass=2.0))
+    for i in range(rods):
+        ground = scene.add(f"ground{i}", Ground(position=(i * 1.0, 0.0, 0.0)))
+        length = reach if i < 2 else math.hypot(1.5, math.sqrt(0.75))
+        rod = scene.add(f"rod{i}", Rod(length=length))
+        scene.connect(ground.frame, rod.a)
+        scene.connect(rod.b, mass.point)
+    scene.guess.update({"mass.position.x": 0.5, "mass.position.z": -0.8 if reach > 0.5 else 0.0})
+    return scene
+
+
+@pytest.mark.parametrize("rods", [2, 3])
+def test_a_truss_cannot_move_and_carries_its_load(rods: int) -> None:
+    results = run_both(lambda: truss(1.0, rods), outputs=3)
+    assert_agree(*results, 1e-9)
+    for form in FORMS:
+        assert freedom(truss(1.0, rods), form) == (0, rods - 2)
+    end = results[0].at(-1)
+    assert sum(end[f"ground{i}.force.z"] for i in range(rods)) == pytest.approx(2.0 * 9.81)
+    if rods == 2:
+        assert end["rod0.tension"] == pytest.approx(9.81 / math.sqrt(0.75))
+
+
+def test_a_truss_in_line_is_a_singular_position() -> None:
+    # it closes, its constraints lose rank, and still it cannot move: no freedom is made of that
+    with pytest.raises(StartError, match="singular position"):
+        simulate(truss(0.5), form="dae")
+
+
+def test_a_motor_beside_a_pivot_is_redundant() -> None:
+    def make() -> Scene:
+        scene = Scene(t_end=1.0)
+        ground, pivot, link = scene.add("ground", Ground()), scene.add("pivot", Pivot()), scene.add("link", Link())
+        motor = scene.add("motor", RotaryDrive(rotation=lambda t: t))
+        for joint in (pivot, motor):
+            scene.connect(ground.frame, joint.a)
+            scene.connect(joint.b, link.a)
+        return scene
+
+    reduced, dae = run_both(make, outputs=5)
+    assert_agree(reduced, dae, 1e-8)
+    assert np.allclose(reduced.array("motor.torque"), 0.5 * 9.81 * np.cos(reduced.time))
+    assert np.allclose(reduced.array("motor.force.z"), reduced.array("pivot.force.z"))
+    scene = make()
+    other = scene.add("other", RotaryDrive(rotation=lambda t: 2.0 * t))
+    scene.connect(scene["ground"].frame, other.a)
+    scene.connect(other.b, scene["link"].a)
+    with pytest.raises(TopologyError, match="cannot hold"):
+        simulate(scene)

@@ -79,6 +79,7 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     _, sizes, directions = np.linalg.svd(matrix)
     rank = int(np.sum(sizes > 1e-7 * sizes[0]))
     admissible = directions[rank:]
+    asked = 0
     for step in (1e-2, 3e-2, 3e-2):
         if not len(admissible):
             break
@@ -91,9 +92,13 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
             nearby, _ = balance.project(t, moved, still, held, iterations=30)
             if balance.misses(t, nearby, still, scales)[0] > _ADMISSIBLE:
                 continue
+        asked += 1
         found = independent_rows(scaled(nearby))
         if len(found) > len(best):
             best = found
+    if len(admissible) and not asked and len(best) < count:
+        # It looks movable here and is not: a singular position, and no reason to call a constraint redundant.
+        best = list(range(count))
     redundant = tuple(i for i in range(count) if i not in set(best))
     lost = tuple(i for i in best if i not in set(at_start)) if len(at_start) < len(best) else ()
     return RankFinding(tuple(best), redundant, len(best), len(at_start), lost)

@@ -194,7 +194,9 @@ def _newton(
             break
         q, missing, matrix = trial, new_missing, new_matrix
         rows = row_scales(matrix, scales)
-    return q, missing / rows, matrix * scales / rows[:, None]
+    # What hardly changes with any coordinate, as where links line up, is measured by the scene.
+    sizes = np.maximum(rows, 1e-4 * max(np.max(rows, initial=0.0), np.max(scales, initial=0.0)))
+    return q, missing / sizes, matrix * scales / rows[:, None]
 
 
 def _solve_positions(
