@@ -22,7 +22,8 @@ from atwood.model.flatten import FlatScene, flatten
 from atwood.model.local import LocalPart, ParameterTable, localize
 from atwood.model.space import make_space
 from atwood.result.result import Result
-from atwood.solve.run import RunOptions, run
+from atwood.solve.options import RunOptions
+from atwood.solve.run import run
 from atwood.solve.start import find_start
 from atwood.topology.bodies import find_bodies
 from atwood.topology.graph import build_graph
@@ -138,6 +139,7 @@ def simulate(
     max_steps: int | None = None,
     max_seconds: float | None = None,
     max_step: float | None = None,
+    solver: str = "auto",
     progress: Callable[[float], object] | None = None,
 ) -> Result:
     """Simulate a scene from its start to its end.
@@ -158,6 +160,9 @@ def simulate(
         Limits; a run that meets one returns what it has, and says so in its status.
     max_step
         The largest step, s.
+    solver
+        ``"ida"``: SUNDIALS IDA with the equations as machine code. ``"ida-sundae"``: the same method through
+        scikit-sundae with the equations as Python, the reference. ``"auto"``: the first where it can be had.
     progress
         Called with the time reached, s.
 
@@ -185,6 +190,7 @@ def simulate(
         max_seconds=max_seconds,
         progress=progress,
         max_step=max_step,
+        solver=solver,
     )
 
     def reassemble(modes: Mapping[str, str]) -> Assembly:

@@ -103,7 +103,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     yield from (("event", one.describe()) for one in result.happenings if one.target != "stop")
     yield (
         "solver",
-        f"{solver_name()}, {count_of(statistics.steps, 'step')}, {statistics.residual_evaluations} residuals, "
+        f"{solver_name(result)}, {count_of(statistics.steps, 'step')}, {statistics.residual_evaluations} residuals, "
         f"{statistics.jacobian_evaluations} Jacobians, {duration(statistics.seconds)}",
     )
     yield "energy", _energy(result)

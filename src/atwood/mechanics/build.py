@@ -241,12 +241,7 @@ def _eliminate(
 def _weightless(mechanism: Mechanism, masses: Masses, forest: Forest) -> set[int]:
     """Return the numbers of the coordinates that only place a body without mass."""
     massive = {mechanism.bodies.body_of[node] for one in masses.coupled for node in one.nodes} | set(masses.bodies)
-    return {
-        number
-        for one in forest.attachments
-        if one.body not in massive
-        for number in one.coordinates
-    }
+    return {number for one in forest.attachments if one.body not in massive for number in one.coordinates}
 
 
 def _substituted(placements: Placements, solution: Mapping[Expression, Expression]) -> Placements:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from atwood.result.result import Result
+from atwood.solve.options import SOLVERS
+from atwood.solve.sundials_library import available, library
 
 __all__ = ["describe_run", "solver_name", "versions"]
 
@@ -21,18 +23,13 @@ def versions() -> dict[str, str]:
             found[name] = version(name)
         except PackageNotFoundError:  # a checkout that is not installed
             found[name] = "unknown"
-    try:
-        from sksundae import SUNDIALS_VERSION
-
-        found["sundials"] = str(SUNDIALS_VERSION)
-    except ImportError:
-        found["sundials"] = "unknown"
+    found["sundials"] = ".".join(map(str, library().version)) if available() else "unknown"
     return found
 
 
-def solver_name() -> str:
-    """Return the name of the solver that runs are made with."""
-    return "SUNDIALS IDA"
+def solver_name(result: Result) -> str:
+    """Return the name of the solver that a run was made with."""
+    return SOLVERS[result.run.solver]
 
 
 def describe_run(result: Result) -> dict[str, Any]:
@@ -63,7 +60,7 @@ def describe_run(result: Result) -> dict[str, Any]:
             {"time": one.time, "part": one.part, "what": one.message, "mode": one.target} for one in result.happenings
         ],
         "solver": {
-            "name": solver_name(),
+            "name": solver_name(result),
             "steps": statistics.steps,
             "residual_evaluations": statistics.residual_evaluations,
             "jacobian_evaluations": statistics.jacobian_evaluations,

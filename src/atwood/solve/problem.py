@@ -13,7 +13,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.program import FormProgram
 from atwood.kernels import BoundKernel
 from atwood.solve.balance import Balance, least_norm, solve_balance
-from atwood.solve.driver import ImplicitProblem
+from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.solve.rank import RankFinding, choose_dependent, dependence, find_rank
 from atwood.solve.scales import Scales, coordinate_scales, find_scales
 
@@ -131,7 +131,37 @@ class Plan:
             events=events,
             event_count=len(directions),
             event_directions=directions,
+            # Compiled functions cannot follow a change of the dependent coordinates.
+            native=None if self.dependent else self.compiled,
         )
+
+    def compiled(self, linear_solver: LinearSolver) -> NativeCallbacks:
+        """Return residual and Jacobian as machine code, for one session."""
+        from atwood.kernels import compile_ida_callbacks
+
+        program = self.program
+        code = compile_ida_callbacks(
+            program.residual,
+            program.jacobian,
+            program.rows,
+            program.columns,
+            program.size,
+            sparse=linear_solver == "sparse",
+        )
+        data = code.bind(self.assembly.parameter_values)
+        return NativeCallbacks(
+            code.residual_address,
+            code.jacobian_address,
+            data.address,
+            code.weights_address,
+            data.set_weights,
+            keep=(code, data),
+        )
+
+    @property
+    def angles(self) -> tuple[int, ...]:
+        """Unknowns that are angles, whose size does not say how accurate they must be."""
+        return tuple(i for i, one in enumerate(self.assembly.equations.names) if one.unit == "rad")
 
     def tolerances(self, relative: float) -> FloatArray:
         """Return the absolute tolerance of each unknown; multipliers are kept out of the error test."""

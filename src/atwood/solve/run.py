@@ -13,6 +13,7 @@ from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.solve.driver import Advance, Budget, Session, SolverOptions, Statistics, Status
 from atwood.solve.modes import EventProbe, Happening, enter_mode
+from atwood.solve.options import RunOptions, choose_solver, sample_times
 from atwood.solve.problem import Plan, make_plan, pack_state
 from atwood.solve.start import Start
 
@@ -20,41 +21,8 @@ __all__ = ["Run", "RunOptions", "Segment", "run"]
 
 FloatArray = NDArray[np.float64]
 
-_SAMPLES = 400
-"""A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it."""
-
 _CHATTER = 50
 """So many changes of mode without time passing end a run."""
-
-
-@dataclass(frozen=True)
-class RunOptions:
-    """How a run is made.
-
-    Attributes
-    ----------
-    t_end
-        Time of the end, s.
-    relative_tolerance
-        Error allowed in a step; absolute tolerances are this share of the scene's sizes.
-    outputs
-        Number of output times, evenly spread, or the times themselves.
-    max_steps, max_seconds
-        Limits of the run.
-    progress
-        Called with the time reached.
-    max_order, max_step
-        Limits for the method.
-    """
-
-    t_end: float
-    relative_tolerance: float = 1e-8
-    outputs: int | FloatArray = 201
-    max_steps: int | None = None
-    max_seconds: float | None = None
-    progress: Callable[[float], object] | None = None
-    max_order: int = 5
-    max_step: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +77,8 @@ class Run:
         The start.
     options
         What was asked for.
+    solver
+        What solved it: ``"ida"`` or ``"ida-sundae"``.
     """
 
     segments: tuple[Segment, ...]
@@ -118,6 +88,7 @@ class Run:
     message: str
     start: Start
     options: RunOptions
+    solver: str
 
 
 @dataclass
@@ -199,11 +170,12 @@ def run(
         raise UsageError(
             f"the end, t = {options.t_end:g}, is not after the start, t = {t:g}", advice="Give a later t_end."
         )
-    times, shown = _sample_times(t, options)
+    solver = choose_solver(options.solver)
+    times, shown = sample_times(t, options)
     q, u = _own_state(assembly, start)
     segments: list[Segment] = []
     happenings: list[Happening] = []
-    statistics = Statistics()
+    statistics = Statistics(error_test_failures=0, convergence_failures=0)
     recent = 0
     while True:
         plan = make_plan(assembly, t, q, u, start.length, options.t_end - start.time)
@@ -211,7 +183,18 @@ def run(
         recorder = _Recorder(plan)
         left = times > t
         outcome = _run_mode(
-            plan, probe, recorder, t, q, u, times[left], shown[left], bool(shown[~left][-1]), options, statistics
+            plan,
+            probe,
+            recorder,
+            t,
+            q,
+            u,
+            times[left],
+            shown[left],
+            bool(shown[~left][-1]),
+            options,
+            solver,
+            statistics,
         )
         segments.append(recorder.segment())
         statistics = statistics + outcome.statistics
@@ -231,7 +214,7 @@ def run(
         if t >= options.t_end:
             status, message = "finished", ""
             break
-    made = Run(tuple(segments), tuple(happenings), statistics, status, message, start, options)
+    made = Run(tuple(segments), tuple(happenings), statistics, status, message, start, options, solver)
     if status == "failed":
         error = SolveError(message, where=assembly.flat.name, advice="Look at what came before: the error's `run`.")
         error.run = made  # type: ignore[attr-defined]
@@ -259,6 +242,7 @@ def _run_mode(
     shown: NDArray[np.bool_],
     first_shown: bool,
     options: RunOptions,
+    solver: str,
     spent: Statistics,
 ) -> _Outcome:
     """Integrate in one mode until the end, an event or a limit."""
@@ -272,7 +256,7 @@ def _run_mode(
     already = probe.broken_at_start(t)
     if already is not None:
         return _Outcome(t, "event", "", already, Statistics())
-    session = _open(plan, probe, options, t, y, yp, spent)
+    session = _open(plan, probe, options, solver, t, y, yp, spent)
     try:
         return _integrate(plan, probe, recorder, session, times, shown, options)
     except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
@@ -314,10 +298,15 @@ def _integrate(
 
 
 def _open(
-    plan: Plan, probe: EventProbe, options: RunOptions, t: float, y: FloatArray, yp: FloatArray, spent: Statistics
+    plan: Plan,
+    probe: EventProbe,
+    options: RunOptions,
+    solver: str,
+    t: float,
+    y: FloatArray,
+    yp: FloatArray,
+    spent: Statistics,
 ) -> Session:
-    from atwood.solve.ida_sundae import open_session
-
     settings = SolverOptions(
         relative_tolerance=options.relative_tolerance,
         absolute_tolerances=plan.tolerances(options.relative_tolerance),
@@ -331,6 +320,13 @@ def _open(
         poll=plan.between_steps if plan.dependent else None,
     )
     problem = plan.problem(probe.function(), probe.directions)
+    if solver == "ida":
+        from atwood.solve import ida_native
+
+        tuning = ida_native.IdaTuning(angle_like=plan.angles)
+        return ida_native.open_session(problem, settings, t, y, yp, budget, tuning)
+    from atwood.solve.ida_sundae import open_session
+
     return open_session(problem, settings, t, y, yp, budget)
 
 
@@ -361,26 +357,3 @@ def _own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray
     kernel = assembly.kernel(assembly.to_maximal)
     q, u = kernel([start.time], start.coordinates, start.speeds)
     return np.asarray(q, dtype=float), np.asarray(u, dtype=float)
-
-
-def _sample_times(t: float, options: RunOptions) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return all sample times with the start, and which of them are outputs."""
-    if isinstance(options.outputs, (int, np.integer)):
-        if options.outputs < 2:
-            raise UsageError("there must be at least two outputs, the start and the end")
-        asked = np.linspace(t, options.t_end, int(options.outputs))
-    else:
-        asked = np.asarray(options.outputs, dtype=float)
-        if asked.ndim != 1 or not len(asked) or not np.all(np.isfinite(asked)) or np.any(np.diff(asked) <= 0.0):
-            raise UsageError("output times must be finite and rise")
-        if asked[0] < t or asked[-1] > options.t_end:
-            raise UsageError(f"output times must lie between {t:g} and {options.t_end:g}")
-    filling = np.linspace(t, options.t_end, _SAMPLES + 1)
-    near = 1e-9 * (options.t_end - t)
-    next_asked = np.minimum(np.searchsorted(asked, filling), len(asked) - 1)
-    distance = np.minimum(np.abs(asked[next_asked] - filling), np.abs(asked[np.maximum(next_asked - 1, 0)] - filling))
-    filling = filling[distance > near]
-    times = np.concatenate([asked, filling])
-    shown = np.concatenate([np.ones(len(asked), dtype=bool), np.zeros(len(filling), dtype=bool)])
-    order = np.argsort(times)
-    return times[order], shown[order]

@@ -13,7 +13,7 @@ from atwood.forms.dae import LEVELS
 from atwood.model.composite import Model
 from atwood.model.flatten import FlatScene, flatten
 from atwood.pipeline import FORMS, assemble_flat
-from atwood.result.about import solver_name
+from atwood.solve.options import SOLVERS, choose_solver
 from atwood.study.reference import Reference, find_reference, run_flat, scaled_difference
 from atwood.study.verdict import judge
 
@@ -197,10 +197,11 @@ def compare(
     end = flat.t_end if t_end is None else float(t_end)
     patience = None if max_seconds is None else 10.0 * max_seconds
     reference = find_reference(scene, flat, end, outputs, patience, lambda what: watch(what, 0, total))
+    solver = SOLVERS[choose_solver("auto")]
     rows: list[ComparisonRow] = []
     for form, level in kinds:
         for rtol in sorted(rtols, reverse=True):
-            row = ComparisonRow(form, level, solver_name(), rtol)
+            row = ComparisonRow(form, level, solver, rtol)
             watch(f"{row.label} at rtol {rtol:g}", len(rows) + 2, total)
             rows.append(_measure(flat, row, reference, max_seconds))
     return Comparison(flat.name, float(reference.time[-1]), reference, tuple(rows))

@@ -1,0 +1,104 @@
+"""How a run is made: its end, tolerances, outputs, limits and solver."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import UsageError, suggestion
+
+__all__ = ["SOLVERS", "RunOptions", "choose_solver", "sample_times"]
+
+FloatArray = NDArray[np.float64]
+
+SOLVERS = {"ida": "SUNDIALS IDA", "ida-sundae": "SUNDIALS IDA through scikit-sundae"}
+"""What can solve a scene, and what it is called."""
+
+_SAMPLES = 400
+"""A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it."""
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run is made.
+
+    Attributes
+    ----------
+    t_end
+        Time of the end, s.
+    relative_tolerance
+        Error allowed in a step; absolute tolerances are this share of the scene's sizes.
+    outputs
+        Number of output times, evenly spread, or the times themselves.
+    max_steps, max_seconds
+        Limits of the run.
+    progress
+        Called with the time reached.
+    max_order, max_step
+        Limits for the method.
+    solver
+        ``"ida"``, ``"ida-sundae"``, or ``"auto"``; see `choose_solver`.
+    """
+
+    t_end: float
+    relative_tolerance: float = 1e-8
+    outputs: int | FloatArray = 201
+    max_steps: int | None = None
+    max_seconds: float | None = None
+    progress: Callable[[float], object] | None = None
+    max_order: int = 5
+    max_step: float | None = None
+    solver: str = "auto"
+
+
+def choose_solver(asked: str) -> str:
+    """Return the driver to use: ``"ida"``, the shared SUNDIALS libraries driven directly, where they can be found.
+
+    Parameters
+    ----------
+    asked
+        ``"auto"``, ``"ida"``, or ``"ida-sundae"``, which drives them through scikit-sundae with kernels in Python: the
+        reference, and the way out where the libraries cannot be found (which is then said).
+
+    Raises
+    ------
+    UsageError
+        If there is no such solver, or ``"ida"`` was asked for and cannot be had.
+    """
+    from atwood.solve.sundials_library import available, why_not
+
+    if asked not in ("auto", *SOLVERS):
+        raise UsageError(f"there is no solver {asked!r}", advice=suggestion(asked, ("auto", *SOLVERS)))
+    if asked == "ida-sundae" or available():
+        return "ida-sundae" if asked == "ida-sundae" else "ida"
+    if asked == "ida":
+        raise UsageError(f"IDA cannot be driven directly: {why_not()}", advice="Use the solver 'ida-sundae'.")
+    warnings.warn(f"running through scikit-sundae, which is slower: {why_not()}", stacklevel=2)
+    return "ida-sundae"
+
+
+def sample_times(t: float, options: RunOptions) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return all sample times with the start, and which of them are outputs."""
+    if isinstance(options.outputs, (int, np.integer)):
+        if options.outputs < 2:
+            raise UsageError("there must be at least two outputs, the start and the end")
+        asked = np.linspace(t, options.t_end, int(options.outputs))
+    else:
+        asked = np.asarray(options.outputs, dtype=float)
+        if asked.ndim != 1 or not len(asked) or not np.all(np.isfinite(asked)) or np.any(np.diff(asked) <= 0.0):
+            raise UsageError("output times must be finite and rise")
+        if asked[0] < t or asked[-1] > options.t_end:
+            raise UsageError(f"output times must lie between {t:g} and {options.t_end:g}")
+    filling = np.linspace(t, options.t_end, _SAMPLES + 1)
+    near = 1e-9 * (options.t_end - t)
+    next_asked = np.minimum(np.searchsorted(asked, filling), len(asked) - 1)
+    distance = np.minimum(np.abs(asked[next_asked] - filling), np.abs(asked[np.maximum(next_asked - 1, 0)] - filling))
+    filling = filling[distance > near]
+    times = np.concatenate([asked, filling])
+    shown = np.concatenate([np.ones(len(asked), dtype=bool), np.zeros(len(filling), dtype=bool)])
+    order = np.argsort(times)
+    return times[order], shown[order]
