@@ -1,0 +1,253 @@
+"""The explicit method of order 8(5,3) as machine code: no Python runs between outputs.
+
+The code of the steps is the same for all problems and comes from the cache after the first time.  What a problem adds
+is the compiled right-hand side, which is made here from a program of accelerations.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from ctypes import c_double, c_int, c_int64, c_void_p
+from functools import cache
+from math import inf
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
+from atwood.expr import Program
+from atwood.kernels.llvm_build import Built, build_code, default_options
+from atwood.kernels.llvm_module import CodeOptions, Part
+from atwood.solve.driver import FloatArray, SolverOptions
+from atwood.solve.event_watch import State
+from atwood.solve.explicit_code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
+from atwood.solve.explicit_loops import ROWS, WIDTH
+from atwood.solve.explicit_problem import (
+    CompiledRates,
+    Counts,
+    ExplicitProblem,
+    Outcome,
+    absolute_tolerances,
+    first_step,
+)
+from atwood.solve.explicit_reference import ORDER, no_interpolation
+
+__all__ = ["CompiledAccelerations", "CompiledStepper"]
+
+_RATES = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
+_UNLIMITED = 2**62
+_NO_VALUE = 3
+
+
+class CompiledAccelerations:
+    """A program of accelerations as a compiled right-hand side, for any parameter values.
+
+    Parameters
+    ----------
+    program
+        A program of (t, q, u) with one output group, the accelerations.
+
+    Raises
+    ------
+    UnsupportedError
+        If the program calls functions in Python.
+    """
+
+    def __init__(self, program: Program) -> None:
+        if any(node.operation == "external" for node in program.nodes):
+            raise UnsupportedError("a program that calls functions in Python has no compiled rates", where=program.name)
+        part = Part("kernel", program)
+        self.program, self.size = program, 2 * len(program.results)
+        more = _rates_code(len(program.results))
+        self._built = build_code([part], default_options([part]), more=more, exports=["rates"])
+        self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
+
+    def bind(self, parameter_values: ArrayLike) -> Callable[[], CompiledRates]:
+        """Compute once what depends on parameters alone; return what gives each session rates of its own.
+
+        Parameters
+        ----------
+        parameter_values
+            The values in the order of the program's parameters.
+        """
+        values = np.array(parameter_values, dtype=np.float64)
+        if values.shape != (len(self.program.parameters),):
+            raise UsageError(f"needs {len(self.program.parameters)} parameter values, got an array of {values.shape}")
+        derived, scratch = np.empty(len(self.program.prologue)), np.empty(self._built.scratch)
+        self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
+
+        def rates() -> CompiledRates:
+            own = np.empty(self._built.scratch)
+            data = np.array([derived.ctypes.data, own.ctypes.data], dtype=np.uint64)
+            return CompiledRates(
+                self._built.code.addresses["rates"], data.ctypes.data, (self._built, derived, own, data)
+            )
+
+        return rates
+
+
+class CompiledStepper:
+    """The state of a run; see `~atwood.solve.explicit_problem.Stepper`.
+
+    Parameters
+    ----------
+    problem
+        The equations.  Where it has no compiled rates, the steps call Python for each of its rates.
+    options
+        The accuracy.
+    """
+
+    def __init__(self, problem: ExplicitProblem, options: SolverOptions) -> None:
+        self._size, self._options = problem.size, options
+        self._failure: BaseException | None = None
+        rates = self._in_python(problem) if problem.compiled is None else problem.compiled()
+        self._keep = rates.keep
+        padded = -(-problem.size // WIDTH) * WIDTH
+        self._numbers = np.zeros(len(NUMBERS))
+        self._counts = np.zeros(len(COUNTS), dtype=np.int64)
+        self._arrays = np.zeros((ROWS["all"], padded))
+        self._absolute = absolute_tolerances(options, problem.size)
+        self._arrays[ROWS["absolute"]] = 1.0
+        self._arrays[ROWS["absolute"], : problem.size] = self._absolute
+        self._counts[:2] = problem.size, padded
+        self._numbers[_R] = options.relative_tolerance
+        self._numbers[_LONGEST] = options.max_step or inf
+        places = [rates.function, rates.data, *(a.ctypes.data for a in (self._numbers, self._counts, self._arrays))]
+        self._pointers = np.array(places, dtype=np.uint64)
+        assert len(places) == len(POINTERS)
+        self._session = c_void_p(self._pointers.ctypes.data)
+        self._y, self._yp = np.empty(problem.size), np.empty(problem.size)
+        self._places = c_void_p(self._y.ctypes.data), c_void_p(self._yp.ctypes.data)
+        self._code = _code()
+        self._evaluate, self._run, self._interpolate, self._sample = _functions()
+
+    @property
+    def counts(self) -> Counts:
+        """What it has done so far, over all starts."""
+        return Counts(*(int(self._counts[COUNTS.index(n)]) for n in ("steps", "failures", "evaluations", "missing")))
+
+    def start(self, t: float, y: FloatArray) -> bool:
+        """Start anew from a state; return whether it has finite rates."""
+        self._numbers[_T] = self._numbers[_T_OLD] = t
+        self._arrays[ROWS["y"], : self._size] = y
+        self._arrays[ROWS["y_old"], : self._size] = y
+        if not self._take(t, "y", 12):
+            return False
+        slope = self._arrays[12, : self._size].copy()
+        step = first_step(self._slope, self._options, self._absolute, t, np.array(y, dtype=np.float64), slope, ORDER)
+        self._numbers[_NEXT] = step
+        return True
+
+    def state(self) -> State:
+        """Return time, values and rates at the end of the last step."""
+        n = self._size
+        return float(self._numbers[_T]), self._arrays[ROWS["y"], :n].copy(), self._arrays[12, :n].copy()
+
+    def run(self, t_stop: float, steps: int) -> Outcome:
+        """Take steps until one ends at or after a time, but no more than so many."""
+        self._numbers[_STOP] = t_stop
+        self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
+        return Outcome(self._finish(self._run(self._session)))
+
+    def interpolate(self, t: float) -> State:
+        """Return the state at a time within the last step."""
+        if self._finish(self._interpolate(self._session, t, *self._places)) or not np.isfinite(self._y).all():
+            raise no_interpolation(t)
+        return t, self._y.copy(), self._yp.copy()
+
+    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
+        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        y, yp = np.empty((2, len(times), self._size))
+        self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
+        tables = (array.ctypes.data for array in (y, yp))
+        outcome = self._finish(self._sample(self._session, times.ctypes.data, len(times), *tables))
+        filled = int(self._counts[_FILLED])
+        if outcome == _NO_VALUE:
+            raise no_interpolation(float(times[filled]))
+        return y[:filled], yp[:filled], Outcome(outcome)
+
+    def _take(self, t: float, source: str, target: int) -> bool:
+        return bool(self._finish(self._evaluate(self._session, t, ROWS[source], target)) == 0)
+
+    def _slope(self, t: float, y: FloatArray) -> FloatArray:
+        self._arrays[ROWS["trial"], : self._size] = y
+        if not self._take(t, "trial", 1):
+            return np.full(self._size, np.nan)
+        return self._arrays[1, : self._size].copy()
+
+    def _finish(self, code: int) -> int:
+        """Return the code of a call, after raising what was raised in it."""
+        if self._failure is not None:
+            failure, self._failure = self._failure, None
+            raise failure
+        return code
+
+    def _in_python(self, problem: ExplicitProblem) -> CompiledRates:
+        """Return rates that call Python."""
+        size = problem.size
+
+        def rates(t: float, y: int, yp: int, data: int) -> int:
+            if self._failure is not None:
+                return 1
+            try:
+                found = np.ctypeslib.as_array(ctypes.cast(yp, ctypes.POINTER(c_double)), (size,))
+                found[:] = problem.rates(t, np.ctypeslib.as_array(ctypes.cast(y, ctypes.POINTER(c_double)), (size,)))
+            except (KernelEvaluationError, ArithmeticError):
+                return 1
+            except BaseException as error:
+                self._failure = error
+                return 1
+            return 0 if np.isfinite(found).all() else 1
+
+        function = _RATES(rates)
+        return CompiledRates(ctypes.cast(function, c_void_p).value or 0, 0, function)
+
+
+_T, _T_OLD, _NEXT, _STOP, _R, _LONGEST = map(NUMBERS.index, ("t", "t_old", "next", "stop", "relative", "longest"))
+_LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
+
+
+@cache
+def _code() -> Built:
+    """Return the code of the steps."""
+    return build_code([], CodeOptions(level=2), more=step_code(), exports=FUNCTIONS)
+
+
+@cache
+def _functions() -> tuple[Callable[..., int], ...]:
+    """Return the functions `evaluate`, `run`, `interpolate` and `sample`."""
+    addresses = _code().code.addresses
+    shapes = {
+        "evaluate": (c_void_p, c_double, c_int64, c_int64),
+        "run": (c_void_p,),
+        "interpolate": (c_void_p, c_double, c_void_p, c_void_p),
+        "sample": (c_void_p, c_void_p, c_int64, c_void_p, c_void_p),
+    }
+    return tuple(ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items())
+
+
+def _rates_code(count: int) -> str:
+    """Return the function that gives ``(u, accelerations)`` from ``(q, u)``; its data: derived values and scratch."""
+    return f"""define i32 @rates(double %t, ptr %y, ptr %yp, ptr %data) #0 {{
+  %time = alloca double
+  %inputs = alloca [3 x ptr]
+  %outputs = alloca ptr
+  store double %t, ptr %time
+  %u = getelementptr double, ptr %y, i64 {count}
+  %a = getelementptr double, ptr %yp, i64 {count}
+  %second = getelementptr ptr, ptr %inputs, i64 1
+  %third = getelementptr ptr, ptr %inputs, i64 2
+  store ptr %time, ptr %inputs
+  store ptr %y, ptr %second
+  store ptr %u, ptr %third
+  store ptr %a, ptr %outputs
+  %derived = load ptr, ptr %data
+  %scratch.at = getelementptr ptr, ptr %data, i64 1
+  %scratch = load ptr, ptr %scratch.at
+  call void @llvm.memcpy.p0.p0.i64(ptr %yp, ptr %u, i64 {8 * count}, i1 false)
+  %code = call i32 @kernel(ptr %inputs, ptr %derived, ptr %scratch, ptr %outputs)
+  ret i32 %code
+}}
+declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"""

@@ -1,0 +1,281 @@
+"""Runs with an explicit method: output times, events and limits around a stepper.
+
+Steps are chosen by their error alone.  What lies between two steps is read from the dense output, so that output
+times and events never change the solution.
+"""
+
+from __future__ import annotations
+
+import time
+from math import inf
+from typing import Literal, cast
+
+import numpy as np
+
+from atwood.errors import KernelEvaluationError, StartError, UsageError
+from atwood.solve.driver import Advance, Budget, FloatArray, ImplicitProblem, SolverOptions, Statistics, Status
+from atwood.solve.event_watch import ROUNDING, EventWatch, Root, State
+from atwood.solve.explicit_problem import ExplicitProblem, Outcome, Stepper
+
+__all__ = ["ExplicitSession", "open_explicit"]
+
+_CHUNK = 20_000
+"""So many steps are taken at most before limits are looked at."""
+
+_STALLED = 50
+"""So many steps in a row that do not move the time beyond rounding are a failure."""
+
+
+def open_explicit(
+    problem: ExplicitProblem,
+    options: SolverOptions,
+    t: float,
+    y: FloatArray,
+    budget: Budget | None = None,
+    stepper: Literal["auto", "compiled", "reference"] = "auto",
+) -> ExplicitSession:
+    """Start a run with the explicit method of order 8(5,3).
+
+    Parameters
+    ----------
+    problem
+        The equations.
+    options
+        Accuracy; `max_order` and `linear_solver` mean nothing here, and a first step that is estimated from
+        derivatives is bounded by the horizon itself.
+    t, y
+        Start values.
+    budget
+        Limits of the session.
+    stepper
+        What takes the steps; ``"auto"`` takes compiled steps where the problem has compiled rates.
+    """
+    if stepper == "compiled" or (stepper == "auto" and problem.compiled is not None):
+        from atwood.solve.explicit_native import CompiledStepper
+
+        return ExplicitSession(problem, options, CompiledStepper(problem, options), t, y, budget)
+    from atwood.solve.explicit_reference import ReferenceStepper
+
+    return ExplicitSession(problem, options, ReferenceStepper(problem, options), t, y, budget)
+
+
+class ExplicitSession:
+    """A run in progress; see `~atwood.solve.driver.Session`.
+
+    Parameters
+    ----------
+    problem, options, t, y, budget
+        As in `open_explicit`.
+    stepper
+        What takes the steps.
+    """
+
+    def __init__(
+        self,
+        problem: ExplicitProblem,
+        options: SolverOptions,
+        stepper: Stepper,
+        t: float,
+        y: FloatArray,
+        budget: Budget | None = None,
+    ) -> None:
+        self.budget = budget or Budget()
+        self._size = problem.size
+        self._stepper = stepper
+        # The watch reads nothing of a problem but its events.
+        watched = cast("ImplicitProblem", problem)
+        self._watch = EventWatch(watched, options.horizon) if problem.events is not None else None
+        self._no_events = (0,) * problem.event_count
+        self._starts = 0
+        self._seconds = 0.0
+        self.reinitialize(t, y)
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the session has cost so far, over all its restarts."""
+        counts, watch = self._stepper.counts, self._watch
+        return Statistics(
+            steps=counts.steps,
+            residual_evaluations=counts.evaluations,
+            event_evaluations=watch.evaluations if watch else 0,
+            missing_values=counts.missing,
+            reinitializations=self._starts - 1,
+            seconds=self._seconds,
+            error_test_failures=counts.failures,
+            convergence_failures=0,
+        )
+
+    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
+        """Go on from another state; its rates follow from it."""
+        values = np.array(y, dtype=np.float64)
+        if values.shape != (self._size,):
+            raise UsageError(f"the state has {self._size} unknowns, but was given values of shape {values.shape}")
+        if not (np.isfinite(t) and np.isfinite(values).all()):
+            raise StartError(f"the start values at t = {t} are not all finite numbers")
+        if not self._stepper.start(float(t), values):
+            raise StartError(f"the right-hand side has no finite value at the start, t = {t:.9g}")
+        self._here = self._newest = self._stepper.state()
+        if self._watch is not None:
+            self._watch.restart(self._here)
+        self._root: Root | None = None
+        self._searched = self._here[0]
+        self._stalled = 0
+        self._broken = False
+        self._starts += 1
+
+    def advance(self, t_out: float) -> Advance:
+        """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
+
+        Parameters
+        ----------
+        t_out
+            Not before the time at which the last advance ended.
+        """
+        if not self._here[0] <= t_out < inf:
+            raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
+        began = time.perf_counter()
+        try:
+            return self._run(float(t_out), began)
+        except KeyboardInterrupt:
+            self._broken = True
+            return self._stopped(Status.INTERRUPTED, "interrupted")
+        except KernelEvaluationError as error:
+            self._broken = True
+            return self._stopped(Status.FAILED, str(error))
+        except BaseException:
+            self._broken = True
+            raise
+        finally:
+            self._seconds += time.perf_counter() - began
+
+    def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, Advance]:
+        """Go on through many times at once, as far as nothing stops it.
+
+        Parameters
+        ----------
+        times
+            Rising, the first not before the time at which the last advance ended.
+
+        Returns
+        -------
+        tuple
+            Values and rates at the times that were reached, one row each, and how it ended.
+        """
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        if not (len(times) and self._here[0] <= times[0] and times[-1] < inf and np.all(np.diff(times) >= 0.0)):
+            raise UsageError(f"cannot sample from t = {self._here[0]:.9g} at these times: they must rise from there")
+        values, rates = np.empty((len(times), self._size)), np.empty((len(times), self._size))
+        filled = 0
+        if self._watch is None and self.budget.poll is None and not self._broken:
+            filled = self._sample_quickly(times, values, rates)
+        advance = Advance(*_copied(self._here), Status.REACHED, self._no_events)
+        while filled < len(times):
+            advance = self.advance(float(times[filled]))
+            if advance.status is not Status.REACHED:
+                break
+            values[filled], rates[filled] = advance.y, advance.yp
+            filled += 1
+        return values[:filled], rates[:filled], advance
+
+    def _sample_quickly(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> int:
+        """Let the stepper go through times as long as no limit is near; return how many it filled."""
+        began = time.perf_counter()
+        filled = int(np.searchsorted(times, self._newest[0])) if self._newest[0] > self._here[0] else 0
+        # What lies within the last step is left to single advances, which come first.
+        if filled or self._exceeded(began) is not None:
+            return 0
+        try:
+            while filled < len(times):
+                y, yp, outcome = self._stepper.sample(times[filled:], self._allowed())
+                values[filled : filled + len(y)], rates[filled : filled + len(y)] = y, yp
+                filled += len(y)
+                self._newest = self._stepper.state()
+                if filled:
+                    self._here = (float(times[filled - 1]), values[filled - 1], rates[filled - 1])
+                if outcome is not Outcome.REACHED or self._exceeded(began) is not None:
+                    break
+        except KeyboardInterrupt:
+            self._broken = True
+        finally:
+            self._searched = self._newest[0]
+            self._seconds += time.perf_counter() - began
+        return filled
+
+    def _run(self, t_out: float, began: float) -> Advance:
+        if self._broken:
+            self.reinitialize(self._here[0], self._here[1])
+        while True:
+            root = self._find_root()
+            if root is not None and root.state[0] <= t_out:
+                self._root = None
+                self._here = root.state
+                return Advance(*_copied(root.state), Status.EVENT, root.events)
+            if t_out <= self._newest[0]:
+                self._here = self._newest if t_out == self._newest[0] else self._stepper.interpolate(t_out)
+                return Advance(*_copied(self._here), Status.REACHED, self._no_events)
+            self._here = self._newest
+            limit = self._exceeded(began)
+            if limit is not None:
+                return limit
+            failure = self._step(t_out)
+            if failure is not None:
+                return failure
+
+    def _find_root(self) -> Root | None:
+        """Return the first root in the part of the last step that has not been handed out."""
+        watch = self._watch
+        if watch is not None and self._root is None and self._searched < self._newest[0]:
+            self._root = watch.search(self._searched, self._newest[0], self._stepper.interpolate)
+            self._searched = self._root.state[0] if self._root else self._newest[0]
+        return self._root
+
+    def _allowed(self) -> int:
+        """Return how many steps may be taken before the next look at limits and events."""
+        if self._watch is not None or self.budget.poll is not None:
+            return 1
+        if self.budget.max_steps is None:
+            return _CHUNK
+        return max(0, min(_CHUNK, self.budget.max_steps - self._stepper.counts.steps))
+
+    def _step(self, t_out: float) -> Advance | None:
+        """Take steps, and return an answer only if that failed."""
+        before, steps = self._newest[0], self._stepper.counts.steps
+        outcome = self._stepper.run(t_out, self._allowed())
+        self._newest = self._stepper.state()
+        if outcome is Outcome.TOO_SMALL:
+            self._here = self._newest
+            self._broken = True
+            reason = "the steps became too small to move the time"
+            if self._stepper.counts.missing:
+                reason += ": the right-hand side has no finite value beyond, or the solution grows without bound"
+            return self._stopped(Status.FAILED, reason)
+        taken = self._stepper.counts.steps - steps
+        if self._newest[0] - before > 4 * ROUNDING * abs(before) * taken:
+            self._stalled = 0
+        else:
+            self._stalled += taken
+        if self._stalled >= _STALLED:
+            self._here, self._broken = self._newest, True
+            return self._stopped(Status.FAILED, "the steps became too small to move the time")
+        return None
+
+    def _exceeded(self, began: float) -> Advance | None:
+        budget, t = self.budget, self._here[0]
+        if budget.poll is not None:
+            budget.poll(t)
+        steps = self._stepper.counts.steps
+        if budget.max_steps is not None and steps >= budget.max_steps:
+            return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
+        if budget.wall_seconds is not None and self._seconds + time.perf_counter() - began >= budget.wall_seconds:
+            return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
+        return None
+
+    def _stopped(self, status: Status, reason: str) -> Advance:
+        message = f"{reason} (at t = {self._here[0]:.9g})"
+        return Advance(*_copied(self._here), status, self._no_events, message)
+
+
+def _copied(state: State) -> State:
+    """Return a state whose arrays the caller may keep and change."""
+    t, y, yp = state
+    return t, y.copy(), yp.copy()
