@@ -80,7 +80,11 @@ def assemble_flat(
         raise UsageError(f"there is no form {form!r}", advice=suggestion(form, FORMS))
     if level not in LEVELS:
         raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
-    all_modes = {path: part.component.modes[0] for path, part in flat.parts.items() if part.component.modes}
+    all_modes = {
+        path: str(part.values.get(part.component.mode_parameter, part.component.modes[0]))
+        for path, part in flat.parts.items()
+        if part.component.modes
+    }
     all_modes.update(modes or {})
     mechanism = read_mechanism(flat, all_modes)
     chosen: Any = form

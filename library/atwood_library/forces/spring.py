@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Point, Scalar, connector, observable, parameter, potential
+from atwood import Component, Point, Scalar, connector, dot, is_zero, observable, parameter, potential
 
 
 class Spring(Component):
@@ -19,7 +19,10 @@ class Spring(Component):
 
     @potential
     def elastic_energy(self) -> Scalar:
-        """Return the elastic energy."""
+        """Return the elastic energy; without natural length it is smooth where the ends meet."""
+        if not self.on_a_line and is_zero(self.natural_length):
+            r = self.b.position - self.a.position
+            return 0.5 * self.stiffness * dot(r, r)
         extension = self.distance(self.a, self.b) - self.natural_length
         return 0.5 * self.stiffness * extension * extension
 

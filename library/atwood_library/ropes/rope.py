@@ -16,12 +16,14 @@ class Rope(Component):
     """
 
     modes = ("taut", "slack")
+    mode_parameter = "starts"
 
     pulleys: int = parameter(0, minimum=0, integer=True, doc="How many pulleys it passes.")
     length: float = parameter(1.0, unit="m", above=0.0, doc="Length from a to b.")
     when_slack: str = parameter(
         "stop", choices=("stop", "slack"), doc="What happens when the tension becomes negative."
     )
+    starts: str = parameter("taut", choices=("taut", "slack"), doc="Whether it is taut or slack at the start.")
     a: Point = connector(Point, "One end.")
     over: Sequence[Groove] = connector(Groove, "The pulleys it passes, in order from a to b.", count="pulleys")
     b: Point = connector(Point, "The other end.")

@@ -149,12 +149,15 @@ def multiply(a: Expression, b: Expression) -> Expression:
         inner, rest = _parametric_factor(other)
         if inner is not None:
             return multiply(multiply(known, inner), rest)
-        if other.operation == "mul":  # l (c u) is (l c) u where l c is there already
-            for core, rest in (other.arguments, other.arguments[::-1]):
-                product = graph.find("mul", _in_order(known, core))
-                if product is not None:
-                    return graph.node("mul", _in_order(product, rest))
+        found = _meet_known_products(known, other)
+        if found is not None:
+            return found
         return graph.node("mul", _in_order(a, b))
+    for product, symbol in ((a, b), (b, a)):  # (x u) u is x (u u), whose square others share
+        if symbol.operation == "symbol" and product.operation == "mul" and symbol in product.arguments:
+            first, second = product.arguments
+            if first is not second:
+                return multiply(second if first is symbol else first, multiply(symbol, symbol))
     factor_a, core_a = _split(a)
     factor_b, core_b = _split(b)
     if core_a is not a or core_b is not b:
@@ -162,6 +165,23 @@ def multiply(a: Expression, b: Expression) -> Expression:
         if _is_safe(factor):
             return multiply(graph.constant(factor), multiply(core_a, core_b))
     return graph.node("mul", _in_order(a, b))
+
+
+def _meet_known_products(known: Expression, other: Expression) -> Expression | None:
+    """Return ``known * other`` from products with `known` that are there already: l (c u) is (l c) u where l c is."""
+    graph = known.graph
+    if other.operation == "mul":
+        for core, rest in (other.arguments, other.arguments[::-1]):
+            product = graph.find("mul", _in_order(known, core))
+            if product is not None:
+                return graph.node("mul", _in_order(product, rest))
+    if other.operation in ("add", "sub"):
+        p, q = other.arguments
+        if p.operation == q.operation == "mul":
+            p_met, q_met = _meet_known_products(known, p), _meet_known_products(known, q)
+            if p_met is not None and q_met is not None:
+                return add(p_met, q_met) if other.operation == "add" else subtract(p_met, q_met)
+    return None
 
 
 def _in_order(a: Expression, b: Expression) -> tuple[Expression, Expression]:

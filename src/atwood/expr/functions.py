@@ -61,6 +61,11 @@ def _operands(graph: Graph, *values: Scalar) -> list[Expression]:
     return [graph.convert(value) for value in values]
 
 
+def is_zero(x: Scalar) -> bool:
+    """Return whether a value is zero whatever happens: the number 0, or an expression that has folded to it."""
+    return x.is_zero if isinstance(x, Expression) else bool(x == 0)
+
+
 def sin(x: Scalar) -> Scalar:
     """Return the sine of an angle in radians."""
     return _unary("sin", x, math.sin, "sin", "sin")

@@ -22,6 +22,7 @@ from atwood.mechanics.kinematics import (
     Placements,
     body_offsets,
     differentiate,
+    lifted_accelerations,
     place,
     rotate,
     shapes,
@@ -99,7 +100,9 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
         {node: turn for _, turns in layouts.values() for node, turn in turns.items()},
     )
     q = tuple(graph.symbol(f"q:{c.name}") for c in forest.coordinates)
-    placements = place(graph, mechanism.graph, bodies, forest, shape_of, mechanism.locals_, q, space)
+    origin = tuple(graph.symbol(f"origin:{axis}") for axis in space.axis_names)
+    movable = place(graph, mechanism.graph, bodies, forest, shape_of, mechanism.locals_, q, space, origin)
+    placements = _substituted(movable, dict.fromkeys(origin, graph.zero))
     left = _unsolved(mechanism, forest)
     values = _constraint_values(mechanism, site, placements, left)
     _check_held(mechanism, masses, forest, q, values)
@@ -107,7 +110,7 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     if forest.form == "reduced":
         solution = _eliminate(mechanism, masses, forest, q, values)
         if solution:
-            placements = _substituted(placements, solution)
+            placements, movable = _substituted(placements, solution), _substituted(movable, solution)
             values = [(path, c, substitute([v], solution)[0]) for path, c, v in values if v is not _SOLVED]
             gone = set(solution)
             eliminated = [c.name for c, s in zip(forest.coordinates, q, strict=True) if s in gone]
@@ -117,16 +120,23 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     u = tuple(graph.symbol(f"u:{c.name}") for c in names)
     a = tuple(graph.symbol(f"a:{c.name}") for c in names)
     kinematics = differentiate(placements, mechanism.time, q, u, a)
+    lifted = lifted_accelerations(movable, origin, space.components(mechanism.gravity), mechanism.time, q, u, a)
     signals = resolve_signals(mechanism, site, kinematics)
+    multipliers = [
+        graph.symbol(f"lambda:{path}.{local_constraint.law.name}[{local_constraint.index}]")
+        for path, local_constraint, _ in values
+    ]
+    chosen = [(path, c, multiplier) for (path, c, _), multiplier in zip(values, multipliers, strict=True)]
+    rows = motion_rows(site, mechanism.locals_, masses, kinematics, lifted, signals, u)
+    # Before the constraints' rates, which can then be written with the slopes that the forces are made of.
+    constraint_rows = force_rows(site, mechanism.locals_, kinematics, chosen, signals, u)
     constraints = []
-    for path, local_constraint, value in values:
+    for (path, local_constraint, value), multiplier in zip(values, multipliers, strict=True):
         rate, second = constraint_levels(value, mechanism.time, q, u, a)
         key = (path, local_constraint.law.name, local_constraint.index)
-        multiplier = graph.symbol(f"lambda:{path}.{local_constraint.law.name}[{local_constraint.index}]")
         constraints.append(
             Constraint(key, local_constraint.reaction, local_constraint.sign, value, rate, second, multiplier)
         )
-    chosen = [(path, c, one.multiplier) for (path, c, _), one in zip(values, constraints, strict=True)]
     return Equations(
         graph=graph,
         forest=forest,
@@ -140,8 +150,8 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
         speeds=u,
         accelerations=a,
         names=tuple(names),
-        rows=tuple(motion_rows(site, mechanism.locals_, masses, kinematics, mechanism.gravity, signals, u)),
-        constraint_rows=tuple(force_rows(site, mechanism.locals_, kinematics, chosen, signals, u)),
+        rows=tuple(rows),
+        constraint_rows=tuple(constraint_rows),
         constraints=tuple(constraints),
         eliminated=tuple(eliminated),
     )

@@ -14,10 +14,13 @@ from atwood.mechanics.forces import Forces, Site, constraint_forces, local_map, 
 from atwood.mechanics.inertia import Masses
 from atwood.mechanics.kinematics import BodyShape, Kinematics
 from atwood.model.local import LocalConstraint, LocalPart
-from atwood.model.vector import Vector
 from atwood.topology.forest import Coordinate, Forest
 
 __all__ = ["Constraint", "Equations", "balance_rows", "inertia_forces"]
+
+
+Lifted = tuple[Mapping[int, tuple[Expression, ...]], Mapping[int, tuple[Expression, ...]]]
+"""Accelerations less that of free fall, of nodes and of reference points."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ def inertia_forces(
     site: Site,
     masses: Masses,
     kinematics: Kinematics,
-    gravity: Vector,
+    lifted: Lifted,
     forces: Forces,
 ) -> dict[int, list[Expression]]:
     """Return ``m (a - g)`` at the centre of mass of each body, and add the inertia of masses spread between nodes.
@@ -122,24 +125,22 @@ def inertia_forces(
     ----------
     site, masses, kinematics
         The mechanism.
-    gravity
-        Acceleration of free fall.
+    lifted
+        What `lifted_accelerations` gave.
     forces
         Takes up, with its sign reversed, what acts at nodes and the inertial torques.
     """
-    pull = site.space.components(gravity)
+    at_nodes, at_references = lifted
     at_centers: dict[int, list[Expression]] = {}
     for index, one in masses.bodies.items():
-        acceleration = kinematics.reference_accelerations[index]
-        at_centers[index] = [site.graph.convert(one.mass * (a - g)) for a, g in zip(acceleration, pull, strict=True)]
+        at_centers[index] = [site.graph.convert(one.mass * a) for a in at_references[index]]
         if index in kinematics.angular_accelerations:
             forces.twist(index, -(one.moment * kinematics.angular_accelerations[index]))
     for spread in masses.coupled:
-        lifted = [[a - g for a, g in zip(kinematics.accelerations[n], pull, strict=True)] for n in spread.nodes]
         for i, node in enumerate(spread.nodes):
-            total: list[Scalar] = [0.0] * len(pull)
+            total: list[Scalar] = [0.0] * len(at_nodes[node])
             for j in range(len(spread.nodes)):
-                total = [t + spread.masses[i][j] * a for t, a in zip(total, lifted[j], strict=True)]
+                total = [t + spread.masses[i][j] * a for t, a in zip(total, at_nodes[spread.nodes[j]], strict=True)]
             forces.push(node, [-t for t in total])
     return at_centers
 
@@ -187,13 +188,13 @@ def motion_rows(
     locals_: Mapping[str, LocalPart],
     masses: Masses,
     kinematics: Kinematics,
-    gravity: Vector,
+    lifted: Lifted,
     signals: Mapping[Expression, Expression],
     speeds: Sequence[Expression],
 ) -> list[Expression]:
     """Return, for each speed, inertial less applied generalized force."""
     forces = Forces(site.graph)
-    at_centers = inertia_forces(site, masses, kinematics, gravity, forces)
+    at_centers = inertia_forces(site, masses, kinematics, lifted, forces)
     for local in locals_.values():
         part_forces(site, local, {**local_map(site, local, kinematics), **signals}, forces)
     return balance_rows(kinematics, at_centers, forces, speeds)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from atwood.expr import Expression, Scalar
+from atwood.expr import Expression, Scalar, is_zero
 from atwood.mechanics.kinematics import rotate
 from atwood.model.local import LocalPart
 from atwood.model.vector import Vector
-from atwood.topology.bodies import Bodies, is_zero
+from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
 __all__ = ["CoupledMass", "Masses", "RigidMass", "add_masses"]

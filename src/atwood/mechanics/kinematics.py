@@ -16,7 +16,7 @@ from atwood.topology.bodies import Bodies, Body, RigidStep
 from atwood.topology.forest import Attachment, Forest
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
 
-__all__ = ["BodyShape", "Kinematics", "Placements", "differentiate", "place", "shapes"]
+__all__ = ["BodyShape", "Kinematics", "Placements", "differentiate", "lifted_accelerations", "place", "shapes"]
 
 Components = tuple[Expression, ...]
 
@@ -148,6 +148,7 @@ def place(
     locals_: Mapping[str, LocalPart],
     coordinates: Sequence[Expression],
     space: Space,
+    origin: Components,
 ) -> Placements:
     """Compute where every node is, walking the forest from the world outwards.
 
@@ -159,6 +160,8 @@ def place(
         The mechanism.
     coordinates
         The symbols of the forest's coordinates.
+    origin
+        Position of the world's origin. Symbols here let the whole world be accelerated, see `lifted_accelerations`.
     """
     angles: dict[int, Expression] = {0: graph.constant(0.0)}
     for turn in forest.orientations:
@@ -170,15 +173,15 @@ def place(
     references: dict[int, Components] = {}
     known: dict[Expression, Expression] = {}
     world = bodies.bodies[0]
-    _spread(graph, world, shape_of[0], WORLD, (graph.constant(0.0),) * len(space.basis), angles, space, positions)
+    _spread(graph, world, shape_of[0], WORLD, origin, angles, space, positions)
     references[0] = positions[WORLD]
     for attachment in forest.attachments:
         body, shape = bodies.bodies[attachment.body], shape_of[attachment.body]
         own = [coordinates[i] for i in attachment.coordinates]
         if attachment.joint is None:
-            references[body.index] = tuple(own)
+            references[body.index] = tuple(o + c for o, c in zip(origin, own, strict=True))
             arm = shape.offsets[body.root] - shape.reference
-            start = _shift(graph, tuple(own), arm, angles.get(body.index), space)
+            start = _shift(graph, references[body.index], arm, angles.get(body.index), space)
         else:
             start = _across_joint(graph, attachment, own, bodies, shape_of, angles, positions, known, space)
         _spread(graph, body, shape, attachment.node, start, angles, space, positions)
@@ -293,6 +296,43 @@ def differentiate(
     v, w, rv = split(rates)
     a, aw, ra = split(second)
     return Kinematics(placements, v, a, w, aw, rv, ra)
+
+
+def lifted_accelerations(
+    placements: Placements,
+    origin: Components,
+    pull: Sequence[Scalar],
+    time: Expression,
+    coordinates: Sequence[Expression],
+    speeds: Sequence[Expression],
+    accelerations: Sequence[Expression],
+) -> tuple[dict[int, Components], dict[int, Components]]:
+    """Return the accelerations less that of free fall, of nodes and of reference points.
+
+    Weight is the same as the world's origin accelerating against it; so it is added once, where the recursion begins,
+    and not for every mass (Featherstone, Rigid Body Dynamics Algorithms, section 5.3).
+
+    Parameters
+    ----------
+    placements
+        With the world's origin in them.
+    origin
+        The symbols of the origin.
+    pull
+        Acceleration of free fall, along the free components.
+    time, coordinates, speeds, accelerations
+        The symbols.
+    """
+    graph = time.graph
+    drift = [graph.symbol(f"rate of {o.name}") for o in origin]
+    flat = [c for group in (placements.positions, placements.references) for p in group.values() for c in p]
+    first: dict[Expression, Expression | float] = {time: 1.0, **dict(zip(coordinates, speeds, strict=True))}
+    rates = jvp(flat, {**first, **dict(zip(origin, drift, strict=True))})
+    rising = {d: graph.convert(-g) for d, g in zip(drift, pull, strict=True)}
+    second = jvp(rates, {**first, **dict(zip(speeds, accelerations, strict=True)), **rising})
+    values = iter(substitute(second, dict.fromkeys([*origin, *drift], 0.0)))
+    nodes = {i: tuple(next(values) for _ in p) for i, p in placements.positions.items()}
+    return nodes, {i: tuple(next(values) for _ in p) for i, p in placements.references.items()}
 
 
 def axes_of(angle: Expression | None) -> tuple[Vector, Vector, Vector]:

@@ -40,6 +40,8 @@ class Component:
 
     modes: ClassVar[tuple[str, ...]] = ()
     """Modes of the component, the usual one first; empty if it has just one."""
+    mode_parameter: ClassVar[str] = ""
+    """Name of the choice parameter that says the mode at the start; the usual one if empty."""
 
     _parameters: ClassVar[dict[str, ParameterSpec]] = {}
     _signals: ClassVar[dict[str, SignalSpec]] = {}

@@ -221,8 +221,8 @@ def _signal(
     path = f"{part.path}.{name}"
     if (part.path, name) in flat.links:
         source, observable = flat.links[part.path, name]
-        if not flat.parts[source].component.connectors():
-            return _source_value(flat.parts[source], observable, time, table)
+        if _is_source(flat.parts[source], flat):
+            return _source_value(flat.parts[source], observable, flat, time, table)
         signal_symbols[name] = table.graph.symbol(f"{path}()")
         return signal_symbols[name]
     if not callable(given):
@@ -237,9 +237,15 @@ def _signal(
         ) from error
 
 
-def _source_value(source: Part, observable: str, time: Expression, table: ParameterTable) -> Scalar:
-    """Return the output of a part without connectors: a function of time and its parameters alone."""
+def _is_source(part: Part, flat: FlatScene) -> bool:
+    """Return whether a part's outputs are functions of time and parameters alone."""
+    return not part.component.connectors() and not any((part.path, name) in flat.links for name in part.signals)
+
+
+def _source_value(source: Part, observable: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
+    """Return the output of a part that depends on time and parameters alone."""
     values = {name: _parameter(source, spec, table) for name, spec in source.component.parameter_specs().items()}
+    values |= {name: _signal(source, name, given, flat, time, table, {}) for name, given in source.signals.items()}
     bound = bind(source.component, Binding(values=values, time=time))
     law = next(law for law in source.component.laws("observable") if law.name == observable)
     return table.graph.convert(_call(source, law, getattr(bound, law.name)))

@@ -7,13 +7,27 @@ knows of a problem comes in through pointers, so that it is compiled once and ke
 from __future__ import annotations
 
 from atwood.solve.explicit_loops import ROWS, exact, loop_code
+from atwood.solve.explicit_problem import CALM, EDGE, STIFF
 from atwood.solve.explicit_reference import GROWTH, RETREAT, SAFETY, SHRINKAGE
 from atwood.solve.explicit_table import NODES
 
 __all__ = ["COUNTS", "FUNCTIONS", "NUMBERS", "POINTERS", "step_code"]
 
 NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest")
-COUNTS = ("size", "padded", "limit", "steps", "failures", "evaluations", "missing", "is_dense", "filled")
+COUNTS = (
+    "size",
+    "padded",
+    "limit",
+    "steps",
+    "failures",
+    "evaluations",
+    "missing",
+    "stiff",
+    "is_dense",
+    "filled",
+    "edgy",
+    "calm",
+)
 POINTERS = ("function", "data", "numbers", "counts", "arrays")
 FUNCTIONS = ("run", "interpolate", "sample", "evaluate")
 
@@ -158,9 +172,10 @@ accept:
   store double %h, ptr %h.at
   store double %t, ptr %t_old.at
   store double %t_new, ptr %t.at
-  call void @accept(ptr %arrays, i64 %m)
   %stepped = add i64 %steps, 1
   store i64 %stepped, ptr %steps.at
+{_stability()}
+  call void @accept(ptr %arrays, i64 %m)
   br label %step
 too_small:
   call void @unshift(ptr %arrays, i64 %m)
@@ -170,6 +185,35 @@ return0:
 return1:
   ret i32 1
 }}"""
+
+
+def _stability() -> str:
+    """Return the instructions that count steps at the edge of stability."""
+    return f"""  %turned = call double @slopes(ptr %arrays, i64 %m)
+  %apart = call double @values(ptr %arrays, i64 %m)
+  %rate2 = fdiv double %turned, %apart
+  %rate = call double @llvm.sqrt.f64(double %rate2)
+  %reach = fmul double %h, %rate
+  %at_edge = fcmp ogt double %reach, {exact(EDGE)}
+  %differs = fcmp ogt double %apart, 0.0
+  %is_edgy = and i1 %at_edge, %differs
+  %edgy.old = load i64, ptr %edgy.at
+  %edgy.up = add i64 %edgy.old, 1
+  %is_full = icmp eq i64 %edgy.up, {STIFF}
+  %found = and i1 %is_edgy, %is_full
+  %found.count = zext i1 %found to i64
+  %stiff.old = load i64, ptr %stiff.at
+  %stiff.new = add i64 %stiff.old, %found.count
+  store i64 %stiff.new, ptr %stiff.at
+  %calm.old = load i64, ptr %calm.at
+  %calm.up = add i64 %calm.old, 1
+  %calm.new = select i1 %is_edgy, i64 0, i64 %calm.up
+  store i64 %calm.new, ptr %calm.at
+  %is_calm = icmp eq i64 %calm.new, {CALM}
+  %edgy.kept = select i1 %is_edgy, i64 %edgy.up, i64 %edgy.old
+  %forget = or i1 %is_calm, %found
+  %edgy.new = select i1 %forget, i64 0, i64 %edgy.kept
+  store i64 %edgy.new, ptr %edgy.at"""
 
 
 def _interpolate() -> str:

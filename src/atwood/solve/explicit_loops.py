@@ -16,7 +16,7 @@ __all__ = ["ROWS", "WIDTH", "exact", "loop_code"]
 WIDTH = 4
 """How many numbers are worked on at a time."""
 
-ROWS = {"slope": 0, "y": 16, "y_old": 17, "trial": 18, "absolute": 19, "dense": 20, "all": 27}
+ROWS = {"slope": 0, "y": 16, "y_old": 17, "trial": 18, "absolute": 19, "dense": 20, "last": 27, "all": 28}
 _VECTOR = f"<{WIDTH} x double>"
 
 
@@ -100,7 +100,10 @@ def _stage(stage: int) -> str:
     loop = _Loop()
     base = ROWS["y_old"] if stage > 12 else ROWS["y"]
     moved = loop.binary("fmul", loop.weighted(STAGES[stage - 1]), loop.spread("%h"))
-    loop.store(loop.binary("fadd", loop.load(base), moved), ROWS["trial"])
+    value = loop.binary("fadd", loop.load(base), moved)
+    loop.store(value, ROWS["trial"])
+    if stage == 11:
+        loop.store(value, ROWS["last"])
     return loop.function(f"stage{stage}", ", double %h")
 
 
@@ -115,12 +118,23 @@ def _squares(name: str, weights: Mapping[int, float]) -> str:
     allowed = loop.binary("fmul", size, loop.spread("%relative"))
     scale = loop.binary("fadd", allowed, loop.load(ROWS["absolute"]))
     error = loop.binary("fdiv", loop.weighted(weights), scale)
-    square = loop.binary("fmul", error, error)
+    return _sum(loop, name, loop.binary("fmul", error, error), ", double %relative")
+
+
+def _sum(loop: _Loop, name: str, square: str, arguments: str = "") -> str:
+    """Return the function that adds up what a loop computes."""
     loop.lines.append(f"  %sum = fadd {_VECTOR} %total, {square}")
     carried = f"  %total = phi {_VECTOR} [ zeroinitializer, %entry ], [ %sum, %body ]\n"
     end = f"""  %result = call double @llvm.vector.reduce.fadd.v{WIDTH}f64(double -0.0, {_VECTOR} %total)
   ret double %result"""
-    return loop.function(name, ", double %relative", carried=carried, end=end)
+    return loop.function(name, arguments, carried=carried, end=end)
+
+
+def _distance(name: str, a: int, b: int) -> str:
+    """Return the function of the square of the distance between two rows."""
+    loop = _Loop()
+    apart = loop.binary("fsub", loop.load(a), loop.load(b))
+    return _sum(loop, name, loop.binary("fmul", apart, apart))
 
 
 def _copy(name: str, moves: Mapping[int, int]) -> str:
@@ -163,6 +177,7 @@ def loop_code() -> str:
     """Return the functions; each takes the table and the length of its rows."""
     parts = [_stage(stage) for stage in range(1, 16)]
     parts += [_squares("squares5", ERROR_5), _squares("squares3", ERROR_3)]
+    parts += [_distance("slopes", 12, 11), _distance("values", ROWS["trial"], ROWS["last"])]
     parts += [_copy("shift", {12: 0}), _copy("unshift", {0: 12})]
     parts += [_copy("accept", {ROWS["y"]: ROWS["y_old"], ROWS["trial"]: ROWS["y"]})]
     parts += [_dense(), _polynomial()]

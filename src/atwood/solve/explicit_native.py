@@ -119,13 +119,12 @@ class CompiledStepper:
         self._session = c_void_p(self._pointers.ctypes.data)
         self._y, self._yp = np.empty(problem.size), np.empty(problem.size)
         self._places = c_void_p(self._y.ctypes.data), c_void_p(self._yp.ctypes.data)
-        self._code = _code()
         self._evaluate, self._run, self._interpolate, self._sample = _functions()
 
     @property
     def counts(self) -> Counts:
         """What it has done so far, over all starts."""
-        return Counts(*(int(self._counts[COUNTS.index(n)]) for n in ("steps", "failures", "evaluations", "missing")))
+        return Counts(*self._counts[_STEPS : _STEPS + 5].tolist())
 
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""

@@ -18,7 +18,24 @@ from atwood.errors import UsageError
 from atwood.solve.driver import FloatArray, SolverOptions, Values
 from atwood.solve.event_watch import State
 
-__all__ = ["CompiledRates", "Counts", "ExplicitProblem", "Outcome", "Stepper", "absolute_tolerances", "first_step"]
+__all__ = [
+    "CALM",
+    "EDGE",
+    "STIFF",
+    "CompiledRates",
+    "Counts",
+    "ExplicitProblem",
+    "Outcome",
+    "Stepper",
+    "absolute_tolerances",
+    "first_step",
+]
+
+EDGE = 6.1
+"""Where the method stops being stable: the largest product of a step and a rate of decay."""
+
+STIFF, CALM = 15, 6
+"""So many steps at the edge of stability, with fewer than so many others in a row between, are a stiff problem."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,12 +118,15 @@ class Counts:
         Steps that were kept, and steps whose error was too large or that had no value.
     evaluations, missing
         Calls of the right-hand side, and those of them that gave no finite value.
+    stiff
+        How often stability, not accuracy, seemed to keep steps short: `STIFF` steps with few others between.
     """
 
     steps: int = 0
     failures: int = 0
     evaluations: int = 0
     missing: int = 0
+    stiff: int = 0
 
 
 class Stepper(Protocol):
@@ -174,10 +194,11 @@ def first_step(
     longest = min(options.horizon, options.max_step or np.inf)
     if options.first_step is not None:
         return min(options.first_step, options.max_step or np.inf)
-    scale = absolute + options.relative_tolerance * np.abs(y)
+    weights = 1.0 / (absolute + options.relative_tolerance * np.abs(y))
 
     def size(values: FloatArray) -> float:
-        return sqrt(float(np.mean((values / scale) ** 2)))
+        scaled = values * weights
+        return sqrt(float(scaled.dot(scaled)) / len(scaled))
 
     with np.errstate(all="ignore"):
         d0, d1 = size(y), size(yp)

@@ -14,7 +14,16 @@ import numpy as np
 from atwood.errors import KernelEvaluationError
 from atwood.solve.driver import FloatArray, SolverOptions
 from atwood.solve.event_watch import ROUNDING, State
-from atwood.solve.explicit_problem import Counts, ExplicitProblem, Outcome, absolute_tolerances, first_step
+from atwood.solve.explicit_problem import (
+    CALM,
+    EDGE,
+    STIFF,
+    Counts,
+    ExplicitProblem,
+    Outcome,
+    absolute_tolerances,
+    first_step,
+)
 from atwood.solve.explicit_table import DENSE, ERROR_3, ERROR_5, NODES, STAGES
 
 __all__ = ["GROWTH", "ORDER", "RETREAT", "SAFETY", "SHRINKAGE", "ReferenceStepper", "estimate", "no_interpolation"]
@@ -74,6 +83,8 @@ class ReferenceStepper:
         self._t = self._t_old = self._h = self._next = 0.0
         self._y = self._y_old = np.zeros(problem.size)
         self._polynomial: FloatArray | None = None
+        self._last = self._y
+        self._edgy = self._calm = 0
 
     @property
     def counts(self) -> Counts:
@@ -168,6 +179,7 @@ class ReferenceStepper:
             rejected = True
             self._counts.failures += 1
         k[12] = slope
+        self._watch_stability(h, new)
         following = h / min(max(_root(error) / SAFETY, 1.0 / GROWTH), SHRINKAGE)
         self._next = min(h, following) if rejected else following
         self._t_old, self._t, self._h = t, t + h, h
@@ -179,13 +191,28 @@ class ReferenceStepper:
         """Try a step; return its error in units of what is allowed, nan where it has no value, and the new values."""
         k, t, y = self._slopes, self._t, self._y
         for stage in range(1, 12):
-            k[stage] = self._slope(t + NODES[stage] * h, y + h * (_WEIGHTS[stage, :stage] @ k[:stage]))
+            self._last = y + h * (_WEIGHTS[stage, :stage] @ k[:stage])
+            k[stage] = self._slope(t + NODES[stage] * h, self._last)
             if not np.isfinite(k[stage]).all():
                 return np.nan, y
         new = y + h * (_WEIGHTS[12, :12] @ k[:12])
         scale = self._absolute + self._options.relative_tolerance * np.maximum(np.abs(y), np.abs(new))
         fifth, third = np.sum((_ERRORS @ k[:12] / scale) ** 2, axis=1)
         return estimate(h, float(fifth), float(third), self._size), new
+
+    def _watch_stability(self, h: float, new: FloatArray) -> None:
+        """Estimate the fastest decay from two slopes at the end of a step, and count steps at the edge of stability."""
+        slopes, values = self._slopes[12] - self._slopes[11], new - self._last
+        apart = float(values.dot(values))
+        if apart > 0.0 and h * sqrt(float(slopes.dot(slopes)) / apart) > EDGE:
+            self._edgy, self._calm = self._edgy + 1, 0
+            if self._edgy == STIFF:
+                self._counts.stiff += 1
+                self._edgy = 0
+        else:
+            self._calm += 1
+            if self._calm == CALM:
+                self._edgy = 0
 
     def _interpolant(self) -> FloatArray:
         """Return the coefficients of the dense output of the last step."""

@@ -105,6 +105,11 @@ class ExplicitSession:
             convergence_failures=0,
         )
 
+    @property
+    def seems_stiff(self) -> bool:
+        """Whether stability, and not accuracy, has kept steps short: an implicit method would take far fewer."""
+        return self._stepper.counts.stiff > 0
+
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
         """Go on from another state; its rates follow from it."""
         values = np.array(y, dtype=np.float64)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from atwood.expr import Expression, Scalar, depends_on
+from atwood.expr import Expression, Scalar, depends_on, is_zero
 from atwood.model.local import LocalConstraint, LocalPart
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
 
-__all__ = ["Bodies", "Body", "RigidStep", "find_bodies", "is_zero"]
+__all__ = ["Bodies", "Body", "RigidStep", "find_bodies"]
 
 
 @dataclass(frozen=True)
@@ -75,11 +75,6 @@ class Bodies:
     closures: tuple[Joint, ...]
     oriented: frozenset[int]
     idle: frozenset[tuple[str, str, int]]
-
-
-def is_zero(value: Scalar) -> bool:
-    """Return whether a number or expression is zero by structure."""
-    return value.is_zero if isinstance(value, Expression) else value == 0.0
 
 
 def find_bodies(graph: MechanismGraph, locals_: Mapping[str, LocalPart]) -> Bodies:
