@@ -361,6 +361,21 @@ def test_longest_steps_are_kept_to(kind: Kind) -> None:
     assert session.statistics.steps >= 99
 
 
+def test_stiffness_is_noticed(kind: Kind) -> None:
+    def stiff(t: float, y: FloatArray) -> list[float]:
+        return [-1000.0 * (y[0] - math.cos(t)), -y[1]]
+
+    session = start(kind, stiff, tight(1e-6), [1.0, 1.0])
+    session.advance(2.0)
+    assert session.seems_stiff
+    other = start("compiled" if kind == "reference" else "reference", stiff, tight(1e-6), [1.0, 1.0])
+    other.advance(2.0)
+    assert other.statistics.steps == session.statistics.steps
+    smooth = start(kind, pendulum, tight(1e-4, 100.0), [2.0, 0.0])
+    smooth.advance(100.0)
+    assert not smooth.seems_stiff
+
+
 # -- scenes -------------------------------------------------------------------------------------------------------
 
 
