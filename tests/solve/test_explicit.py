@@ -11,11 +11,10 @@ from scipy.integrate import DOP853
 from scipy.special import ellipj, ellipk
 
 from atwood.errors import KernelEvaluationError, StartError, UsageError
-from atwood.forms.accelerations import acceleration_program
 from atwood.pipeline import assemble
 from atwood.solve.driver import Budget, SolverOptions, Status
-from atwood.solve.explicit_native import CompiledAccelerations
 from atwood.solve.explicit_problem import ExplicitProblem
+from atwood.solve.explicit_scene import explicit_problem
 from atwood.solve.explicit_session import ExplicitSession, open_explicit
 from atwood.solve.explicit_table import ERROR_3, ERROR_5, NODES, STAGES
 from atwood.solve.start import find_start
@@ -379,24 +378,18 @@ def test_stiffness_is_noticed(kind: Kind) -> None:
 # -- scenes -------------------------------------------------------------------------------------------------------
 
 
-def scene_problem(name: str, scene: Any) -> tuple[Any, ExplicitProblem, FloatArray]:
+def scene_problem(scene: Any) -> tuple[Any, ExplicitProblem, FloatArray]:
     assembly = assemble(scene)
-    found, begin = acceleration_program(assembly), find_start(assembly)
-    assert found is not None
-    kernel, n = assembly.kernel(found.program), len(begin.coordinates)
-
-    def rates(t: float, y: FloatArray) -> list[float]:
-        return [*y[n:], *kernel([t], y[:n], y[n:])[0]]
-
-    compiled = CompiledAccelerations(found.program).bind(assembly.parameter_values)
-    state = np.concatenate([begin.coordinates, begin.speeds])
-    return assembly, ExplicitProblem(2 * n, rates, compiled=compiled), state
+    problem, begin = explicit_problem(assembly), find_start(assembly)
+    assert problem is not None
+    assert problem.compiled is not None
+    return assembly, problem, np.concatenate([begin.coordinates, begin.speeds])
 
 
 @pytest.mark.parametrize("name", ["double-pendulum", "chain", "pendulum-on-cart", "driven-pendulum", "double-atwood"])
 def test_scenes_run_alike_on_compiled_and_plain_rates(name: str) -> None:
     scene = Chain(links=4) if name == "chain" else SCENES[name]()
-    _, problem, y = scene_problem(name, scene)
+    _, problem, y = scene_problem(scene)
     found = [
         open_explicit(problem, tight(1e-10, 1.0), 0.0, y, stepper=kind).advance(0.7)
         for kind in ("reference", "compiled")
@@ -406,7 +399,7 @@ def test_scenes_run_alike_on_compiled_and_plain_rates(name: str) -> None:
 
 
 def test_double_pendulum_keeps_its_energy() -> None:
-    assembly, problem, _ = scene_problem("double-pendulum", SCENES["double-pendulum"]())
+    assembly, problem, _ = scene_problem(SCENES["double-pendulum"]())
     energies = assembly.kernel(assembly.energy_program)
     y = np.array([2.0, 1.5, 0.3, -0.2])
     session = open_explicit(problem, tight(1e-12, 10.0), 0.0, y)
@@ -422,10 +415,25 @@ def test_double_pendulum_keeps_its_energy() -> None:
 
 
 def test_sessions_with_compiled_rates_share_nothing() -> None:
-    _, problem, y = scene_problem("double-pendulum", SCENES["double-pendulum"]())
+    _, problem, y = scene_problem(SCENES["double-pendulum"]())
     alone = open_explicit(problem, tight(1e-9), 0.0, y).advance(3.0)
     a, b = (open_explicit(problem, tight(1e-9), 0.0, y) for _ in range(2))
     for t in np.linspace(0.0, 3.0, 20):
         last = a.advance(float(t)), b.advance(float(t))
     assert_array_equal(last[0].y, alone.y)
     assert_array_equal(last[1].y, alone.y)
+
+
+def test_scenes_with_constraints_left_have_no_explicit_problem() -> None:
+    assert explicit_problem(assemble(SCENES["four-bar"]())) is None
+
+
+def test_events_of_a_scene() -> None:
+    # the pendulum passes its lowest point after a quarter of its period
+    assembly = assemble(SCENES["simple-pendulum"]())
+    problem = explicit_problem(assembly, lambda t, y, yp: (y[0],), (0,))
+    assert problem is not None
+    found = open_explicit(problem, tight(1e-12), 0.0, np.array([2.0, 0.0])).advance(10.0)
+    assert found.status is Status.EVENT
+    length = dict(zip([p.name for p in assembly.parameters], assembly.parameter_values, strict=True))["rod.length"]
+    assert found.t == pytest.approx(math.sqrt(length / 9.81) * ellipk(math.sin(1.0) ** 2), abs=1e-10)

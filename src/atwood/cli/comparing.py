@@ -89,7 +89,7 @@ def _table(found: Comparison) -> Table:
     from rich.table import Table
 
     table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
-    table.add_column("form", no_wrap=True)
+    table.add_column("form", no_wrap=True, min_width=22)
     for heading in ("rtol", "error", "time, ms", "steps", "energy drift", "constraint drift"):
         table.add_column(heading, justify="right", no_wrap=True)
     shown = ""

@@ -46,7 +46,7 @@ def console() -> Console:
 
     made = Console(highlight=False)
     if not made.is_terminal and "COLUMNS" not in os.environ:
-        made = Console(highlight=False, width=100)
+        made = Console(highlight=False, width=120)
     return made
 
 
