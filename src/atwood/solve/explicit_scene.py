@@ -1,0 +1,70 @@
+"""From an assembled scene to the problem that an explicit method solves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+
+from atwood.forms.accelerations import AccelerationProgram, acceleration_program
+from atwood.forms.assembly import Assembly
+from atwood.solve.driver import FloatArray, Values
+from atwood.solve.explicit_problem import CompiledRates, ExplicitProblem
+
+__all__ = ["explicit_problem"]
+
+
+def explicit_problem(
+    assembly: Assembly,
+    events: Callable[[float, FloatArray, FloatArray], Values] | None = None,
+    directions: tuple[int, ...] = (),
+    found: AccelerationProgram | None = None,
+) -> ExplicitProblem | None:
+    """Return the equations of a scene in the reduced form for an explicit method, with ``y = (q, u)``.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    events, directions
+        What is watched, as functions of (t, y, y'), and in which direction.
+    found
+        The accelerations, where they are there already.
+
+    Returns
+    -------
+    ExplicitProblem or None
+        None if the scene has no coordinates, or constraints are left among them.
+    """
+    program = found or acceleration_program(assembly)
+    n = len(assembly.reduced.coordinates)
+    if program is None or n == 0:
+        return None
+    kernel = assembly.kernel(program.program)
+
+    def rates(t: float, y: FloatArray) -> Sequence[float]:
+        return [*y[n:], *kernel([t], y[:n], y[n:])[0]]
+
+    return ExplicitProblem(
+        size=2 * n,
+        rates=rates,
+        events=events,
+        event_count=len(directions),
+        event_directions=directions,
+        compiled=_compiled(assembly, program),
+    )
+
+
+def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], CompiledRates] | None:
+    """Return what gives each session compiled rates, made when they are first asked for; None if they cannot be."""
+    try:
+        from atwood.solve.explicit_native import CompiledAccelerations
+    except ImportError:  # no compiler: steps in Python
+        return None
+    if any(node.operation == "external" for node in found.program.nodes):
+        return None
+
+    @cache
+    def bound() -> Callable[[], CompiledRates]:
+        return CompiledAccelerations(found.program).bind(assembly.parameter_values)
+
+    return lambda: bound()()
