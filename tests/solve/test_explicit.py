@@ -12,6 +12,7 @@ from scipy.special import ellipj, ellipk
 
 from atwood.errors import KernelEvaluationError, StartError, UsageError
 from atwood.pipeline import assemble
+from atwood.solve import explicit_session
 from atwood.solve.driver import Budget, SolverOptions, Status
 from atwood.solve.explicit_problem import ExplicitProblem
 from atwood.solve.explicit_scene import explicit_problem
@@ -181,6 +182,16 @@ def test_samples_are_what_single_advances_give(kind: Kind) -> None:
     assert_array_equal(last.y, one.advance(13.0).y)
     with pytest.raises(UsageError):
         all_.sample(np.array([12.0]))
+
+
+def test_looking_at_limits_changes_nothing(kind: Kind, monkeypatch: Any) -> None:
+    times = np.linspace(0.0, 10.0, 57)
+    usual = start(kind, pendulum, tight(1e-8), [2.0, 0.0])
+    monkeypatch.setattr(explicit_session, "FIRST_CHUNK", 1)
+    often = start(kind, pendulum, tight(1e-8), [2.0, 0.0], budget=Budget(wall_seconds=100.0))
+    assert_array_equal(often.sample(times)[0], usual.sample(times)[0])
+    assert often.statistics.steps == usual.statistics.steps
+    assert_array_equal(often.advance(15.0).y, usual.advance(15.0).y)
 
 
 def test_events_are_found_on_the_dense_output(kind: Kind) -> None:

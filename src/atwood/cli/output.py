@@ -41,7 +41,7 @@ def strict(value: Any) -> Any:
 
 
 def console() -> Console:
-    """Return the console for texts on standard output; where there is no terminal it is a hundred columns wide."""
+    """Return the console for texts on standard output; where there is no terminal it is 120 columns wide."""
     from rich.console import Console
 
     made = Console(highlight=False)

@@ -19,8 +19,11 @@ from atwood.solve.explicit_problem import ExplicitProblem, Outcome, Stepper
 
 __all__ = ["ExplicitSession", "open_explicit"]
 
-_CHUNK = 20_000
-"""So many steps are taken at most before limits are looked at."""
+FIRST_CHUNK, LARGEST_CHUNK = 100, 100_000
+"""So many steps are taken before limits are looked at: at first, and at most."""
+
+_MOMENT = 0.02
+"""Steps are taken for about so long, in seconds, before limits are looked at and Ctrl-C is heard."""
 
 _STALLED = 50
 """So many steps in a row that do not move the time beyond rounding are a failure."""
@@ -88,6 +91,7 @@ class ExplicitSession:
         self._no_events = (0,) * problem.event_count
         self._starts = 0
         self._seconds = 0.0
+        self._chunk = FIRST_CHUNK
         self.reinitialize(t, y)
 
     @property
@@ -191,13 +195,15 @@ class ExplicitSession:
             return 0
         try:
             while filled < len(times):
+                looked = time.perf_counter()
                 y, yp, outcome = self._stepper.sample(times[filled:], self._allowed())
+                self._learn(time.perf_counter() - looked, outcome)
                 values[filled : filled + len(y)], rates[filled : filled + len(y)] = y, yp
                 filled += len(y)
                 self._newest = self._stepper.state()
                 if filled:
                     self._here = (float(times[filled - 1]), values[filled - 1], rates[filled - 1])
-                if outcome is not Outcome.REACHED or self._exceeded(began) is not None:
+                if outcome is Outcome.TOO_SMALL or self._exceeded(began) is not None:
                     break
         except KeyboardInterrupt:
             self._broken = True
@@ -239,13 +245,22 @@ class ExplicitSession:
         if self._watch is not None or self.budget.poll is not None:
             return 1
         if self.budget.max_steps is None:
-            return _CHUNK
-        return max(0, min(_CHUNK, self.budget.max_steps - self._stepper.counts.steps))
+            return self._chunk
+        return max(0, min(self._chunk, self.budget.max_steps - self._stepper.counts.steps))
+
+    def _learn(self, seconds: float, outcome: Outcome) -> None:
+        """Come closer to a chunk that takes a moment."""
+        if seconds > 2.0 * _MOMENT:
+            self._chunk = max(1, int(self._chunk * _MOMENT / seconds))
+        elif outcome is Outcome.USED_UP and seconds < 0.5 * _MOMENT:
+            self._chunk = min(2 * self._chunk, LARGEST_CHUNK)
 
     def _step(self, t_out: float) -> Advance | None:
         """Take steps, and return an answer only if that failed."""
         before, steps = self._newest[0], self._stepper.counts.steps
+        looked = time.perf_counter()
         outcome = self._stepper.run(t_out, self._allowed())
+        self._learn(time.perf_counter() - looked, outcome)
         self._newest = self._stepper.state()
         if outcome is Outcome.TOO_SMALL:
             self._here = self._newest
