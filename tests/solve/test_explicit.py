@@ -305,12 +305,14 @@ def test_interruption_loses_nothing(kind: Kind) -> None:
             raise KeyboardInterrupt
         return pendulum(t, y)
 
-    session = start(kind, interrupted, tight(1e-9), [2.0, 0.0])
-    found = session.advance(5.0)
-    assert found.status is Status.INTERRUPTED
-    assert_allclose(
-        session.advance(5.0).y, start("reference", pendulum, tight(1e-12), [2.0, 0.0]).advance(5.0).y, atol=1e-7
-    )
+    for sampled in (False, True):
+        calls = 0
+        session = start(kind, interrupted, tight(1e-9), [2.0, 0.0])
+        found = session.sample(np.linspace(0.0, 5.0, 6))[2] if sampled else session.advance(5.0)
+        assert found.status is Status.INTERRUPTED
+        assert_allclose(
+            session.advance(5.0).y, start("reference", pendulum, tight(1e-12), [2.0, 0.0]).advance(5.0).y, atol=1e-7
+        )
 
 
 def test_errors_of_the_user_come_through(kind: Kind) -> None:

@@ -174,9 +174,11 @@ class ExplicitSession:
         if not (len(times) and self._here[0] <= times[0] and times[-1] < inf and np.all(np.diff(times) >= 0.0)):
             raise UsageError(f"cannot sample from t = {self._here[0]:.9g} at these times: they must rise from there")
         values, rates = np.empty((len(times), self._size)), np.empty((len(times), self._size))
-        filled = 0
+        filled, stopped = 0, None
         if self._watch is None and self.budget.poll is None and not self._broken:
-            filled = self._sample_quickly(times, values, rates)
+            filled, stopped = self._sample_quickly(times, values, rates)
+        if stopped is not None:
+            return values[:filled], rates[:filled], stopped
         advance = Advance(*_copied(self._here), Status.REACHED, self._no_events)
         while filled < len(times):
             advance = self.advance(float(times[filled]))
@@ -186,31 +188,43 @@ class ExplicitSession:
             filled += 1
         return values[:filled], rates[:filled], advance
 
-    def _sample_quickly(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> int:
-        """Let the stepper go through times as long as no limit is near; return how many it filled."""
+    def _sample_quickly(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> tuple[int, Advance | None]:
+        """Let the stepper go through times as long as no limit is near.
+
+        Returns
+        -------
+        tuple
+            How many times it filled, and why it must end there; None if single advances can go on.
+        """
         began = time.perf_counter()
-        filled = int(np.searchsorted(times, self._newest[0])) if self._newest[0] > self._here[0] else 0
-        # What lies within the last step is left to single advances, which come first.
-        if filled or self._exceeded(began) is not None:
-            return 0
+        filled = 0
         try:
             while filled < len(times):
+                if times[-1] > self._newest[0] and self._exceeded(began) is not None:
+                    break
                 looked = time.perf_counter()
                 y, yp, outcome = self._stepper.sample(times[filled:], self._allowed())
                 self._learn(time.perf_counter() - looked, outcome)
                 values[filled : filled + len(y)], rates[filled : filled + len(y)] = y, yp
                 filled += len(y)
                 self._newest = self._stepper.state()
-                if filled:
-                    self._here = (float(times[filled - 1]), values[filled - 1], rates[filled - 1])
-                if outcome is Outcome.TOO_SMALL or self._exceeded(began) is not None:
+                if len(y):
+                    self._here = (float(times[filled - 1]), y[-1].copy(), yp[-1].copy())
+                if outcome is Outcome.TOO_SMALL:
                     break
         except KeyboardInterrupt:
             self._broken = True
+            return filled, self._stopped(Status.INTERRUPTED, "interrupted")
+        except KernelEvaluationError as error:
+            self._broken = True
+            return filled, self._stopped(Status.FAILED, str(error))
+        except BaseException:
+            self._broken = True
+            raise
         finally:
             self._searched = self._newest[0]
             self._seconds += time.perf_counter() - began
-        return filled
+        return filled, None
 
     def _run(self, t_out: float, began: float) -> Advance:
         if self._broken:
