@@ -90,6 +90,13 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 )
 @click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
 @click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative tolerance of the solver.")
+@click.option(
+    "--solver",
+    type=click.Choice(["auto", "ida", "ida-sundae"]),
+    default="auto",
+    show_default=True,
+    help="IDA with compiled equations, or through scikit-sundae with equations in Python.",
+)
 @click.option("--outputs", type=click.IntRange(min=2), default=201, show_default=True, help="Number of output times.")
 @click.option("--max-steps", type=click.IntRange(min=1), help="Stop after so many steps.")
 @click.option("--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after so many seconds.")

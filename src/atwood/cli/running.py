@@ -33,6 +33,7 @@ class RunRequest:
     level: str = "ggl"
     t_end: float | None = None
     rtol: float = 1e-8
+    solver: str = "auto"
     outputs: int = 201
     max_steps: int | None = None
     max_seconds: float | None = None
@@ -64,6 +65,7 @@ def run_scene(request: RunRequest) -> None:
             outputs=request.outputs,
             max_steps=request.max_steps,
             max_seconds=request.max_seconds,
+            solver=request.solver,
             progress=progress,
         )
     if request.save is not None:
