@@ -10,6 +10,7 @@ import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
 from functools import cache
+from itertools import accumulate
 from math import inf
 
 import numpy as np
@@ -77,12 +78,14 @@ class CompiledAccelerations:
         derived, scratch = np.empty(len(self.program.prologue)), np.empty(self._built.scratch)
         self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
 
+        function, place = self._built.code.addresses["rates"], derived.ctypes.data
+
         def rates() -> CompiledRates:
-            own = np.empty(self._built.scratch)
-            data = np.array([derived.ctypes.data, own.ctypes.data], dtype=np.uint64)
-            return CompiledRates(
-                self._built.code.addresses["rates"], data.ctypes.data, (self._built, derived, own, data)
-            )
+            # The pointers to derived values and scratch, and then the scratch itself.
+            own = np.empty(2 + len(scratch))
+            data = own.ctypes.data
+            own[:2].view(np.uint64)[:] = place, data + 16
+            return CompiledRates(function, data, (self._built, derived, own))
 
         return rates
 
@@ -103,22 +106,23 @@ class CompiledStepper:
         self._failure: BaseException | None = None
         rates = self._in_python(problem) if problem.compiled is None else problem.compiled()
         self._keep = rates.keep
-        padded = -(-problem.size // WIDTH) * WIDTH
-        self._numbers = np.zeros(len(NUMBERS))
-        self._counts = np.zeros(len(COUNTS), dtype=np.int64)
-        self._arrays = np.zeros((ROWS["all"], padded))
         self._absolute = absolute_tolerances(options, problem.size)
+        n, padded = problem.size, -(-problem.size // WIDTH) * WIDTH
+        # All memory is one piece, since looking up an address takes longer than a step.
+        ends = list(accumulate((ROWS["all"] * padded, len(NUMBERS), len(COUNTS), len(POINTERS), n, n)))
+        self._memory = np.zeros(ends[-1])
+        base = self._memory.ctypes.data
+        arrays, self._numbers, counts, pointers, self._y, self._yp = np.split(self._memory, ends[:-1])
+        self._arrays = arrays.reshape(ROWS["all"], padded)
+        self._counts, self._pointers = counts.view(np.int64), pointers.view(np.uint64)
         self._arrays[ROWS["absolute"]] = 1.0
-        self._arrays[ROWS["absolute"], : problem.size] = self._absolute
-        self._counts[:2] = problem.size, padded
+        self._arrays[ROWS["absolute"], :n] = self._absolute
+        self._counts[:2] = n, padded
         self._numbers[_R] = options.relative_tolerance
         self._numbers[_LONGEST] = options.max_step or inf
-        places = [rates.function, rates.data, *(a.ctypes.data for a in (self._numbers, self._counts, self._arrays))]
-        self._pointers = np.array(places, dtype=np.uint64)
-        assert len(places) == len(POINTERS)
-        self._session = c_void_p(self._pointers.ctypes.data)
-        self._y, self._yp = np.empty(problem.size), np.empty(problem.size)
-        self._places = c_void_p(self._y.ctypes.data), c_void_p(self._yp.ctypes.data)
+        self._pointers[:] = rates.function, rates.data, base + 8 * ends[0], base + 8 * ends[1], base
+        self._session = c_void_p(base + 8 * ends[2])
+        self._places = c_void_p(base + 8 * ends[3]), c_void_p(base + 8 * ends[4])
         self._evaluate, self._run, self._interpolate, self._sample = _functions()
 
     @property

@@ -160,6 +160,8 @@ class Stepper(Protocol):
 
 def absolute_tolerances(options: SolverOptions, size: int) -> FloatArray:
     """Return the absolute tolerance of each unknown; nothing is divided by zero where it is zero."""
+    if isinstance(options.absolute_tolerances, float):
+        return np.full(size, max(options.absolute_tolerances, float(np.finfo(float).tiny)))
     try:
         given = np.broadcast_to(np.asarray(options.absolute_tolerances, dtype=np.float64), (size,))
         return np.maximum(given, np.finfo(float).tiny)
