@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from atwood.errors import AtwoodError
 from atwood.expr import (
     Expression,
     InputGroup,
@@ -275,7 +276,10 @@ class _Tree:
         those of the angles, but where many parts meet there is a difference for each pair.
         """
         self.differences = differences
-        steps = eliminate(self.system, order, self.tidy)
+        try:
+            steps = eliminate(self.system, order, self.tidy)
+        except AtwoodError:  # a pivot that is always zero
+            return None
         true: dict[Expression, Expression] = {}
         exact: dict[int, Expression] = {}
         short: dict[int, Expression] = {}
