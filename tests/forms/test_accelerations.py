@@ -125,8 +125,12 @@ def driven() -> Scene:
     """Return a double pendulum below a mass that moves as prescribed."""
     scene = SCENES["driven-pendulum"]()
     assert isinstance(scene, Scene)
-    mass, rod, bob = scene.add("mass", PointMass()), scene.add("rod2", Rod(length=0.3)), scene.add("bob2", PointMass())
-    for a, b in ((scene["drive"].b, mass.point), (scene["bob"].point, rod.a), (rod.b, bob.point)):
+    extra, rod, bob = (
+        scene.add("extra", PointMass()),
+        scene.add("rod2", Rod(length=0.3)),
+        scene.add("bob2", PointMass()),
+    )
+    for a, b in ((scene["drive"].b, extra.point), (scene["bob"].point, rod.a), (rod.b, bob.point)):
         scene.connect(a, b)
     scene.start.update({"rod2.angle": 0.2, "rod2.angular_velocity": 0.0})
     return scene
