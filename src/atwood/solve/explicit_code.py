@@ -109,7 +109,21 @@ begin:
   %size = call double @llvm.fabs.f64(double %t)
   %least = fmul double %size, {exact(10.0 * 2.0**-52)}
   br label %attempt
-attempt:
+{_attempt()}
+{_acceptance()}
+too_small:
+  call void @unshift(ptr %arrays, i64 %m)
+  ret i32 2
+return0:
+  ret i32 0
+return1:
+  ret i32 1
+}}"""
+
+
+def _attempt() -> str:
+    """Return the instructions that try steps until one is good enough."""
+    return f"""attempt:
   %wanted = phi double [ %first, %begin ], [ %shorter, %again ]
   %rejected = phi i1 [ false, %begin ], [ true, %again ]
   %long = fcmp olt double %wanted, %longest
@@ -145,7 +159,12 @@ last:
   %e12 = call i32 @evaluate(ptr %session, double %t_new, i64 {ROWS["trial"]}, i64 12)
   %ok12 = icmp eq i32 %e12, 0
   br i1 %ok12, label %accept, label %retreat
-reject:
+{_rejection()}"""
+
+
+def _rejection() -> str:
+    """Return the instructions that shorten a step."""
+    return f"""reject:
   %small = fcmp olt double %factor, {exact(SHRINKAGE)}
   %by = select i1 %small, double %factor, double {exact(SHRINKAGE)}
   %share = fdiv double 1.0, %by
@@ -158,8 +177,12 @@ again:
   %failures = load i64, ptr %failures.at
   %failed = add i64 %failures, 1
   store i64 %failed, ptr %failures.at
-  br label %attempt
-accept:
+  br label %attempt"""
+
+
+def _acceptance() -> str:
+    """Return the instructions that keep a step and choose the next one."""
+    return f"""accept:
   %low = fcmp olt double %factor, {exact(1.0 / GROWTH)}
   %at_least = select i1 %low, double {exact(1.0 / GROWTH)}, double %factor
   %high = fcmp ogt double %at_least, {exact(SHRINKAGE)}
@@ -176,15 +199,7 @@ accept:
   store i64 %stepped, ptr %steps.at
 {_stability()}
   call void @accept(ptr %arrays, i64 %m)
-  br label %step
-too_small:
-  call void @unshift(ptr %arrays, i64 %m)
-  ret i32 2
-return0:
-  ret i32 0
-return1:
-  ret i32 1
-}}"""
+  br label %step"""
 
 
 def _stability() -> str:
