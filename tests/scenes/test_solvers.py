@@ -26,3 +26,28 @@ def test_both_drivers_agree(name: str, form: str) -> None:
 def test_an_unknown_solver_is_refused() -> None:
     with pytest.raises(UsageError, match="ida-sundae"):
         simulate(SCENES["atwood"](), solver="ida-sundea")
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if name not in ("four-bar", "slider-crank")])
+def test_the_explicit_method_agrees(name: str) -> None:
+    scene = SCENES[name]()
+    end = min(scene.t_end, 1.0)
+    explicit = simulate(scene, t_end=end, rtol=1e-11, outputs=11, solver="explicit")
+    reference = simulate(scene, t_end=end, rtol=1e-11, outputs=11, solver="ida")
+    assert explicit.run.solver == "explicit"
+    for path in reference.paths:
+        one, other = explicit.array(path), reference.array(path)
+        assert np.max(np.abs(one - other)) <= 3e-7 * max(1.0, np.max(np.abs(other))), path
+
+
+@pytest.mark.parametrize(("name", "form"), [("four-bar", "reduced"), ("double-pendulum", "dae")])
+def test_the_explicit_method_is_refused_where_constraints_are_left(name: str, form: str) -> None:
+    with pytest.raises(UsageError, match="without closed loops"):
+        simulate(SCENES[name](), form=form, solver="explicit")
+
+
+def test_a_rope_is_watched_by_the_explicit_method_too() -> None:
+    scene = SCENES["atwood"]()
+    stopped = [simulate(scene, t_end=3.0, rtol=1e-10, solver=solver) for solver in ("ida", "explicit")]
+    assert [one.status for one in stopped] == ["stopped", "stopped"]
+    assert stopped[0].time[-1] == pytest.approx(stopped[1].time[-1], abs=1e-8)

@@ -92,10 +92,10 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative tolerance of the solver.")
 @click.option(
     "--solver",
-    type=click.Choice(["auto", "ida", "ida-sundae"]),
+    type=click.Choice(["auto", "ida", "ida-sundae", "explicit"]),
     default="auto",
     show_default=True,
-    help="IDA with compiled equations, or through scikit-sundae with equations in Python.",
+    help="IDA with compiled equations, or through scikit-sundae with equations in Python; or an explicit method.",
 )
 @click.option("--outputs", type=click.IntRange(min=2), default=201, show_default=True, help="Number of output times.")
 @click.option("--max-steps", type=click.IntRange(min=1), help="Stop after so many steps.")

@@ -112,7 +112,7 @@ def _numbers(row: ComparisonRow) -> list[str]:
     error, wall = row.error or 0.0, row.wall_s or 0.0
     mark = "*" if row.within_reference else " "
     drifts = [f"{drift or 0.0:.1e}" for drift in (row.energy_drift, row.constraint_drift)]
-    return [f"{error:.1e}{mark}", f"{1e3 * wall:.1f}", str(row.steps), *drifts]
+    return [f"{error:.1e}{mark}", f"{1e3 * wall:.3g}", str(row.steps), *drifts]
 
 
 @contextlib.contextmanager

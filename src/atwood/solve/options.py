@@ -15,11 +15,12 @@ __all__ = ["SOLVERS", "RunOptions", "choose_solver", "sample_times"]
 
 FloatArray = NDArray[np.float64]
 
-SOLVERS = {"ida": "SUNDIALS IDA", "ida-sundae": "SUNDIALS IDA through scikit-sundae"}
+SOLVERS = {
+    "ida": "SUNDIALS IDA",
+    "ida-sundae": "SUNDIALS IDA through scikit-sundae",
+    "explicit": "Dormand-Prince 8(5,3)",
+}
 """What can solve a scene, and what it is called."""
-
-_SAMPLES = 400
-"""A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,10 @@ class RunOptions:
         Called with the time reached.
     max_order, max_step
         Limits for the method.
+    samples
+        A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it.
     solver
-        ``"ida"``, ``"ida-sundae"``, or ``"auto"``; see `choose_solver`.
+        ``"ida"``, ``"ida-sundae"``, ``"explicit"`` or ``"auto"``; see `choose_solver`.
     """
 
     t_end: float
@@ -53,6 +56,7 @@ class RunOptions:
     max_order: int = 5
     max_step: float | None = None
     solver: str = "auto"
+    samples: int = 400
 
 
 def choose_solver(asked: str) -> str:
@@ -62,7 +66,8 @@ def choose_solver(asked: str) -> str:
     ----------
     asked
         ``"auto"``, ``"ida"``, or ``"ida-sundae"``, which drives them through scikit-sundae with kernels in Python: the
-        reference, and the way out where the libraries cannot be found (which is then said).
+        reference, and the way out where the libraries cannot be found (which is then said). ``"explicit"``: a
+        Runge-Kutta method of order 8(5,3), for the reduced form without loops.
 
     Raises
     ------
@@ -73,8 +78,10 @@ def choose_solver(asked: str) -> str:
 
     if asked not in ("auto", *SOLVERS):
         raise UsageError(f"there is no solver {asked!r}", advice=suggestion(asked, ("auto", *SOLVERS)))
-    if asked == "ida-sundae" or available():
-        return "ida-sundae" if asked == "ida-sundae" else "ida"
+    if asked in ("ida-sundae", "explicit"):
+        return asked
+    if available():
+        return "ida"
     if asked == "ida":
         raise UsageError(f"IDA cannot be driven directly: {why_not()}", advice="Use the solver 'ida-sundae'.")
     warnings.warn(f"running through scikit-sundae, which is slower: {why_not()}", stacklevel=2)
@@ -93,7 +100,7 @@ def sample_times(t: float, options: RunOptions) -> tuple[FloatArray, NDArray[np.
             raise UsageError("output times must be finite and rise")
         if asked[0] < t or asked[-1] > options.t_end:
             raise UsageError(f"output times must lie between {t:g} and {options.t_end:g}")
-    filling = np.linspace(t, options.t_end, _SAMPLES + 1)
+    filling = np.linspace(t, options.t_end, options.samples + 1)
     near = 1e-9 * (options.t_end - t)
     next_asked = np.minimum(np.searchsorted(asked, filling), len(asked) - 1)
     distance = np.minimum(np.abs(asked[next_asked] - filling), np.abs(asked[np.maximum(next_asked - 1, 0)] - filling))

@@ -78,7 +78,7 @@ class Run:
     options
         What was asked for.
     solver
-        What solved it: ``"ida"`` or ``"ida-sundae"``.
+        What solved it: a key of `SOLVERS`.
     """
 
     segments: tuple[Segment, ...]
@@ -319,6 +319,8 @@ def _open(
         wall_seconds=None if options.max_seconds is None else max(0.0, options.max_seconds - spent.seconds),
         poll=plan.between_steps if plan.dependent else None,
     )
+    if solver == "explicit":
+        return _open_explicit(plan, probe, settings, budget, t, y)
     problem = plan.problem(probe.function(), probe.directions)
     if solver == "ida":
         from atwood.solve import ida_native
@@ -328,6 +330,23 @@ def _open(
     from atwood.solve.ida_sundae import open_session
 
     return open_session(problem, settings, t, y, yp, budget)
+
+
+def _open_explicit(
+    plan: Plan, probe: EventProbe, settings: SolverOptions, budget: Budget, t: float, y: FloatArray
+) -> Session:
+    from atwood.solve.explicit_scene import explicit_problem
+    from atwood.solve.explicit_session import open_explicit
+
+    assembly = plan.assembly
+    problem = explicit_problem(assembly, probe.function(), probe.directions) if assembly.form == "reduced" else None
+    if problem is None:
+        raise UsageError(
+            "the explicit method needs the reduced form of a scene without closed loops",
+            where=assembly.flat.name,
+            advice="Use the solver 'ida'.",
+        )
+    return open_explicit(problem, settings, t, y, budget)
 
 
 def _restart(plan: Plan, session: Session, advance: Advance) -> None:

@@ -133,7 +133,15 @@ def _tight_solutions(
 
 
 def run_flat(
-    flat: FlatScene, form: str, level: str, rtol: float, t_end: float, outputs: Any, max_seconds: float | None
+    flat: FlatScene,
+    form: str,
+    level: str,
+    rtol: float,
+    t_end: float,
+    outputs: Any,
+    max_seconds: float | None,
+    solver: str = "auto",
+    samples: int = 400,
 ) -> Result:
     """Run a scene in one form.
 
@@ -141,11 +149,19 @@ def run_flat(
     ----------
     flat
         The scene.
-    form, level, rtol, t_end, outputs, max_seconds
+    form, level, rtol, t_end, outputs, max_seconds, solver, samples
         See `atwood.simulate`.
     """
     assembly = assemble_flat(flat, form=form, level=level)
-    return simulate(assembly, t_end=t_end, rtol=rtol, outputs=outputs, max_seconds=max_seconds)
+    return simulate(
+        assembly,
+        t_end=t_end,
+        rtol=rtol,
+        outputs=outputs,
+        max_seconds=max_seconds,
+        solver=solver,
+        samples=samples,
+    )
 
 
 def compared_paths(result: Result) -> list[str]:
