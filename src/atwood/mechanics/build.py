@@ -130,13 +130,7 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     rows = motion_rows(site, mechanism.locals_, masses, kinematics, lifted, signals, u)
     # Before the constraints' rates, which can then be written with the slopes that the forces are made of.
     constraint_rows = force_rows(site, mechanism.locals_, kinematics, chosen, signals, u)
-    constraints = []
-    for (path, local_constraint, value), multiplier in zip(values, multipliers, strict=True):
-        rate, second = constraint_levels(value, mechanism.time, q, u, a)
-        key = (path, local_constraint.law.name, local_constraint.index)
-        constraints.append(
-            Constraint(key, local_constraint.reaction, local_constraint.sign, value, rate, second, multiplier)
-        )
+    constraints = _differentiated(values, multipliers, mechanism.time, q, u, a)
     return Equations(
         graph=graph,
         forest=forest,
@@ -158,6 +152,23 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
 
 
 Values = list[tuple[str, LocalConstraint, Expression]]
+
+
+def _differentiated(
+    values: Values,
+    multipliers: Sequence[Expression],
+    time: Expression,
+    q: Sequence[Expression],
+    u: Sequence[Expression],
+    a: Sequence[Expression],
+) -> list[Constraint]:
+    """Return the constraints that are left with their time derivatives."""
+    found = []
+    for (path, one, value), multiplier in zip(values, multipliers, strict=True):
+        rate, second = constraint_levels(value, time, q, u, a)
+        key = (path, one.law.name, one.index)
+        found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier))
+    return found
 
 
 def _unsolved(mechanism: Mechanism, forest: Forest) -> list[tuple[str, LocalConstraint]]:
