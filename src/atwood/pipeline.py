@@ -109,7 +109,7 @@ def read_mechanism(flat: FlatScene, modes: Mapping[str, str]) -> Mechanism:
     graph = Graph()
     time = graph.symbol("t")
     space = make_space(flat.space, flat.line_axis)
-    table = ParameterTable(graph)
+    table = ParameterTable(graph, space=space.name)
     locals_: Mapping[str, LocalPart] = localize(flat, space, time, table, modes, None)
     network = build_graph(flat, locals_)
     bodies = find_bodies(network, locals_)

@@ -27,9 +27,14 @@ def run_both(make: Callable[[], Model], **options: Any) -> tuple[Result, Result]
 
 
 def apart(a: Mapping[str, FloatArray], b: Mapping[str, FloatArray]) -> dict[str, float]:
-    """Return how far two tables of quantities are apart, relative to the size of each quantity but at least to 1."""
+    """Return how far two tables of quantities are apart, relative to the size of each quantity but at least to 1.
+
+    Quantities that are not known (nan) in both are not apart.
+    """
     return {
-        path: float(np.max(np.abs(values - b[path]))) / max(1.0, float(np.max(np.abs(values))))
+        path: 0.0
+        if np.all(np.isnan(values)) and np.all(np.isnan(b[path]))
+        else float(np.max(np.abs(values - b[path]))) / max(1.0, float(np.max(np.abs(values))))
         for path, values in a.items()
     }
 

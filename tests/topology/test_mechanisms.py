@@ -86,7 +86,9 @@ def weld_loop(reach: float) -> Scene:
 
 
 def test_weld_loops_fit_or_are_refused() -> None:
-    assert_agree(*run_both(lambda: weld_loop(1.0), rtol=1e-10, outputs=5), 1e-6)
+    reduced, dae = run_both(lambda: weld_loop(1.0), rtol=1e-10, outputs=5)
+    assert_agree(reduced, dae, 1e-6)
+    assert np.all(np.isnan(reduced.array("weld.torque")))  # the link shares the load, and nobody knows how
     with pytest.raises(TopologyError, match="do not fit together") as caught:
         assemble(weld_loop(1.5))
     assert caught.value.where.startswith("weld")

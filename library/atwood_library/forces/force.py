@@ -10,9 +10,7 @@ from atwood import Component, Load, Point, Scalar, Vector, as_vector, connector,
 class Force(Component):
     """A force on a point, in a direction that is fixed in the world, with a value given as a function of time."""
 
-    direction: tuple[float, float, float] = parameter(
-        (1.0, 0.0, 0.0), size=3, structural=True, doc="Direction in world axes, a unit vector."
-    )
+    direction: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction in world axes.")
     value: float = signal(0.0, unit="N", doc="Force along the direction, a function of time.")
     point: Point = connector(Point, "Where the force acts.")
 

@@ -25,7 +25,7 @@ class Drive(Component):
     """
 
     axis: tuple[float, float, float] = parameter(
-        (1.0, 0.0, 0.0), size=3, structural=True, doc="Direction of the motion in frame a, a unit vector."
+        (1.0, 0.0, 0.0), direction=True, doc="Direction of the motion in frame a."
     )
     motion: float = signal(0.0, unit="m", doc="Displacement of frame b along the axis, a function of time.")
     a: Frame = connector(Frame, "The frame that carries the drive.")

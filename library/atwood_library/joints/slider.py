@@ -28,7 +28,7 @@ class Slider(Component):
         (1.0, 0.0, 0.0),
         size=3,
         structural=True,
-        doc="Direction of the guide in frame a, a unit vector in its x-z plane.",
+        doc="Direction of the guide in frame a.",
     )
     a: Frame = connector(Frame, "The frame that carries the guide.")
     b: Frame = connector(Frame, "The frame that slides.")

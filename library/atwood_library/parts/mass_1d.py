@@ -33,9 +33,7 @@ class Mass1D(Component):
     origin: tuple[float, float, float] = parameter(
         (0.0, 0.0, 0.0), unit="m", size=3, doc="Point of the line where the displacement is zero."
     )
-    axis: tuple[float, float, float] = parameter(
-        (1.0, 0.0, 0.0), size=3, structural=True, doc="Direction of the line, a unit vector in the x-z plane."
-    )
+    axis: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction of the line.")
     flange: Point = connector(Point, "The mass.")
 
     def direction(self) -> Vector:

@@ -43,7 +43,12 @@ class Rod(Component):
         third, sixth = self.mass / 3.0, self.mass / 6.0
         yield PointInertia((self.a, self.b), ((third, sixth), (sixth, third)))
 
-    @constraint(reaction="tension", unit="N", sign=-1.0, doc="Tension; negative when the rod is pushed.")
+    @constraint(
+        reaction="tension",
+        unit="N",
+        sign=-1.0,
+        doc="Tension, with mass its mean over the length; negative when pushed.",
+    )
     def fixed_distance(self) -> Scalar:
         """Return ``(r^2 - l^2)/(2 l)``, whose multiplier is minus the tension; on a line, the distance less l."""
         if self.on_a_line:
@@ -62,7 +67,11 @@ class Rod(Component):
         return Placement(self.line * (self.side(self.a, self.b) * self.length))
 
     @observable(
-        unit="rad", doc="Angle from the downward vertical, counter-clockwise.", periodic=True, spaces=("plane",)
+        unit="rad",
+        doc="Angle from the downward vertical, counter-clockwise.",
+        periodic=True,
+        rate="angular_velocity",
+        spaces=("plane",),
     )
     def angle(self) -> Scalar:
         """Return the angle."""

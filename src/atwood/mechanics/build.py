@@ -116,7 +116,7 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
             eliminated = [c.name for c, s in zip(forest.coordinates, q, strict=True) if s in gone]
             names = [c for c, s in zip(forest.coordinates, q, strict=True) if s not in gone]
             q = tuple(s for s in q if s not in gone)
-    values = _drop_closed(mechanism, q, values)
+    values, prescribed = _drop_closed(mechanism, q, values)
     u = tuple(graph.symbol(f"u:{c.name}") for c in names)
     a = tuple(graph.symbol(f"a:{c.name}") for c in names)
     kinematics = differentiate(placements, mechanism.time, q, u, a)
@@ -148,6 +148,7 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
         constraint_rows=tuple(constraint_rows),
         constraints=tuple(constraints),
         eliminated=tuple(eliminated),
+        prescribed=prescribed,
     )
 
 
@@ -277,9 +278,16 @@ def _substituted(placements: Placements, solution: Mapping[Expression, Expressio
     )
 
 
-def _drop_closed(mechanism: Mechanism, q: tuple[Expression, ...], values: Values) -> Values:
-    """Take out the constraints that no coordinate can change, after checking that they hold."""
+Prescribed = tuple[tuple[tuple[str, str, int], Expression], ...]
+
+
+def _drop_closed(mechanism: Mechanism, q: tuple[Expression, ...], values: Values) -> tuple[Values, Prescribed]:
+    """Take out the constraints that no coordinate can change; return the rest, and those that depend on time.
+
+    Those that do not are checked here; functions of time are checked when it is known for which times.
+    """
     kept: Values = []
+    prescribed = []
     parameters = mechanism.table.values
     for path, constraint, value in values:
         if value is _SOLVED:
@@ -287,21 +295,26 @@ def _drop_closed(mechanism: Mechanism, q: tuple[Expression, ...], values: Values
         if depends_on(value, q):
             kept.append((path, constraint, value))
             continue
-        for moment in (0.0, 0.3217, 1.7331):
-            (miss,) = evaluate([value], {**parameters, mechanism.time: moment})
-            if not abs(miss) <= _CLOSES * max(1.0, extent(mechanism)):
-                raise TopologyError(
-                    f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
-                    where=f"{path}.{constraint.law.name}",
-                    advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
-                )
-    return kept
+        if depends_on(value, [mechanism.time]):
+            prescribed.append(((path, constraint.law.name, constraint.index), value))
+            continue
+        (miss,) = evaluate([value], parameters)
+        if not abs(miss) <= _CLOSES * (extent(mechanism) or 1.0):
+            raise TopologyError(
+                f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
+                where=f"{path}.{constraint.law.name}",
+                advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
+            )
+    return kept, tuple(prescribed)
 
 
 def extent(mechanism: Mechanism) -> float:
-    """Return the extent of a mechanism, m: the largest of its parameters that are lengths; 0 if it has none."""
+    """Return the extent of a mechanism, m: the largest length among the parameters of what moves; 0 if none is."""
     sizes = [0.0]
-    for local in mechanism.locals_.values():
+    for path, local in mechanism.locals_.items():
+        bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors}
+        if bodies == {0}:
+            continue  # where the ground is says nothing about the size of what moves
         for name, spec in local.part.component.parameter_specs().items():
             value = local.part.values[name]
             if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
@@ -330,7 +343,10 @@ def check_closures(mechanism: Mechanism) -> None:
         graph = mechanism.table.graph
         misses = [*gap, turns[joint.b] - turns[joint.a] - rotation if space.has_rotation else 0.0]
         numbers = evaluate([graph.convert(m) for m in misses], mechanism.table.values)
-        if not all(abs(m) <= _CLOSES * max(1.0, extent(mechanism)) for m in numbers):
+        if (
+            not all(abs(m) <= _CLOSES * (extent(mechanism) or 1.0) for m in numbers[:3])
+            or not abs(numbers[3]) <= _CLOSES
+        ):
             kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
             raise TopologyError(
                 f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {numbers[3]:g} rad",

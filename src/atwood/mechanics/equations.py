@@ -87,6 +87,8 @@ class Equations:
         The constraints that are left.
     eliminated
         Coordinates that linear constraints gave as functions of the others, by name.
+    prescribed
+        Constraints that no coordinate can change and that depend on time, with their residuals.
     """
 
     graph: Graph
@@ -105,6 +107,7 @@ class Equations:
     constraint_rows: tuple[Expression, ...]
     constraints: tuple[Constraint, ...]
     eliminated: tuple[str, ...]
+    prescribed: tuple[tuple[tuple[str, str, int], Expression], ...]
 
     @property
     def multipliers(self) -> tuple[Expression, ...]:

@@ -35,6 +35,8 @@ class Observable:
         Whether it comes out within one turn and must be unwrapped.
     value
         The expression, of time, coordinates, speeds, accelerations and reactions.
+    rate
+        Path of its rate, for a periodic one; empty if none is said.
     """
 
     path: str
@@ -42,6 +44,7 @@ class Observable:
     doc: str
     periodic: bool
     value: Expression
+    rate: str = ""
 
 
 @dataclass(frozen=True)
@@ -120,8 +123,8 @@ def observe(mechanism: Mechanism, equations: Equations, reactions: Sequence[Reac
         What `list_reactions` gave.
     """
     found: dict[str, Observable] = {}
-    parts = {path: part_energies(mechanism, equations, path) for path in mechanism.locals_}
     signals = resolve_signals(mechanism, equations.site, equations.kinematics)
+    parts = {path: part_energies(mechanism, equations, path, signals) for path in mechanism.locals_}
     for path, local in mechanism.locals_.items():
         own = {r.path[len(path) + 1 :]: r.symbol for r in reactions if r.key[0] == path}
         bound = bind(local.part.component, _binding(mechanism, equations, local, own, parts, signals))
@@ -133,7 +136,8 @@ def observe(mechanism: Mechanism, equations: Equations, reactions: Sequence[Reac
             except DeclarationError:
                 continue  # it asks for an orientation that nothing determines
             options = law.options
-            _take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic)
+            rate = f"{path}.{options.rate}" if options.rate else ""
+            _take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic, rate)
         kinetic, potential = parts[path]
         has_inertia = bool(local.part.component.laws("inertia"))
         if has_inertia:
@@ -153,6 +157,7 @@ def _take(
     unit: str,
     doc: str,
     periodic: bool,
+    rate: str = "",
 ) -> None:
     graph = mechanism.table.graph
     if isinstance(value, Vector):
@@ -162,7 +167,7 @@ def _take(
     else:
         expression = graph.convert(value)
         # A joint coordinate needs no unwrapping: it counts its turns by itself.
-        found[path] = Observable(path, unit, doc, periodic and not expression.is_symbol, expression)
+        found[path] = Observable(path, unit, doc, periodic and not expression.is_symbol, expression, rate)
 
 
 def bindings_of(
@@ -242,11 +247,13 @@ def _turned(mechanism: Mechanism, equations: Equations, motion: Motion, node: in
     )
 
 
-def part_energies(mechanism: Mechanism, equations: Equations, path: str) -> tuple[Expression, Expression]:
+def part_energies(
+    mechanism: Mechanism, equations: Equations, path: str, signals: Mapping[Expression, Expression]
+) -> tuple[Expression, Expression]:
     """Return kinetic and potential energy of one part, its weight included."""
     graph, local, kinematics = mechanism.table.graph, mechanism.locals_[path], equations.kinematics
     site, space = equations.site, mechanism.space
-    mapping = local_map(site, local, kinematics)
+    mapping = {**local_map(site, local, kinematics), **signals}
     kinetic: Scalar = graph.constant(0.0)
     potential: Scalar = graph.constant(0.0)
     pull = space.components(mechanism.gravity)
@@ -280,7 +287,8 @@ def part_energies(mechanism: Mechanism, equations: Equations, path: str) -> tupl
 
 def energies(mechanism: Mechanism, equations: Equations) -> tuple[Expression, Expression]:
     """Return kinetic and potential energy of the scene."""
-    parts = [part_energies(mechanism, equations, path) for path in mechanism.locals_]
+    signals = resolve_signals(mechanism, equations.site, equations.kinematics)
+    parts = [part_energies(mechanism, equations, path, signals) for path in mechanism.locals_]
     return _sum([k for k, _ in parts]), _sum([v for _, v in parts])
 
 

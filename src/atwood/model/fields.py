@@ -114,11 +114,13 @@ class ParameterSpec(Field):
         integer: bool = False,
         choices: tuple[str, ...] = (),
         structural: bool = False,
+        direction: bool = False,
     ) -> None:
         super().__init__("parameter", default, unit, doc)
         self.minimum, self.above, self.maximum = minimum, above, maximum
         self.size, self.integer, self.choices = size, integer, choices
-        self.structural = structural or integer or bool(choices)
+        self.direction = direction
+        self.structural = structural or direction or integer or bool(choices)
 
     def check(self, value: Any, where: str) -> Any:
         """Return a value in its own type and SI unit, or refuse it.
@@ -152,7 +154,13 @@ class ParameterSpec(Field):
             raise ParameterError(
                 f"{value!r} is not {self.size} numbers", where=where, advice=f"Give {self.size} numbers in brackets."
             )
-        return tuple(self._check_number(part, where) for part in parts)
+        numbers = tuple(self._check_number(part, where) for part in parts)
+        if not self.direction:
+            return numbers
+        length = math.hypot(*numbers)
+        if length == 0.0:
+            raise ParameterError("a direction cannot be zero", where=where)
+        return tuple(number / length for number in numbers)
 
     def _check_number(self, value: Any, where: str) -> float | int:
         number = parse_quantity(value, self.unit, where) if isinstance(value, str) else _plain_number(value)
@@ -230,6 +238,7 @@ def parameter(
     integer: bool = False,
     choices: Sequence[str] = (),
     structural: bool = False,
+    direction: bool = False,
 ) -> Any:
     """Declare a parameter in the class body of a component.
 
@@ -255,6 +264,8 @@ def parameter(
     structural
         Whether its value shapes the mechanism, as a direction does. Counts and choices always do; every other
         parameter is a number that can change without anything being derived again.
+    direction
+        Whether it is a direction: three numbers, not all zero, of which a unit vector is made.
 
     Raises
     ------
@@ -270,10 +281,11 @@ def parameter(
         minimum=minimum,
         above=above,
         maximum=maximum,
-        size=size,
+        size=3 if direction else size,
         integer=integer,
         choices=tuple(choices),
         structural=structural,
+        direction=direction,
     )
 
 

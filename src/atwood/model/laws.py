@@ -164,6 +164,7 @@ class ObservableOptions:
     unit: str
     doc: str
     periodic: bool
+    rate: str
     spaces: tuple[str, ...]
 
 
@@ -270,7 +271,12 @@ def joint(
 
 
 def observable(
-    *, unit: str, doc: str, periodic: bool = False, spaces: Sequence[str] = ("line", "plane", "space")
+    *,
+    unit: str,
+    doc: str,
+    periodic: bool = False,
+    rate: str = "",
+    spaces: Sequence[str] = ("line", "plane", "space"),
 ) -> Callable[[_F], _F]:
     """Mark a method that returns a quantity to report: a scalar or a `Vector`.
 
@@ -282,6 +288,8 @@ def observable(
         One line of meaning.
     periodic
         Whether it is an angle that comes out within one turn; it is then unwrapped along a run.
+    rate
+        Name of the observable that is its rate, by which the turns of a periodic one are counted.
     spaces
         The spaces in which it has a meaning.
     """
@@ -297,7 +305,7 @@ def observable(
             known = self._known_observable(name)
             return function(self) if known is None else known
 
-        law = Law("observable", name, ObservableOptions(unit, doc, periodic, tuple(spaces)))
+        law = Law("observable", name, ObservableOptions(unit, doc, periodic, rate, tuple(spaces)))
         return ObservableLaw(read, law)  # type: ignore[return-value]
 
     return decorate

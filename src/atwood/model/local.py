@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from atwood.errors import AtwoodError, DeclarationError
+from atwood.errors import AtwoodError, DeclarationError, ParameterError
 from atwood.expr import Expression, Graph, Scalar
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, Motion
@@ -30,6 +30,7 @@ class ParameterTable:
 
     graph: Graph
     values: dict[Expression, float] = field(default_factory=dict)
+    space: str = "plane"
 
     def scalar(self, name: str, value: float, structural: bool = False) -> Scalar:
         """Return the symbol of a parameter, or the plain number if it shapes the program (exact zero, structural)."""
@@ -202,6 +203,8 @@ def _parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
     value, name = part.values[spec.name], f"{part.path}.{spec.name}"
     if value is None or spec.integer or spec.choices:
         return value
+    if spec.direction and table.space == "plane" and value[1] != 0.0:
+        raise ParameterError("it points out of the plane", where=name, advice="Leave its y component zero.")
     if spec.size is None:
         return table.scalar(name, value, spec.structural)
     axes = "xyz" if spec.size == 3 else [str(i) for i in range(spec.size)]

@@ -8,8 +8,15 @@ from numpy.typing import NDArray
 __all__ = ["unwrap"]
 
 
-def unwrap(values: NDArray[np.float64], start: float | None) -> NDArray[np.float64]:
+def unwrap(
+    values: NDArray[np.float64],
+    start: float | None,
+    time: NDArray[np.float64] | None = None,
+    rate: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
     """Return an angle without jumps by whole turns.
+
+    With its rate at the samples, also more than half a turn from sample to sample is counted.
 
     Parameters
     ----------
@@ -17,10 +24,16 @@ def unwrap(values: NDArray[np.float64], start: float | None) -> NDArray[np.float
         Samples, each within one turn, rad.
     start
         What the angle was said to be at the start, which fixes the number of whole turns; none if not given.
+    time, rate
+        Times of the samples and rate of the angle there; without them, what turns fast is counted wrong.
     """
     if not len(values):
         return values
-    smooth: NDArray[np.float64] = np.unwrap(values)
+    if time is None or rate is None:
+        smooth: NDArray[np.float64] = np.unwrap(values)
+    else:
+        expected = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))])
+        smooth = expected + np.unwrap(values - expected)
     if start is not None:
         smooth = smooth + 2.0 * np.pi * np.round((start - smooth[0]) / (2.0 * np.pi))
     return smooth

@@ -44,6 +44,7 @@ def make_ledger(
     kinetic: Sequence[FloatArray],
     potential: Sequence[FloatArray],
     power: Sequence[FloatArray | None],
+    impacts: Sequence[bool],
     shown: NDArray[np.bool_],
 ) -> EnergyLedger:
     """Return the ledger of a run from samples of each of its segments.
@@ -54,13 +55,16 @@ def make_ledger(
         Samples.
     power
         Power put in, W; None where there is none.
+    impacts
+        For each segment, whether it began with an impact, which takes energy away. No other change of mode does; if
+        energy jumps there, that is drift.
     shown
         Which of all samples are outputs.
     """
     work, carried = [], 0.0
     for i, (t, p) in enumerate(zip(times, power, strict=True)):
-        if i > 0:  # what an impact took away between segments
-            carried += float(kinetic[i][0] + potential[i][0] - kinetic[i - 1][-1] - potential[i - 1][-1])
+        if impacts[i]:
+            carried += min(0.0, float(kinetic[i][0] - kinetic[i - 1][-1]))
         work.append(carried + (np.zeros(len(t)) if p is None else _integral(t, p)))
         carried = float(work[-1][-1])
     t_all, v_all, w_all = (np.concatenate(list(x)) for x in (kinetic, potential, work))

@@ -172,7 +172,9 @@ class Result:
         guesses = {**self.assembly.flat.guess, **self.assembly.flat.start}
         for path in missing:
             if observables[path].periodic:
-                self._cache[path] = unwrap(self._cache[path], guesses.get(path))
+                rate = observables[path].rate
+                turning = (self._all_time, self.samples(rate)) if rate else (None, None)
+                self._cache[path] = unwrap(self._cache[path], guesses.get(path), *turning)
 
     def _evaluate(self, segment: Segment, paths: tuple[str, ...]) -> FloatArray:
         assembly = segment.assembly
@@ -230,7 +232,10 @@ class Result:
             kinetic.append(energies[0])
             potential.append(energies[1])
             power.append(self._power(segment, state, idle))
-        return make_ledger([segment.time for segment in self.run.segments], kinetic, potential, power, self._shown)
+        impacts = [False, *(one.impact for one in self.run.happenings)][: len(kinetic)]
+        return make_ledger(
+            [segment.time for segment in self.run.segments], kinetic, potential, power, impacts, self._shown
+        )
 
     def _power(
         self, segment: Segment, state: tuple[FloatArray, ...], idle: tuple[FloatArray, ...]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.errors import SolveError
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.watches import Watch, list_watches
@@ -122,6 +123,28 @@ class EventProbe:
         """Return the first event whose one-sided bound does not hold from the outset."""
         return None if self.broken is None else self._happening(t, self.broken)
 
+    def between(self, start: float, end: float) -> Happening | None:
+        """Return the first event between two times in which nothing is free to move; None if there is none."""
+        if not self.watches:
+            return None
+        nothing = np.zeros(0)
+        before, after = self.values(start, nothing, nothing), self.values(end, nothing, nothing)
+        found: list[tuple[float, Watch]] = []
+        for i, watch in enumerate(self.watches):
+            if before[i] == 0.0 or np.sign(before[i]) == np.sign(after[i]):
+                continue
+            if watch.direction and np.sign(after[i] - before[i]) != watch.direction:
+                continue
+            low, high = start, end
+            while high - low > 4e-16 * max(abs(low), abs(high), end - start):
+                middle = 0.5 * (low + high)
+                if not low < middle < high:
+                    break
+                same = np.sign(self.values(middle, nothing, nothing)[i]) == np.sign(before[i])
+                low, high = (middle, high) if same else (low, middle)
+            found.append((high, watch))
+        return self._happening(*min(found, key=lambda one: one[0])) if found else None
+
     def name(self, t: float, events: Sequence[int]) -> Happening:
         """Return what happened when the driver reports an event."""
         watch = next(one for one, sign in zip(self.watches, events, strict=True) if sign)
@@ -160,23 +183,53 @@ def enter_mode(
     program = after.balance("dae")
     balance = Balance(program, after.kernel(program.program))
     if happening.impact:
-        big_q, _ = balance.project(t, big_q, big_u, sizes)
-        big_u = _plastic_impact(balance, t, big_q, big_u)
+        met, _ = balance.project(t, big_q, big_u, sizes)
+        _check_in_place(happening, (met - big_q) / sizes)
+        big_u = _plastic_impact(after, balance, happening, t, met, big_u)
+        big_q = met
     if after.form == "dae":
         return after, big_q, big_u
-    return after, *_to_reduced(assembly, after, t, (q, u), (big_q, big_u), length)
+    return after, *_to_reduced(assembly, after, t, (q, u), (big_q, big_u), length, happening)
 
 
-def _plastic_impact(balance: Balance, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+_IN_PLACE = 1e-5
+"""Relative to the scene's sizes: how far a change of mode may move anything."""
+
+
+def _check_in_place(happening: Happening, moved: FloatArray) -> None:
+    """Refuse a change of mode that would move bodies."""
+    farthest = float(np.max(np.abs(moved), initial=0.0))
+    if not farthest <= _IN_PLACE:
+        raise SolveError(
+            f"at t = {happening.time:.6g} a change of mode ({happening.message}) would move something at once by "
+            f"{farthest:.3g} of the scene's size",
+            where=happening.part,
+            advice="The position does not belong to the mode: change the start, or when the mode is entered.",
+        )
+
+
+def _plastic_impact(
+    after: Assembly, balance: Balance, happening: Happening, t: float, q: FloatArray, u: FloatArray
+) -> FloatArray:
     """Return the velocities after an impact: the nearest admissible ones in the metric of the masses.
 
-    Impulses act along the constraints only: ``M (u+ - u-) = G^T Lambda``, ``G u+ + g_t = 0``.
+    Impulses act along the constraints only: ``M (u+ - u-) = G^T Lambda``, ``G u+ + g_t = 0``. What has modes, as a rope
+    has, can only pull: an impact that would make it push is refused.
     """
     now = balance.at(t, q, u)
     n, m = len(u), len(now.gamma)
     matrix = np.block([[now.mass, -now.slope.T], [now.slope, np.zeros((m, m))]])
     right = np.concatenate([now.mass @ u, -now.drift])
     solution: FloatArray = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+    impulses = solution[n:]
+    size = float(np.max(np.abs(impulses), initial=0.0))
+    for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
+        if one.key[0] in after.modes and one.sign * impulse < -1e-9 * size:
+            raise SolveError(
+                f"at t = {t:.6g} the jerk ({happening.message}, {happening.part}) would make it push",
+                where=one.key[0],
+                advice="Several ropes that jerk at once, of which some go slack, cannot be solved yet.",
+            )
     return solution[:n]
 
 
@@ -187,6 +240,7 @@ def _to_reduced(
     own: tuple[FloatArray, FloatArray],
     maximal: tuple[FloatArray, FloatArray],
     length: float,
+    happening: Happening,
 ) -> tuple[FloatArray, FloatArray]:
     """Find the generalized coordinates of a mode that give the same maximal coordinates and speeds."""
     from atwood.expr import InputGroup, OutputGroup, Program, jacobian
@@ -219,6 +273,7 @@ def _to_reduced(
         q = q + step
         if float(np.max(np.abs(step), initial=0.0)) < 1e-14 * max(1.0, float(np.max(np.abs(q), initial=0.0))):
             break
+    _check_in_place(happening, miss)
     still = after.kernel(to_maximal)([t], q, np.zeros_like(q))[1]
     u = least_norm(matrix / scales[:, None], (maximal[1] - np.asarray(still)) / scales)
     return q, u

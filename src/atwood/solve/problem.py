@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import StartError
+from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import FormProgram
 from atwood.kernels import BoundKernel
-from atwood.solve.balance import Balance, least_norm, solve_balance
+from atwood.solve.balance import Balance, least_norm, row_scales, solve_balance
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.solve.rank import RankFinding, choose_dependent, dependence, find_rank
 from atwood.solve.scales import Scales, coordinate_scales, find_scales
@@ -20,6 +20,9 @@ from atwood.solve.scales import Scales, coordinate_scales, find_scales
 __all__ = ["Plan", "make_plan", "pack_state"]
 
 FloatArray = NDArray[np.float64]
+
+_HELD = 1e-7
+"""Relative to the scene's sizes: a projected state that misses a constraint by more has not met it."""
 
 _POOR = 0.3
 """Below this share of the best, dependent coordinates are chosen anew."""
@@ -92,6 +95,26 @@ class Plan:
         self._kernels = None
         self.switches += 1
         return True
+
+    def check_held(self, t: float, q: FloatArray, u: FloatArray) -> None:
+        """Refuse a state that misses constraints even after it has been projected onto them: they contradict.
+
+        Raises
+        ------
+        SolveError
+            If it does; it names the constraint that is missed most.
+        """
+        now = self.balance.at(t, q, u)
+        rows = row_scales(now.slope, self.sizes)
+        misses = np.maximum(np.abs(now.value / rows), np.abs(now.rate / rows) * self.scales.time)
+        if not np.all(misses <= _HELD):
+            worst = int(np.argmax(np.where(np.isfinite(misses), misses, np.inf)))
+            raise SolveError(
+                f"at t = {t:.6g} the constraints cannot all hold: this is missed by {misses[worst]:.3g} of the scene's "
+                "size",
+                where=self.assembly.equations.constraints[worst].label,
+                advice="Drives or lengths contradict each other here, or the mechanism cannot go on from here.",
+            )
 
     def between_steps(self, t: float) -> None:
         """Review the dependent coordinates where the solver last asked for a Jacobian; for the driver's poll."""

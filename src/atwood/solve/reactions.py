@@ -124,8 +124,9 @@ class ReactionSolver:
             (released,) = kernel(t[None, :], big_q, big_u, a, multipliers)
         for i, reaction in enumerate(assembly.reactions):
             if reaction.axis >= 0:
-                if released is not None and reaction.path in self._release.rows:  # type: ignore[union-attr]
-                    values[i] = released[self._release.rows[reaction.path]]  # type: ignore[union-attr]
+                rows = {} if self._release is None else self._release.rows
+                # Where another rigid connection shares the load, no share is known.
+                values[i] = released[rows[reaction.path]] if released is not None and reaction.path in rows else np.nan
             elif reaction.key in self._of_constraint:
                 values[i] = reaction.sign * multipliers[self._of_constraint[reaction.key]]
         power = -np.sum(multipliers * drift, axis=0) if len(multipliers) else np.zeros(len(t))

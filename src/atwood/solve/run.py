@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import SolveError, UsageError
+from atwood.errors import SolveError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.solve.driver import Advance, Budget, Session, SolverOptions, Statistics, Status
 from atwood.solve.modes import EventProbe, Happening, enter_mode
 from atwood.solve.options import RunOptions, choose_solver, sample_times
 from atwood.solve.problem import Plan, make_plan, pack_state
+from atwood.solve.scales import scene_length
 from atwood.solve.start import Start
 
 __all__ = ["Run", "RunOptions", "Segment", "run"]
@@ -110,6 +111,7 @@ class _Recorder:
         held = plan.balance.misses(t, q, u, plan.sizes)
         if plan.is_projected:
             q, u = plan.balance.project(t, q, u, plan.sizes)
+            plan.check_held(t, q, u)
         if self.time and self.time[-1] == t:  # an output time that is also an event: keep the state after it
             for last in (self.time, self.q, self.u, self.shown, self.held):
                 del last[-1]
@@ -172,6 +174,7 @@ def run(
         )
     solver = choose_solver(options.solver)
     times, shown = sample_times(t, options)
+    _check_prescribed(assembly, times)
     q, u = _own_state(assembly, start)
     segments: list[Segment] = []
     happenings: list[Happening] = []
@@ -222,6 +225,26 @@ def run(
     return made
 
 
+def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
+    """Refuse motions that are prescribed for what is held, or twice over, where they contradict each other."""
+    prescribed = assembly.equations.prescribed
+    if not prescribed:
+        return
+    program = assembly.state_program("prescribed", [value for _, value in prescribed])
+    n = len(assembly.equations.coordinates)
+    idle = (np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(len(assembly.reactions)))
+    misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])
+    if float(np.max(misses)) > 1e-9 * scene_length(assembly):
+        worst, moment = np.unravel_index(int(np.argmax(misses)), misses.shape)
+        part, law, _ = prescribed[int(worst)][0]
+        raise TopologyError(
+            f"it cannot hold: at t = {times[moment]:.6g} what is prescribed contradicts what is held, by "
+            f"{misses[worst, moment]:.3g}",
+            where=f"{part}.{law}",
+            advice="Two drives, or a drive and a fixed part, say different things about the same motion.",
+        )
+
+
 @dataclass(frozen=True)
 class _Outcome:
     t: float
@@ -247,21 +270,41 @@ def _run_mode(
 ) -> _Outcome:
     """Integrate in one mode until the end, an event or a limit."""
     n = plan.program.coordinates
-    if n == 0:
-        for moment, show in zip([t, *times], [first_shown, *shown], strict=True):
-            recorder.take(moment, np.zeros(0), show)
-        return _Outcome(float(times[-1]), "finished", "", None, Statistics())
-    y, yp = pack_state(plan, t, q, u)
+    y, yp = (np.zeros(0), np.zeros(0)) if n == 0 else pack_state(plan, t, q, u)
     recorder.take(t, y, first_shown)
     already = probe.broken_at_start(t)
     if already is not None:
         return _Outcome(t, "event", "", already, Statistics())
+    if n == 0:
+        return _follow(probe, recorder, t, times, shown, options)
     session = _open(plan, probe, options, solver, t, y, yp, spent)
     try:
         return _integrate(plan, probe, recorder, session, times, shown, options)
     except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
         t = recorder.close()
         return _Outcome(t, "interrupted", f"interrupted (at t = {t:.9g})", None, session.statistics)
+
+
+def _follow(
+    probe: EventProbe,
+    recorder: _Recorder,
+    t: float,
+    times: FloatArray,
+    shown: NDArray[np.bool_],
+    options: RunOptions,
+) -> _Outcome:
+    """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen."""
+    nothing, last = np.zeros(0), t
+    for moment, show in zip(times, shown, strict=True):
+        happening = probe.between(last, float(moment))
+        if happening is not None:
+            recorder.take(happening.time, nothing, True)
+            return _Outcome(happening.time, "event", "", happening, Statistics())
+        last = float(moment)
+        recorder.take(last, nothing, show)
+        if options.progress is not None:
+            options.progress(last)
+    return _Outcome(last, "finished", "", None, Statistics())
 
 
 def _integrate(

@@ -308,11 +308,12 @@ def _solve_speeds(
     missing, matrix = system.at(t, q, u)
     if missing.size:
         rows = row_scales(matrix, scales)
-        speed = max([1e-300, *(abs(x.value) / s for x, s in zip(level.fixed, rows[len(rates) :], strict=True))])
-        if not float(np.max(np.abs(missing / rows))) <= 1e-9 * max(
-            speed, float(np.max(np.abs(u / scales), initial=0.0))
-        ):
-            _raise_contradiction(level.fixed, (missing / rows)[len(rates) :] / speed, equations)
+        # Each equation is measured by its own terms, so that what is small beside another speed is not lost.
+        own = np.abs(matrix) @ np.abs(u)
+        own[len(rates) :] += [abs(x.value) for x in level.fixed]
+        share = np.abs(missing) / np.where(own > 0.0, own, 1.0)
+        if not float(np.max(share)) <= 1e-8:
+            _raise_contradiction(level.fixed, share[len(rates) :], equations)
         matrix = matrix * scales / rows[:, None]
     return u, *_counted(equations, level.fixed, len(rates), matrix)
 

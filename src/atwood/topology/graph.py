@@ -144,6 +144,7 @@ def _nodes(flat: FlatScene) -> tuple[tuple[Node, ...], dict[tuple[str, str], int
             if end not in owners and end.rpartition(".")[0] in flat.parts:
                 raise ConnectError("there is no such connector", where=end, advice=suggestion(end, owners))
         meeting.add_edge(a, b)
+    _check_frames(meeting, frames, set(owners) - frames)
     nodes = [Node(WORLD, "world", (), True)]
     node_of: dict[tuple[str, str], int] = {}
     order = {name: i for i, name in enumerate(owners)}
@@ -153,6 +154,29 @@ def _nodes(flat: FlatScene) -> tuple[tuple[Node, ...], dict[tuple[str, str], int
         nodes.append(node)
         node_of.update({owners[name]: node.index for name in group})
     return tuple(nodes), node_of
+
+
+def _check_frames(meeting: nx.Graph[str], frames: set[str], points: set[str]) -> None:
+    """Refuse frames that meet through a point only: it does not say whether they are welded or hinged.
+
+    Raises
+    ------
+    ConnectError
+        If there are such frames.
+    """
+    rigid = meeting.subgraph([name for name in meeting if name not in points])
+    class_of = {name: i for i, group in enumerate(nx.connected_components(rigid)) for name in group}
+    for group in nx.connected_components(meeting):
+        found: dict[int, str] = {}
+        for name in sorted(group & frames):
+            found.setdefault(class_of[name], name)
+        if len(found) > 1:
+            first, second = list(found.values())[:2]
+            raise ConnectError(
+                f"the frames {first} and {second} meet through a point only, which leaves open how they turn",
+                where=first,
+                advice="Connect them to each other to weld them, or put a Pivot between them to hinge them.",
+            )
 
 
 def _joint(path: str, local: LocalPart, joint: LocalJoint, node_of: Mapping[tuple[str, str], int]) -> Joint:
