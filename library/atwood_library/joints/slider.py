@@ -26,8 +26,7 @@ class Slider(Component):
 
     axis: tuple[float, float, float] = parameter(
         (1.0, 0.0, 0.0),
-        size=3,
-        structural=True,
+        direction=True,
         doc="Direction of the guide in frame a.",
     )
     a: Frame = connector(Frame, "The frame that carries the guide.")

@@ -29,14 +29,14 @@ def _version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Show the version.")
 def main() -> None:
-    r"""Mechanics from parts: what moves, how it moves, and with which forces.
+    """Mechanics from parts: what moves, how it moves, and with which forces.
 
     \b
     atwood list                          the scenes there are
     atwood info four-bar                 bodies, joints, freedom, equations
     atwood run double-pendulum           its motion and its forces
     atwood compare double-pendulum       what each form costs for which error
-    """
+    """  # noqa: D301 - click reads the backspace, not the two letters
 
 
 def _scene_options(function: F) -> F:

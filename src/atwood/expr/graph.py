@@ -83,7 +83,10 @@ class Expression:
     def value(self) -> float:
         """The value of a constant."""
         if self.operation != "constant":
-            raise AtwoodError(f"{self!r} is not a constant and has no value yet")
+            raise AtwoodError(
+                f"{self!r} is not a constant and has no value yet",
+                advice="In a law, use Atwood's own functions (atwood.sqrt, atwood.select, ...) and no others.",
+            )
         return float(self.payload)
 
     @property

@@ -17,7 +17,7 @@ from atwood.expr import Scalar
 from atwood.model.connectors import Frame, Point
 from atwood.model.quantities import ObservableLaw
 from atwood.model.units import parse_si_unit
-from atwood.model.vector import ZERO, Vector
+from atwood.model.vector import ZERO, Vector, as_vector
 
 __all__ = [
     "BodyInertia",
@@ -111,6 +111,10 @@ class Load:
     at: Point
     force: Vector = ZERO
     torque: Vector = ZERO
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "force", as_vector(self.force))
+        object.__setattr__(self, "torque", as_vector(self.torque))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError
-from atwood.expr import Expression, Graph, Scalar
+from atwood.expr import Expression, Graph, Scalar, depends_on
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, Motion
 from atwood.model.fields import ParameterSpec
@@ -177,8 +177,10 @@ def _localize_part(
         return [law for law in component.laws(kind) if law.holds_in(space.name) and law.acts_in(mode)]
 
     def scalar_laws(kind: Any) -> tuple[Expression, ...]:
-        return tuple(graph.convert(_call(part, law, getattr(bound, law.name))) for law in laws(kind))
+        return tuple(_call(part, law, functools.partial(_scalar, bound, law, graph)) for law in laws(kind))
 
+    potentials, dissipations = scalar_laws("potential"), scalar_laws("dissipation")
+    _check_reads(part, connectors, potentials, dissipations)
     inertias = [one for law in laws("inertia") for one in _call(part, law, functools.partial(_listed, bound, law))]
     return LocalPart(
         part=part,
@@ -187,12 +189,39 @@ def _localize_part(
         joints=tuple(_local_joint(part, law, bound, graph) for law in laws("joint")),
         point_inertias=tuple(one for one in inertias if isinstance(one, PointInertia)),
         body_inertias=tuple(one for one in inertias if isinstance(one, BodyInertia)),
-        potentials=scalar_laws("potential"),
-        dissipations=scalar_laws("dissipation"),
+        potentials=potentials,
+        dissipations=dissipations,
         loads=tuple(one for law in laws("force") for one in _call(part, law, functools.partial(_listed, bound, law))),
         constraints=tuple(one for law in laws("constraint") for one in _local_constraints(part, law, bound, graph)),
         signal_symbols=signal_symbols,
     )
+
+
+def _scalar(bound: Any, law: Law, graph: Graph) -> Expression:
+    return graph.convert(getattr(bound, law.name)())
+
+
+def _check_reads(
+    part: Part,
+    connectors: Mapping[str, LocalConnector],
+    potentials: tuple[Expression, ...],
+    dissipations: tuple[Expression, ...],
+) -> None:
+    """Refuse energies that depend on velocities, and Rayleigh functions that do not: their forces would be lost."""
+    velocities = [symbol for one in connectors.values() for symbol in one.velocity]
+    velocities += [one.angular_speed for one in connectors.values() if one.angular_speed is not None]
+    if any(depends_on(value, velocities) for value in potentials):
+        raise DeclarationError(
+            "a potential depends on positions, angles and time, not on velocities",
+            where=part.path,
+            advice="Use @dissipation for what depends on velocities, or @force for any other load.",
+        )
+    if any(not value.is_parametric and not depends_on(value, velocities) for value in dissipations):
+        raise DeclarationError(
+            "a Rayleigh function depends on velocities, and this one does not",
+            where=part.path,
+            advice="Use @potential for what depends on positions.",
+        )
 
 
 def _listed(bound: Any, law: Law) -> list[Any]:
@@ -287,7 +316,7 @@ def _local_joint(part: Part, law: Law, bound: Any, graph: Graph) -> LocalJoint:
 
 
 def _local_constraints(part: Part, law: Law, bound: Any, graph: Graph) -> Iterable[LocalConstraint]:
-    values = scalars(_call(part, law, getattr(bound, law.name)))
+    values = _call(part, law, lambda: [graph.convert(one) for one in scalars(getattr(bound, law.name)())])
     names = law.options.reactions
     if len(names) == 1 and len(values) == 3:
         names = tuple(f"{names[0]}.{axis}" for axis in "xyz")
@@ -296,7 +325,7 @@ def _local_constraints(part: Part, law: Law, bound: Any, graph: Graph) -> Iterab
             f"it returns {len(values)} scalars and names {len(names)} reactions", where=f"{part.path}.{law.name}"
         )
     for index, (value, name) in enumerate(zip(values, names, strict=True)):
-        yield LocalConstraint(law, index, graph.convert(value), name, law.options.sign)
+        yield LocalConstraint(law, index, value, name, law.options.sign)
 
 
 def _call(part: Part, law: Law, function: Callable[[], Any]) -> Any:
@@ -306,7 +335,7 @@ def _call(part: Part, law: Law, function: Callable[[], Any]) -> Any:
         if error.where.startswith(part.path):
             raise
         raise type(error)(error.message, where=f"{part.path}.{law.name}", advice=error.advice) from error
-    except (TypeError, ValueError, ArithmeticError, AttributeError) as error:
+    except Exception as error:  # whatever a law of somebody's own can raise
         raise DeclarationError(
             f"the law cannot be evaluated ({type(error).__name__}: {error})",
             where=f"{part.path}.{law.name}",

@@ -232,10 +232,23 @@ class Result:
             kinetic.append(energies[0])
             potential.append(energies[1])
             power.append(self._power(segment, state, idle))
+        if not all(np.all(np.isfinite(one)) for one in (*kinetic, *potential)):
+            raise ResultError(
+                "the energy has no value somewhere along the run",
+                where=self._without_energy(),
+                advice="A law is evaluated outside its domain there: look at its formula and at the start.",
+            )
         impacts = [False, *(one.impact for one in self.run.happenings)][: len(kinetic)]
         return make_ledger(
             [segment.time for segment in self.run.segments], kinetic, potential, power, impacts, self._shown
         )
+
+    def _without_energy(self) -> str:
+        """Return the part whose energy has no value."""
+        for path in self.paths:
+            if path.endswith("_energy") and not np.all(np.isfinite(self.samples(path))):
+                return path
+        return self.assembly.flat.name
 
     def _power(
         self, segment: Segment, state: tuple[FloatArray, ...], idle: tuple[FloatArray, ...]

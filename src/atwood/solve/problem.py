@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import SolveError, StartError
+from atwood.errors import KernelEvaluationError, SolveError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import FormProgram
 from atwood.kernels import BoundKernel
@@ -228,7 +228,14 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     balance = Balance(balance_program, assembly.kernel(balance_program.program))
     sizes = coordinate_scales(equations, length)
     finding = find_rank(balance, t, q, sizes)
-    now = balance.at(t, q, u)
+    try:
+        now = balance.at(t, q, u)
+    except KernelEvaluationError as error:
+        raise StartError(
+            f"at the start a law has no value: {error.message}",
+            where=assembly.flat.name,
+            advice="Do two points coincide that a spring, damper or rope joins? Give start positions that part them.",
+        ) from error
     slope = now.slope[list(finding.kept)] if finding.kept else now.slope[:0]
     _check_inertia(assembly, now.mass, slope, sizes)
     if finding.starts_singular:

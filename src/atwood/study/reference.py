@@ -153,7 +153,7 @@ def run_flat(
         See `atwood.simulate`.
     """
     assembly = assemble_flat(flat, form=form, level=level)
-    return simulate(
+    result = simulate(
         assembly,
         t_end=t_end,
         rtol=rtol,
@@ -162,6 +162,9 @@ def run_flat(
         solver=solver,
         samples=samples,
     )
+    if result.status == "interrupted":  # who interrupts one run of a comparison means all of it
+        raise KeyboardInterrupt
+    return result
 
 
 def compared_paths(result: Result) -> list[str]:
