@@ -154,8 +154,10 @@ def others(quick: bool, repeat: int) -> list[dict[str, Any]]:
                 rates(0.0, y)
             return (time.perf_counter() - began) / 200
 
-        found.append({"case": "double pendulum", "what": "sympy: Kane, lambdify, solve", **best_of({"s": kane}, repeat)})
-    mujoco, pinocchio, exudyn = (None if quick else peer(name) for name in ("mujoco", "pinocchio", "exudyn"))
+        found.append(
+            {"case": "double pendulum", "what": "sympy: Kane, lambdify, solve", **best_of({"s": kane}, repeat)}
+        )
+    mujoco, pinocchio = (None if quick else peer(name) for name in ("mujoco", "pinocchio"))
     for n in (2, 10, 40, 100):
         if mujoco:
             times = best_of({"s": peers.mujoco_chain(mujoco, n)}, repeat)
@@ -163,9 +165,6 @@ def others(quick: bool, repeat: int) -> list[dict[str, Any]]:
         if pinocchio:
             times = best_of({"s": peers.pinocchio_chain(pinocchio, n)}, repeat)
             found.append({"case": f"chain of {n}", "what": "Pinocchio: aba, from Python", **times})
-        if exudyn:
-            times = best_of({"s": peers.exudyn_chain(exudyn, n)}, repeat)
-            found.append({"case": f"chain of {n}", "what": "Exudyn: a step of its tree, from C", **times})
     return found
 
 
@@ -178,7 +177,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for case in cases(chosen.quick):
         calls = 2000 if chosen.quick else max(20_000, 2_000_000 // max(case.links, 10))
         rows.append(measure(case, chosen.cflags, chosen.repeat, calls))
-    head = ["program", "of", "Atwood / C", "Atwood ns", "C ns", "Python us", "Python / Atwood", "operations", "compile s"]
+    head = [
+        "program",
+        "of",
+        "Atwood / C",
+        "Atwood ns",
+        "C ns",
+        "Python us",
+        "Python / Atwood",
+        "operations",
+        "compile s",
+    ]
     table = [
         [
             row["case"],

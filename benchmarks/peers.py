@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["kane_double_pendulum", "mujoco_chain"]
+__all__ = ["heyoka_double_pendulum", "kane_double_pendulum", "mujoco_chain", "pinocchio_chain"]
 
 
 @cache
@@ -47,7 +47,7 @@ def mujoco_chain(mujoco: Any, links: int) -> Callable[[], float]:
 
     length, bodies = 1.0 / links, ""
     for i in range(links):
-        place = f'0 0 {-length if i else 0.0}'
+        place = f"0 0 {-length if i else 0.0}"
         bodies += f'<body pos="{place}"><joint type="hinge" axis="0 -1 0"/>'
         bodies += f'<inertial pos="0 0 {-length}" mass="{1.0 / links}" diaginertia="1e-9 1e-9 1e-9"/>'
     text = (
@@ -64,3 +64,48 @@ def mujoco_chain(mujoco: Any, links: int) -> Callable[[], float]:
         return (time.perf_counter() - began) / 2000
 
     return measure
+
+
+def pinocchio_chain(pinocchio: Any, links: int) -> Callable[[], float]:
+    """Return what measures the seconds of Pinocchio's articulated-body algorithm, called from Python."""
+    import time
+
+    model, joint = pinocchio.Model(), 0
+    length = 1.0 / links
+    for i in range(links):
+        place = pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -length if i else 0.0]))
+        joint = model.addJoint(joint, pinocchio.JointModelRY(), place, f"j{i}")
+        bob = pinocchio.Inertia(1.0 / links, np.array([0.0, 0.0, -length]), np.zeros((3, 3)))
+        model.appendBodyToJoint(joint, bob, pinocchio.SE3.Identity())
+    data, q, v, tau = model.createData(), np.full(links, 0.1), np.full(links, 0.2), np.zeros(links)
+
+    def measure() -> float:
+        began = time.perf_counter()
+        for _ in range(1000):
+            pinocchio.aba(model, data, q, v, tau)
+        return (time.perf_counter() - began) / 1000
+
+    return measure
+
+
+def heyoka_double_pendulum(heyoka: Any, tolerance: float) -> Callable[[], tuple[float, Any]]:
+    """Return what integrates the double pendulum for 10 s by Taylor series; it gives seconds and the angles."""
+    import time
+
+    a, b, u, v = heyoka.make_vars("a", "b", "u", "v")
+    s, c = heyoka.sin(a - b), heyoka.cos(a - b)
+    right1 = v * v * s + 2.0 * 9.81 * heyoka.sin(a)
+    right2 = u * u * s - 9.81 * heyoka.sin(b)
+    over = 1.0 / (2.0 - c * c)
+    rates = [(a, u), (b, v), (u, -(right1 + c * right2) * over), (v, (2.0 * right2 + c * right1) * over)]
+    start = [np.pi / 2.0, np.pi / 2.0, 0.0, 0.0]
+    integrator = heyoka.taylor_adaptive(rates, start, tol=tolerance)
+
+    def run() -> tuple[float, Any]:
+        integrator.time = 0.0
+        integrator.state[:] = start
+        began = time.perf_counter()
+        integrator.propagate_until(10.0)
+        return time.perf_counter() - began, integrator.state[:2].copy()
+
+    return run

@@ -120,6 +120,7 @@ int jacobian(const double *const *in, const double *p, double *scratch, double *
 
 /* As IDA calls them.  Where its structures have their arrays is given in bytes when this is compiled. */
 #ifdef VECTOR_DATA
+#include <stdint.h>
 #define CONTENT(object) (*(char **)(object))
 #define ARRAY(object, offset, type) (*(type **)(CONTENT(object) + (offset)))
 
