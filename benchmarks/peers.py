@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["heyoka_double_pendulum", "kane_double_pendulum", "mujoco_chain", "pinocchio_chain"]
+__all__ = ["kane_double_pendulum", "mujoco_chain", "pinocchio_chain"]
 
 
 @cache
@@ -86,26 +86,3 @@ def pinocchio_chain(pinocchio: Any, links: int) -> Callable[[], float]:
         return (time.perf_counter() - began) / 1000
 
     return measure
-
-
-def heyoka_double_pendulum(heyoka: Any, tolerance: float) -> Callable[[], tuple[float, Any]]:
-    """Return what integrates the double pendulum for 10 s by Taylor series; it gives seconds and the angles."""
-    import time
-
-    a, b, u, v = heyoka.make_vars("a", "b", "u", "v")
-    s, c = heyoka.sin(a - b), heyoka.cos(a - b)
-    right1 = v * v * s + 2.0 * 9.81 * heyoka.sin(a)
-    right2 = u * u * s - 9.81 * heyoka.sin(b)
-    over = 1.0 / (2.0 - c * c)
-    rates = [(a, u), (b, v), (u, -(right1 + c * right2) * over), (v, (2.0 * right2 + c * right1) * over)]
-    start = [np.pi / 2.0, np.pi / 2.0, 0.0, 0.0]
-    integrator = heyoka.taylor_adaptive(rates, start, tol=tolerance)
-
-    def run() -> tuple[float, Any]:
-        integrator.time = 0.0
-        integrator.state[:] = start
-        began = time.perf_counter()
-        integrator.propagate_until(10.0)
-        return time.perf_counter() - began, integrator.state[:2].copy()
-
-    return run

@@ -104,9 +104,6 @@ def curves(name: str, scene: Model, t_end: float, paths: Sequence[str], chosen: 
         if peer("sympy"):
             rates = peers.kane_double_pendulum()
             runs["sympy Kane, SciPy DOP853"] = [(rtol, partial(scipy_run, rates, rtol)) for rtol in tolerances[:11:2]]
-        heyoka = peer("heyoka")
-        if heyoka:
-            runs["heyoka"] = [(rtol, peers.heyoka_double_pendulum(heyoka, rtol)) for rtol in tolerances]
     points: dict[str, list[tuple[float, float, float]]] = {way: [] for way in runs}
     for rtol in tolerances:
         errors: dict[str, float] = {}
@@ -148,7 +145,7 @@ def show(name: str, found: dict[str, Any]) -> None:
     rows.append(["Atwood explicit now / C order 8(5,3) then", *map(ratio, at["Atwood explicit"], reference)])
     rows.append(["Atwood IDA dae ggl now / C with IDA then", *map(ratio, at["Atwood IDA dae ggl"], by_ida)])
     head = ["measured on one quiet core before the project began", *(f"ms at {t:g}" for t in TARGETS)]
-    print_table(f"{name}: earlier figures (another machine state: read ratios across tables with care)", head, rows)
+    print_table(f"{name}: earlier figures (a slower core: see README before dividing)", head, rows)
 
 
 def draw(path: Any, results: dict[str, Any]) -> None:
