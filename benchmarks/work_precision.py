@@ -100,10 +100,9 @@ def curves(name: str, scene: Model, t_end: float, paths: Sequence[str], chosen: 
             for rtol in tolerances
             if rtol >= least * 0.99
         ]
-    if angles and not chosen.quick:
-        if peer("sympy"):
-            rates = peers.kane_double_pendulum()
-            runs["sympy Kane, SciPy DOP853"] = [(rtol, partial(scipy_run, rates, rtol)) for rtol in tolerances[:11:2]]
+    if angles and not chosen.quick and peer("sympy"):
+        rates = peers.kane_double_pendulum()
+        runs["sympy Kane, SciPy DOP853"] = [(rtol, partial(scipy_run, rates, rtol)) for rtol in tolerances[:11:2]]
     points: dict[str, list[tuple[float, float, float]]] = {way: [] for way in runs}
     for rtol in tolerances:
         errors: dict[str, float] = {}
