@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.errors import StartError, UnsupportedError, UsageError, suggestion
 from atwood.expr import Graph
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import LEVELS
@@ -24,6 +24,7 @@ from atwood.model.space import make_space
 from atwood.result.result import Result
 from atwood.solve.options import RunOptions
 from atwood.solve.run import run
+from atwood.solve.sides import actual_sides, sides_differ
 from atwood.solve.start import find_start
 from atwood.topology.bodies import find_bodies
 from atwood.topology.graph import build_graph
@@ -63,7 +64,12 @@ def assemble(scene: Model, *, form: str = "reduced", level: str = "ggl", name: s
 
 
 def assemble_flat(
-    flat: FlatScene, *, form: str = "reduced", level: str = "ggl", modes: Mapping[str, str] | None = None
+    flat: FlatScene,
+    *,
+    form: str = "reduced",
+    level: str = "ggl",
+    modes: Mapping[str, str] | None = None,
+    sides: Mapping[tuple[str, str, str], float] | None = None,
 ) -> Assembly:
     """Assemble a scene that has been taken apart into leaves.
 
@@ -75,6 +81,8 @@ def assemble_flat(
         See `assemble`.
     modes
         Mode of each part that has modes; the usual one where it is not given.
+    sides
+        On a line, the sign of lengths; as far as start values tell if not given.
     """
     if form not in FORMS:
         raise UsageError(f"there is no form {form!r}", advice=suggestion(form, FORMS))
@@ -86,12 +94,14 @@ def assemble_flat(
         if part.component.modes
     }
     all_modes.update(modes or {})
-    mechanism = read_mechanism(flat, all_modes)
+    mechanism = read_mechanism(flat, all_modes, sides)
     chosen: Any = form
     return Assembly(flat, mechanism, chosen, level if form == "dae" else "", all_modes)
 
 
-def read_mechanism(flat: FlatScene, modes: Mapping[str, str]) -> Mechanism:
+def read_mechanism(
+    flat: FlatScene, modes: Mapping[str, str], known_sides: Mapping[tuple[str, str, str], float] | None = None
+) -> Mechanism:
     """Read the laws of all parts and find nodes, joints and bodies.
 
     Parameters
@@ -100,6 +110,8 @@ def read_mechanism(flat: FlatScene, modes: Mapping[str, str]) -> Mechanism:
         The scene.
     modes
         Mode of each part that has modes.
+    known_sides
+        On a line, the sign of lengths, where it is known already.
 
     Raises
     ------
@@ -115,7 +127,7 @@ def read_mechanism(flat: FlatScene, modes: Mapping[str, str]) -> Mechanism:
     bodies = find_bodies(network, locals_)
     if space.name == "line":
         offsets = {body.index: body_offsets(body, space)[0] for body in bodies.bodies}
-        sides = find_sides(flat, network, bodies, locals_, offsets, table.values, space)
+        sides = known_sides or find_sides(flat, network, bodies, locals_, offsets, table.values, space)
         locals_ = localize(flat, space, time, table, modes, sides)
         network = build_graph(flat, locals_)
         bodies = find_bodies(network, locals_)
@@ -204,7 +216,18 @@ def simulate(
         samples=samples,
     )
 
-    def reassemble(modes: Mapping[str, str]) -> Assembly:
-        return assemble_flat(flat, form=assembly.form, level=assembly.level or "ggl", modes=modes)
+    def reassemble(modes: Mapping[str, str], sides: Mapping[tuple[str, str, str], float]) -> Assembly:
+        return assemble_flat(flat, form=assembly.form, level=assembly.level or "ggl", modes=modes, sides=sides)
 
-    return Result(run(assembly, find_start(assembly), options, reassemble))
+    start = find_start(assembly)
+    for _ in range(3):  # on a line, lengths are signed by where things start, which is known only now
+        actual = actual_sides(assembly, start.time, start.coordinates, start.speeds, "reduced")
+        if not sides_differ(assembly, actual):
+            return Result(run(assembly, start, options, reassemble))
+        assembly = reassemble(assembly.modes, actual)
+        start = find_start(assembly)
+    raise StartError(
+        "it depends on the signs of lengths where things start, and on where they start, which signs these are",
+        where=flat.name,
+        advice="Give start positions instead of guesses, so that it is clear what is on which side.",
+    )

@@ -174,3 +174,42 @@ def test_a_pivot_keeps_frames_apart() -> None:
     scene.connect(ground.frame, pivot.a)
     scene.connect(pivot.b, link.a)
     assert len(simulate(scene, t_end=0.1).assembly.reduced.names) == 1
+
+
+@pytest.mark.parametrize("solver", ["ida", "ida-sundae", "explicit"])
+@pytest.mark.parametrize("width", [0.5, 0.01, 1e-4])
+def test_a_pulse_in_time_is_not_passed_over(width: float, solver: str) -> None:
+    scene = Scene(gravity=0.0)
+    mass = scene.add("m", PointMass())
+    push = scene.add("push", Force(value=lambda t: select((t > 5.0) & (t < 5.0 + width), 2.0, 0.0)))
+    scene.connect(push.point, mass.point)
+    result = simulate(scene, t_end=10.0, rtol=1e-9, solver=solver)
+    assert result["m.velocity.x"][-1] == pytest.approx(2.0 * width, rel=1e-4)
+    assert result["m.position.x"][-1] == pytest.approx(width**2 + 2.0 * width * (5.0 - width), rel=1e-4)
+    assert len(result.time) == 201
+
+
+def test_sides_on_a_line_follow_from_the_start_itself() -> None:
+    scene = Scene(space="line")
+    wall, spring = scene.add("wall", Ground(position=(3.0, 0.0, 0.0))), scene.add("spring", Spring(natural_length=1.0))
+    mass = scene.add("m", Mass1D(origin=(5.0, 0.0, 0.0)))
+    scene.connect(wall.frame, spring.a)
+    scene.connect(spring.b, mass.flange)
+    scene.start.update({"m.displacement": 0.5, "m.speed": 0.0})
+    result = simulate(scene, t_end=1.0, rtol=1e-10)
+    assert result["spring.length"][0] == pytest.approx(2.5)
+    assert result["m.position.x"][-1] == pytest.approx(4.0 + 1.5 * np.cos(1.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_rope_on_a_line_comes_taut_on_the_other_side_too(form: str) -> None:
+    scene = Scene(space="line", gravity=0.0)
+    ground, rope = scene.add("ground", Ground()), scene.add("rope", Rope(starts="slack", when_slack="slack"))
+    mass = scene.add("m", PointMass())
+    scene.connect(ground.frame, rope.a)
+    scene.connect(rope.b, mass.point)
+    scene.start.update({"m.position.x": -0.5, "m.velocity.x": 10.0})
+    result = simulate(scene, form=form, t_end=0.3)
+    assert [one.law for one in result.happenings][:1] == ["comes_taut"]
+    assert result.happenings[0].time == pytest.approx(0.15, abs=1e-6)
+    assert np.max(np.abs(result["m.position.x"])) < 1.0 + 1e-6

@@ -5,7 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from atwood import Component, Groove, Point, Scalar, connector, constraint, dot, event, minimum, observable, parameter
+from atwood import (
+    Component,
+    Groove,
+    Point,
+    Scalar,
+    absolute,
+    connector,
+    constraint,
+    dot,
+    event,
+    minimum,
+    observable,
+    parameter,
+)
 
 
 class Rope(Component):
@@ -37,7 +50,7 @@ class Rope(Component):
     def fixed_length(self) -> Scalar:
         """Return the length less the rope's own; for a single straight piece ``(r^2 - l^2)/(2 l)``."""
         if self.on_a_line or self.pulleys:
-            return self.reach() - self.length
+            return self.sum_of_spans() - self.length
         r = self.b.position - self.a.position
         return dot(r, r) * (0.5 / self.length) - 0.5 * self.length
 
@@ -63,6 +76,11 @@ class Rope(Component):
     @observable(unit="m", doc="Length along the straight pieces from a to b.")
     def reach(self) -> Scalar:
         """Return the length of the path from a to b."""
+        # On a line a rope without pulleys can come taut on either side.
+        return absolute(self.sum_of_spans()) if self.on_a_line and not self.pulleys else self.sum_of_spans()
+
+    def sum_of_spans(self) -> Scalar:
+        """Return the sum of the straight pieces; on a line, signed as they start."""
         total = self.spans()[0]
         for span in self.spans()[1:]:
             total = total + span

@@ -204,6 +204,15 @@ class Assembly:
         outputs = (OutputGroup(name, tuple(expressions)),)
         return Program(f"{self.flat.name} {name}", groups, self.parameters, outputs)
 
+    def coordinate_program(self, name: str, equations: Equations, expressions: Sequence[Expression]) -> Program:
+        """Return a program of (t, q, u) in the coordinates of the given equations."""
+        groups = (
+            InputGroup("t", (equations.time,)),
+            InputGroup("q", equations.coordinates),
+            InputGroup("u", equations.speeds),
+        )
+        return Program(f"{self.flat.name} {name}", groups, self.parameters, (OutputGroup(name, tuple(expressions)),))
+
     @cached_property
     def to_maximal(self) -> Program:
         """The program of (t, q, u) of the reduced form that gives maximal coordinates and speeds."""

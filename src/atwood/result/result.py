@@ -238,7 +238,7 @@ class Result:
                 where=self._without_energy(),
                 advice="A law is evaluated outside its domain there: look at its formula and at the start.",
             )
-        impacts = [False, *(one.impact for one in self.run.happenings)][: len(kinetic)]
+        impacts = [segment.impact for segment in self.run.segments]
         return make_ledger(
             [segment.time for segment in self.run.segments], kinetic, potential, power, impacts, self._shown
         )

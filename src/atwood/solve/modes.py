@@ -19,6 +19,7 @@ from atwood.mechanics.watches import Watch, list_watches
 from atwood.solve.balance import Balance, least_norm
 from atwood.solve.reactions import ReactionSolver, maximal_state
 from atwood.solve.scales import Scales, coordinate_scales
+from atwood.solve.sides import actual_sides
 
 __all__ = ["EventProbe", "Happening", "enter_mode"]
 
@@ -158,7 +159,7 @@ def enter_mode(
     recorder: Any,
     assembly: Assembly,
     happening: Happening,
-    reassemble: Callable[[Mapping[str, str]], Assembly],
+    reassemble: Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float]], Assembly],
     length: float,
 ) -> tuple[Assembly, FloatArray, FloatArray]:
     """Return the scene in the mode that an event leads to, with its state.
@@ -178,7 +179,8 @@ def enter_mode(
     """
     t, q, u = recorder.time[-1], recorder.q[-1], recorder.u[-1]
     big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
-    after = reassemble({**assembly.modes, happening.part: happening.target})
+    sides = actual_sides(assembly, t, q, u, assembly.form)
+    after = reassemble({**assembly.modes, happening.part: happening.target}, sides)
     sizes = coordinate_scales(after.maximal, length)
     program = after.balance("dae")
     balance = Balance(program, after.kernel(program.program))

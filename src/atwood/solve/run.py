@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from atwood.errors import SolveError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
+from atwood.solve.breaks import find_breaks
 from atwood.solve.driver import Advance, Budget, Session, SolverOptions, Statistics, Status
 from atwood.solve.modes import EventProbe, Happening, enter_mode
 from atwood.solve.options import RunOptions, choose_solver, sample_times
@@ -34,6 +35,8 @@ class Segment:
     ----------
     plan
         What it was run with.
+    impact
+        Whether it began with an impact.
     time
         Sample times, shape (samples,).
     coordinates, speeds
@@ -45,6 +48,7 @@ class Segment:
     """
 
     plan: Plan
+    impact: bool
     time: FloatArray
     coordinates: FloatArray
     speeds: FloatArray
@@ -131,10 +135,11 @@ class _Recorder:
         self.shown[-1] = True
         return self.time[-1]
 
-    def segment(self) -> Segment:
+    def segment(self, impact: bool) -> Segment:
         """Return what was recorded."""
         return Segment(
             self.plan,
+            impact,
             np.array(self.time),
             np.array(self.q).T.reshape(self.plan.program.coordinates, len(self.time)),
             np.array(self.u).T.reshape(self.plan.program.coordinates, len(self.time)),
@@ -147,7 +152,7 @@ def run(
     assembly: Assembly,
     start: Start,
     options: RunOptions,
-    reassemble: Callable[[Mapping[str, str]], Assembly],
+    reassemble: Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float]], Assembly],
 ) -> Run:
     """Run a scene from its start to its end.
 
@@ -158,7 +163,7 @@ def run(
     options
         How.
     reassemble
-        Gives the scene in other modes.
+        Gives the scene in other modes, with lengths on a line signed as given.
 
     Raises
     ------
@@ -176,35 +181,31 @@ def run(
     times, shown = sample_times(t, options)
     _check_prescribed(assembly, times)
     q, u = _own_state(assembly, start)
+    breaks = find_breaks(assembly, t, options.t_end)
     segments: list[Segment] = []
     happenings: list[Happening] = []
     statistics = Statistics(error_test_failures=0, convergence_failures=0)
-    recent = 0
+    recent, impact, show = 0, False, bool(shown[0])
+    plan: Plan | None = None
     while True:
-        plan = make_plan(assembly, t, q, u, start.length, options.t_end - start.time)
-        probe = EventProbe(assembly, t, q, u, plan.scales, options.relative_tolerance)
+        if plan is None:
+            plan = make_plan(assembly, t, q, u, start.length, options.t_end - start.time)
+            probe = EventProbe(assembly, t, q, u, plan.scales, options.relative_tolerance)
         recorder = _Recorder(plan)
-        left = times > t
-        outcome = _run_mode(
-            plan,
-            probe,
-            recorder,
-            t,
-            q,
-            u,
-            times[left],
-            shown[left],
-            bool(shown[~left][-1]),
-            options,
-            solver,
-            statistics,
-        )
-        segments.append(recorder.segment())
+        limit = float(np.min(breaks[breaks[:, 0] > t, 0], initial=options.t_end))
+        ahead = _until(times, shown, t, limit)
+        outcome = _run_mode(plan, probe, recorder, t, q, u, ahead, show, limit, options, solver, statistics)
+        segments.append(recorder.segment(impact))
         statistics = statistics + outcome.statistics
         status, message = outcome.status, outcome.message
         recent = recent + 1 if outcome.t - t < 1e-9 * (options.t_end - start.time) else 0
         t = outcome.t
         if outcome.happening is None:
+            if status == "finished" and t < options.t_end:  # a law switches by the clock: on behind it
+                behind = float(breaks[breaks[:, 0] == t, 1][0])
+                show = bool(np.any(shown[(times > t) & (times <= behind)]))
+                t, q, u, impact = behind, recorder.q[-1], recorder.u[-1], False
+                continue
             break
         happenings.append(outcome.happening)
         if outcome.happening.target == "stop":
@@ -214,6 +215,7 @@ def run(
             status, message = "failed", f"{outcome.happening.part} changes its mode endlessly at t = {t:.9g}"
             break
         assembly, q, u = enter_mode(recorder, assembly, outcome.happening, reassemble, start.length)
+        plan, impact, show = None, outcome.happening.impact, True
         if t >= options.t_end:
             status, message = "finished", ""
             break
@@ -245,6 +247,15 @@ def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
         )
 
 
+def _until(times: FloatArray, shown: NDArray[np.bool_], t: float, limit: float) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the samples after one time up to another, which is among them."""
+    ahead = (times > t) & (times <= limit)
+    chosen, seen = times[ahead], shown[ahead]
+    if len(chosen) and chosen[-1] == limit:
+        return chosen, seen
+    return np.append(chosen, limit), np.append(seen, False)
+
+
 @dataclass(frozen=True)
 class _Outcome:
     t: float
@@ -261,14 +272,15 @@ def _run_mode(
     t: float,
     q: FloatArray,
     u: FloatArray,
-    times: FloatArray,
-    shown: NDArray[np.bool_],
+    ahead: tuple[FloatArray, NDArray[np.bool_]],
     first_shown: bool,
+    limit: float,
     options: RunOptions,
     solver: str,
     spent: Statistics,
 ) -> _Outcome:
-    """Integrate in one mode until the end, an event or a limit."""
+    """Integrate in one mode until a time, an event or a limit of the run."""
+    times, shown = ahead
     n = plan.program.coordinates
     y, yp = (np.zeros(0), np.zeros(0)) if n == 0 else pack_state(plan, t, q, u)
     recorder.take(t, y, first_shown)
@@ -277,7 +289,7 @@ def _run_mode(
         return _Outcome(t, "event", "", already, Statistics())
     if n == 0:
         return _follow(probe, recorder, t, times, shown, options)
-    session = _open(plan, probe, options, solver, t, y, yp, spent)
+    session = _open(plan, probe, options, solver, t, limit, y, yp, spent)
     try:
         return _integrate(plan, probe, recorder, session, times, shown, options)
     except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
@@ -346,6 +358,7 @@ def _open(
     options: RunOptions,
     solver: str,
     t: float,
+    limit: float,
     y: FloatArray,
     yp: FloatArray,
     spent: Statistics,
@@ -353,7 +366,7 @@ def _open(
     settings = SolverOptions(
         relative_tolerance=options.relative_tolerance,
         absolute_tolerances=plan.tolerances(options.relative_tolerance),
-        max_step=options.max_step,
+        max_step=_max_step(options, t, limit),
         max_order=options.max_order,
         horizon=options.t_end - t if options.t_end > t else 1.0,
     )
@@ -368,11 +381,19 @@ def _open(
     if solver == "ida":
         from atwood.solve import ida_native
 
-        tuning = ida_native.IdaTuning(angle_like=plan.angles)
+        tuning = ida_native.IdaTuning(angle_like=plan.angles, stop_time=limit)
         return ida_native.open_session(problem, settings, t, y, yp, budget, tuning)
     from atwood.solve.ida_sundae import open_session
 
     return open_session(problem, settings, t, y, yp, budget)
+
+
+def _max_step(options: RunOptions, t: float, limit: float) -> float | None:
+    """Return the largest step: up to a switch by the clock, so short that nothing is passed over unseen."""
+    if limit >= options.t_end:
+        return options.max_step
+    share = 0.25 * (limit - t)
+    return share if options.max_step is None else min(share, options.max_step)
 
 
 def _open_explicit(
