@@ -321,3 +321,12 @@ def test_sparklines() -> None:
     assert sparkline(np.linspace(0.0, 1.0, 8), 8) == "▁▂▃▄▅▆▇█"
     assert set(sparkline(np.ones(5))) == {"─"}
     assert sparkline(np.array([np.nan])) == ""
+
+
+def test_a_start_value_that_the_scene_fixes_can_be_let_go() -> None:
+    pytest.importorskip("atwood_library")
+    end = run_json(
+        "run", "simple-pendulum", "--t-end", "0.1", "--start", "rod.angle=free", "--start", "bob.position.x=0.5"
+    )
+    assert end["start"]["bob.position.x"] == pytest.approx(0.5)
+    assert end["start"]["rod.angle"] == pytest.approx(np.arcsin(0.5))

@@ -20,11 +20,11 @@ class FourBar(Scene):
     left: Ground = Ground()
     right: Ground = Ground()
     pivot1: Pivot = Pivot()
-    crank: Link = Link(length=crank_length, mass=0.2)
+    crank: Link = Link(length=crank_length, mass=0.1)
     pivot2: Pivot = Pivot()
-    coupler: Link = Link(length=coupler_length, mass=0.5)
+    coupler: Link = Link(length=coupler_length, mass=0.25)
     pivot3: Pivot = Pivot()
-    rocker: Link = Link(length=rocker_length, mass=0.4)
+    rocker: Link = Link(length=rocker_length, mass=0.2)
     pivot4: Pivot = Pivot()
     connections = [
         connect(left.frame, pivot1.a),

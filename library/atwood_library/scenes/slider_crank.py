@@ -15,14 +15,14 @@ class SliderCrank(Scene):
 
     crank_length: float = parameter(0.5, unit="m", above=0.0, doc="Length of the crank.")
     rod_length: float = parameter(1.5, unit="m", above=0.0, doc="Length of the connecting rod.")
-    piston_mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the piston.")
+    piston_mass: float = parameter(0.5, unit="kg", above=0.0, doc="Mass of the piston.")
     t_end = 2.0
 
     ground: Ground = Ground()
     pivot1: Pivot = Pivot()
-    crank: Link = Link(length=crank_length, mass=0.5)
+    crank: Link = Link(length=crank_length, mass=0.25)
     pivot2: Pivot = Pivot()
-    connecting_rod: Link = Link(length=rod_length, mass=1.0)
+    connecting_rod: Link = Link(length=rod_length, mass=0.5)
     pivot3: Pivot = Pivot()
     piston: PointMass = PointMass(mass=piston_mass)
     guide: Slider = Slider()

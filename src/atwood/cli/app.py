@@ -45,7 +45,7 @@ def _scene_options(function: F) -> F:
         click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output."),
         click.option(
             "--start", "starts", multiple=True, metavar="PATH=VALUE",
-            help="Start value, such as rod1.angle='30 deg'. Can be repeated.",
+            help="Start value, such as rod1.angle='30 deg'; =free lets one go that the scene fixes. Can be repeated.",
         ),
         click.option(
             "--set", "settings", multiple=True, metavar="PATH=VALUE",

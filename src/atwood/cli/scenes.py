@@ -95,7 +95,12 @@ def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[
     for path, value in _pairs(starts, "--start"):
         if not isinstance(scene, Scene):
             raise UsageError("this is a model and no scene, and has no start of its own", where=name)
-        scene.start[path] = value
+        if value.strip() != "free":
+            scene.start[path] = value
+        elif path in scene.start:
+            scene.guess[path] = scene.start.pop(path)
+        else:
+            raise UsageError("the scene fixes no such start value", where=path, advice=suggestion(path, scene.start))
     return scene, name
 
 

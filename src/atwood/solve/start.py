@@ -285,7 +285,7 @@ def _raise_contradiction(fixed: Sequence[_Target], missing: FloatArray, equation
         f"the start values contradict each other or the constraints: {', '.join(names)} cannot all hold",
         where=where,
         advice=f"The mechanism has {freedom} free coordinate{'s' if freedom != 1 else ''}; "
-        "fix fewer values, or give some as guesses.",
+        "fix fewer values, or give some as guesses (on the command line: --start PATH=free).",
     )
 
 
