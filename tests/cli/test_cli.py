@@ -289,14 +289,14 @@ def test_ctrl_c_shows_and_saves_what_is_done(tmp_path: Path) -> None:
     script = (
         "import os, signal, threading\n"
         "from atwood.cli import main\n"
-        "import atwood.solve.run as solving\n"
-        "inner, timers = solving._Recorder.take, []\n"
+        "import atwood.solve.record as recording\n"
+        "inner, timers = recording.Recorder.take, []\n"
         "def take(*arguments):\n"
         "    if not timers:  # once the run is under way, however long it took to get there\n"
         "        timers.append(threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)))\n"
         "        timers[0].start()\n"
         "    return inner(*arguments)\n"
-        "solving._Recorder.take = take\n"
+        "recording.Recorder.take = take\n"
         f"main(['run', {str(FILE) + ':Swing'!r}, '--t-end', '1e6', '--json', '--save', {str(file)!r}])\n"
     )
     done = python("-c", script)

@@ -14,7 +14,7 @@ from atwood.errors import ParameterError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.collect import collect
 from atwood.forms.dae import dae_form, keep_constraints
-from atwood.forms.program import BalanceProgram, FormProgram, balance_program
+from atwood.forms.program import BalanceProgram, FormProgram, balance_program, state_groups
 from atwood.forms.reduced import reduced_form
 from atwood.kernels import BoundKernel, compile_program
 from atwood.mechanics.build import Mechanism, build_equations
@@ -195,9 +195,7 @@ class Assembly:
         """Return a program of (t, q, u, a, reactions) in the coordinates of this form."""
         equations = self.equations
         groups = (
-            InputGroup("t", (equations.time,)),
-            InputGroup("q", equations.coordinates),
-            InputGroup("u", equations.speeds),
+            *state_groups(equations),
             InputGroup("a", equations.accelerations),
             InputGroup("reactions", tuple(one.symbol for one in self.reactions)),
         )
@@ -206,12 +204,8 @@ class Assembly:
 
     def coordinate_program(self, name: str, equations: Equations, expressions: Sequence[Expression]) -> Program:
         """Return a program of (t, q, u) in the coordinates of the given equations."""
-        groups = (
-            InputGroup("t", (equations.time,)),
-            InputGroup("q", equations.coordinates),
-            InputGroup("u", equations.speeds),
-        )
-        return Program(f"{self.flat.name} {name}", groups, self.parameters, (OutputGroup(name, tuple(expressions)),))
+        outputs = (OutputGroup(name, tuple(expressions)),)
+        return Program(f"{self.flat.name} {name}", state_groups(equations), self.parameters, outputs)
 
     @cached_property
     def to_maximal(self) -> Program:
@@ -229,10 +223,5 @@ class Assembly:
             if turn.coordinate is not None:
                 positions[turn.coordinate] = kinematics.placements.angles[turn.body]
                 speeds[turn.coordinate] = kinematics.angular_speeds[turn.body]
-        groups = (
-            InputGroup("t", (reduced.time,)),
-            InputGroup("q", reduced.coordinates),
-            InputGroup("u", reduced.speeds),
-        )
         outputs = (OutputGroup("q", tuple(positions)), OutputGroup("u", tuple(speeds)))
-        return Program(f"{self.flat.name} to maximal coordinates", groups, self.parameters, outputs)
+        return Program(f"{self.flat.name} to maximal coordinates", state_groups(reduced), self.parameters, outputs)

@@ -92,6 +92,15 @@ class BalanceProgram:
     constraints: int
 
 
+def state_groups(equations: Equations) -> tuple[InputGroup, ...]:
+    """Return the input groups (t, q, u) of programs of a state."""
+    return (
+        InputGroup("t", (equations.time,)),
+        InputGroup("q", equations.coordinates),
+        InputGroup("u", equations.speeds),
+    )
+
+
 def rate_symbols(equations: Equations) -> tuple[Expression, ...]:
     """Return the symbols of the coordinates' derivatives in y'."""
     return tuple(equations.graph.symbol(f"rate:{c.name}") for c in equations.names)
@@ -187,11 +196,7 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
         OutputGroup("slope", tuple(slope.entries)),
         OutputGroup("drift", tuple(substitute(rates, still))),
     )
-    inputs = (
-        InputGroup("t", (equations.time,)),
-        InputGroup("q", equations.coordinates),
-        InputGroup("u", equations.speeds),
-    )
+    inputs = state_groups(equations)
     return BalanceProgram(
         Program(f"{name} balance", inputs, tuple(parameters), outputs),
         np.asarray(mass.rows, dtype=np.intp),

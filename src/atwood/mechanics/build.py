@@ -267,14 +267,15 @@ def _weightless(mechanism: Mechanism, masses: Masses, forest: Forest) -> set[int
 
 
 def _substituted(placements: Placements, solution: Mapping[Expression, Expression]) -> Placements:
-    def all_of(values: Sequence[Expression]) -> tuple[Expression, ...]:
-        return tuple(substitute(list(values), solution))
-
+    """Return placements with coordinates replaced: one walk over the whole position program."""
+    positions, references = placements.positions, placements.references
+    points = [c for group in (positions, references) for p in group.values() for c in p]
+    values = iter(substitute([*points, *placements.angles.values(), *placements.joint_coordinates.values()], solution))
     return Placements(
-        {i: all_of(p) for i, p in placements.positions.items()},
-        {i: all_of([a])[0] for i, a in placements.angles.items()},
-        {i: all_of(p) for i, p in placements.references.items()},
-        {s: all_of([e])[0] for s, e in placements.joint_coordinates.items()},
+        positions={i: tuple(next(values) for _ in p) for i, p in positions.items()},
+        references={i: tuple(next(values) for _ in p) for i, p in references.items()},
+        angles={i: next(values) for i in placements.angles},
+        joint_coordinates={s: next(values) for s in placements.joint_coordinates},
     )
 
 

@@ -101,17 +101,13 @@ def shapes(bodies: Bodies, references: Mapping[int, Vector], space: Space) -> di
     """
     found = {}
     for body in bodies.bodies:
-        offsets, turns = _shape(body, space)
+        offsets, turns = body_offsets(body, space)
         found[body.index] = BodyShape(offsets, turns, references.get(body.index, offsets[body.root]))
     return found
 
 
 def body_offsets(body: Body, space: Space) -> tuple[dict[int, Vector], dict[int, Scalar]]:
     """Return offset and turn of each node in the axes of a body."""
-    return _shape(body, space)
-
-
-def _shape(body: Body, space: Space) -> tuple[dict[int, Vector], dict[int, Scalar]]:
     offsets: dict[int, Vector] = {body.root: Vector(0.0, 0.0, 0.0)}
     turns: dict[int, Scalar] = {body.root: 0.0}
     for step in body.steps:
@@ -335,6 +331,22 @@ def lifted_accelerations(
     return nodes, {i: tuple(next(values) for _ in p) for i, p in placements.references.items()}
 
 
-def axes_of(angle: Expression | None) -> tuple[Vector, Vector, Vector]:
-    """Return the axes of a frame at an angle; the world's where nothing turns."""
-    return FIXED_AXES if angle is None else planar_axes(angle)
+def arm_of(placements: Placements, body: int, turn: Scalar, vector: Vector, space: Space) -> tuple[Scalar, ...]:
+    """Return the free components, in world axes, of a vector that is given in the axes of a node.
+
+    Parameters
+    ----------
+    placements
+        Positions and orientations.
+    body
+        The body of the node; without an orientation its axes are the world's.
+    turn
+        Rotation of the node from its body, rad.
+    vector
+        The vector.
+    space
+        What the scene lives in.
+    """
+    angle = placements.angles.get(body)
+    axes = FIXED_AXES if angle is None else planar_axes(angle + turn)
+    return space.components(axes[0] * vector.x + axes[1] * vector.y + axes[2] * vector.z)

@@ -10,6 +10,7 @@ from atwood.expr import Expression, Scalar, substitute
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.forces import local_map
+from atwood.mechanics.kinematics import arm_of
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, Motion
 from atwood.model.local import LocalPart
@@ -268,10 +269,7 @@ def part_energies(
     for body in local.body_inertias:
         node = site.node(path, body.frame.name)
         index = site.bodies.body_of[node]
-        angle = kinematics.placements.angles.get(index)
-        axes = FIXED_AXES if angle is None else planar_axes(angle + site.node_turns[node])
-        c = body.center_of_mass
-        arm = space.components(axes[0] * c.x + axes[1] * c.y + axes[2] * c.z)
+        arm = arm_of(kinematics.placements, index, site.node_turns[node], body.center_of_mass, space)
         speed = kinematics.angular_speeds.get(index, graph.constant(0.0))
         # In the plane the centre moves with the frame plus w x arm, w counter-clockwise.
         swing = (-speed * arm[1], speed * arm[0]) if space.name == "plane" else (0.0,) * len(pull)

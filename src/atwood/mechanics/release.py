@@ -13,8 +13,9 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.forces import Forces, constraint_forces, local_map, part_forces
+from atwood.mechanics.kinematics import arm_of
 from atwood.mechanics.observables import Reaction
-from atwood.model.space import FIXED_AXES, planar_axes
+from atwood.model.vector import Vector
 from atwood.topology.bodies import Body
 from atwood.topology.graph import Joint
 
@@ -97,7 +98,7 @@ def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:
                 forces.push(node, push)
         for body in local.body_inertias:
             node = site.node(path, body.frame.name)
-            _push_body(mechanism, equations, forces, node, body.mass, tuple(body.center_of_mass), body.moment)
+            _push_body(mechanism, equations, forces, node, body.mass, body.center_of_mass, body.moment)
     return forces
 
 
@@ -107,15 +108,13 @@ def _push_body(
     forces: Forces,
     node: int,
     mass: Scalar,
-    center: tuple[Scalar, Scalar, Scalar],
+    center: Vector,
     moment: Scalar,
 ) -> None:
     """Add the inertial force of a rigid body, taken to its frame's node."""
     kinematics, space = equations.kinematics, mechanism.space
     index = equations.site.bodies.body_of[node]
-    angle = kinematics.placements.angles.get(index)
-    axes = FIXED_AXES if angle is None else planar_axes(angle + equations.site.node_turns[node])
-    arm = space.components(axes[0] * center[0] + axes[1] * center[1] + axes[2] * center[2])
+    arm = arm_of(kinematics.placements, index, equations.site.node_turns[node], center, space)
     pull = space.components(mechanism.gravity)
     acceleration = list(kinematics.accelerations[node])
     turning: Scalar = 0.0

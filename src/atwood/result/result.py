@@ -22,7 +22,8 @@ from atwood.result.energy import EnergyLedger, make_ledger
 from atwood.solve.driver import Statistics
 from atwood.solve.modes import Happening
 from atwood.solve.reactions import ReactionSolver
-from atwood.solve.run import Run, Segment
+from atwood.solve.record import Segment
+from atwood.solve.run import Run
 
 __all__ = ["Result"]
 

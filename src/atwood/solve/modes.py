@@ -156,7 +156,7 @@ class EventProbe:
 
 
 def enter_mode(
-    recorder: Any,
+    state: tuple[float, FloatArray, FloatArray],
     assembly: Assembly,
     happening: Happening,
     reassemble: Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float]], Assembly],
@@ -166,8 +166,8 @@ def enter_mode(
 
     Parameters
     ----------
-    recorder
-        Holds the last state before the event.
+    state
+        Time, coordinates and speeds just before the event.
     assembly
         The scene before the event.
     happening
@@ -177,7 +177,7 @@ def enter_mode(
     length
         Extent of the scene, m.
     """
-    t, q, u = recorder.time[-1], recorder.q[-1], recorder.u[-1]
+    t, q, u = state
     big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
     sides = actual_sides(assembly, t, q, u, assembly.form)
     after = reassemble({**assembly.modes, happening.part: happening.target}, sides)

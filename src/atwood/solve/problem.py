@@ -289,11 +289,10 @@ def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, size
 
 def pack_state(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return consistent y and y' from a state that fulfils the constraints."""
-    accelerations, multipliers = solve_balance(plan.balance.at(t, q, u), plan.kept, t)
+    now = plan.balance.at(t, q, u)
+    accelerations, multipliers = solve_balance(now, plan.kept, t)
     if plan.assembly.form == "dae":
-        if plan.kept is not None:
-            # The solver knows the multipliers of the kept constraints only.
-            now = plan.balance.at(t, q, u)
+        if plan.kept is not None:  # the solver knows the multipliers of the kept constraints only
             force = now.mass @ accelerations + now.bias
             multipliers = least_norm(now.slope[plan.kept].T, force)
         tail = [multipliers, np.zeros(plan.program.extra)]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,49 +15,16 @@ from atwood.solve.driver import Advance, Budget, Session, SolverOptions, Statist
 from atwood.solve.modes import EventProbe, Happening, enter_mode
 from atwood.solve.options import RunOptions, choose_solver, sample_times
 from atwood.solve.problem import Plan, make_plan, pack_state
+from atwood.solve.record import Recorder, Segment
 from atwood.solve.scales import scene_length
 from atwood.solve.start import Start
 
-__all__ = ["Run", "RunOptions", "Segment", "run"]
+__all__ = ["Run", "run"]
 
 FloatArray = NDArray[np.float64]
 
 _CHATTER = 50
 """So many changes of mode without time passing end a run."""
-
-
-@dataclass(frozen=True, eq=False)
-class Segment:
-    """A stretch of a run in one mode.
-
-    Attributes
-    ----------
-    plan
-        What it was run with.
-    impact
-        Whether it began with an impact.
-    time
-        Sample times, shape (samples,).
-    coordinates, speeds
-        Of the form, projected where the form has constraints; shape (number, samples).
-    shown
-        Which samples are outputs.
-    held
-        By how much the solver's own states missed the constraints on position and velocity, shape (2, samples).
-    """
-
-    plan: Plan
-    impact: bool
-    time: FloatArray
-    coordinates: FloatArray
-    speeds: FloatArray
-    shown: NDArray[np.bool_]
-    held: FloatArray
-
-    @property
-    def assembly(self) -> Assembly:
-        """The scene in this mode."""
-        return self.plan.assembly
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,58 +60,6 @@ class Run:
     start: Start
     options: RunOptions
     solver: str
-
-
-@dataclass
-class _Recorder:
-    """Takes up samples of a segment."""
-
-    plan: Plan
-    time: list[float] = field(default_factory=list)
-    q: list[FloatArray] = field(default_factory=list)
-    u: list[FloatArray] = field(default_factory=list)
-    shown: list[bool] = field(default_factory=list)
-    held: list[tuple[float, float]] = field(default_factory=list)
-
-    def take(self, t: float, y: FloatArray, shown: bool) -> tuple[FloatArray, FloatArray]:
-        """Record a state of the solver, projected; return what was recorded."""
-        plan = self.plan
-        n = plan.program.coordinates
-        q, u = y[:n].copy(), y[n : 2 * n].copy()
-        held = plan.balance.misses(t, q, u, plan.sizes)
-        if plan.is_projected:
-            q, u = plan.balance.project(t, q, u, plan.sizes)
-            plan.check_held(t, q, u)
-        if self.time and self.time[-1] == t:  # an output time that is also an event: keep the state after it
-            for last in (self.time, self.q, self.u, self.shown, self.held):
-                del last[-1]
-        self.time.append(t)
-        self.q.append(q)
-        self.u.append(u)
-        self.shown.append(shown)
-        self.held.append(held)
-        return q, u
-
-    def close(self) -> float:
-        """Drop a sample that was not recorded to its end, show the last one, and return its time."""
-        lists: tuple[list[Any], ...] = (self.time, self.q, self.u, self.shown, self.held)
-        complete = min(len(one) for one in lists)
-        for one in lists:
-            del one[complete:]
-        self.shown[-1] = True
-        return self.time[-1]
-
-    def segment(self, impact: bool) -> Segment:
-        """Return what was recorded."""
-        return Segment(
-            self.plan,
-            impact,
-            np.array(self.time),
-            np.array(self.q).T.reshape(self.plan.program.coordinates, len(self.time)),
-            np.array(self.u).T.reshape(self.plan.program.coordinates, len(self.time)),
-            np.array(self.shown),
-            np.array(self.held).T,
-        )
 
 
 def run(
@@ -191,7 +105,7 @@ def run(
         if plan is None:
             plan = make_plan(assembly, t, q, u, start.length, options.t_end - start.time)
             probe = EventProbe(assembly, t, q, u, plan.scales, options.relative_tolerance)
-        recorder = _Recorder(plan)
+        recorder = Recorder(plan)
         limit = float(np.min(breaks[breaks[:, 0] > t, 0], initial=options.t_end))
         ahead = _until(times, shown, t, limit)
         outcome = _run_mode(plan, probe, recorder, t, q, u, ahead, show, limit, options, solver, statistics)
@@ -214,7 +128,9 @@ def run(
         if recent > _CHATTER:
             status, message = "failed", f"{outcome.happening.part} changes its mode endlessly at t = {t:.9g}"
             break
-        assembly, q, u = enter_mode(recorder, assembly, outcome.happening, reassemble, start.length)
+        assembly, q, u = enter_mode(
+            (t, recorder.q[-1], recorder.u[-1]), assembly, outcome.happening, reassemble, start.length
+        )
         plan, impact, show = None, outcome.happening.impact, True
         if t >= options.t_end:
             status, message = "finished", ""
@@ -268,7 +184,7 @@ class _Outcome:
 def _run_mode(
     plan: Plan,
     probe: EventProbe,
-    recorder: _Recorder,
+    recorder: Recorder,
     t: float,
     q: FloatArray,
     u: FloatArray,
@@ -299,7 +215,7 @@ def _run_mode(
 
 def _follow(
     probe: EventProbe,
-    recorder: _Recorder,
+    recorder: Recorder,
     t: float,
     times: FloatArray,
     shown: NDArray[np.bool_],
@@ -322,7 +238,7 @@ def _follow(
 def _integrate(
     plan: Plan,
     probe: EventProbe,
-    recorder: _Recorder,
+    recorder: Recorder,
     session: Session,
     times: FloatArray,
     shown: NDArray[np.bool_],
@@ -421,7 +337,7 @@ def _restart(plan: Plan, session: Session, advance: Advance) -> None:
 
 def _repair(
     plan: Plan,
-    recorder: _Recorder,
+    recorder: Recorder,
     session: Session,
     advance: Advance,
     q: FloatArray,

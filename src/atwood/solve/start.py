@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import StartError, suggestion
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, evaluate, jacobian
+from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, jacobian
 from atwood.forms.assembly import Assembly
+from atwood.forms.program import state_groups
 from atwood.kernels import compile_program
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.observables import Observable
@@ -64,7 +65,6 @@ class _Target:
     path: str
     value: float
     observable: Observable
-    scale: float
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def find_start(assembly: Assembly) -> Start:
         If a start value names no quantity, or they contradict each other or the constraints.
     """
     equations, length = assembly.reduced, scene_length(assembly)
-    positions, speeds = _sort_targets(assembly, equations, length)
+    positions, speeds = _sort_targets(assembly, equations)
     scales = coordinate_scales(equations, length)
     t = assembly.flat.t_start
     q, free_q, repeated_q = _solve_positions(assembly, equations, positions, scales, t)
@@ -97,7 +97,7 @@ def find_start(assembly: Assembly) -> Start:
     return Start(t, q, u, length, free_q, free_u, (*repeated_q, *repeated_u))
 
 
-def _sort_targets(assembly: Assembly, equations: Equations, length: float) -> tuple[_Level, _Level]:
+def _sort_targets(assembly: Assembly, equations: Equations) -> tuple[_Level, _Level]:
     observables = assembly.start_observables
     late = [*equations.accelerations, *(r.symbol for r in assembly.reactions)]
     levels = (_Level([], []), _Level([], []))
@@ -114,7 +114,6 @@ def _sort_targets(assembly: Assembly, equations: Equations, length: float) -> tu
                     where=path,
                     advice="Give coordinates, positions and velocities.",
                 )
-            scale = length if one.unit.startswith("m") else 1.0
             level = levels[1] if depends_on(one.value, equations.speeds) else levels[0]
             if level is levels[1] and any(
                 depends_on(slope, equations.speeds) for slope in jacobian([one.value], list(equations.speeds)).entries
@@ -124,7 +123,7 @@ def _sort_targets(assembly: Assembly, equations: Equations, length: float) -> tu
                     where=path,
                     advice="Give velocities.",
                 )
-            (level.fixed if is_fixed else level.guessed).append(_Target(path, value, one, scale))
+            (level.fixed if is_fixed else level.guessed).append(_Target(path, value, one))
     return levels
 
 
@@ -141,11 +140,7 @@ class _System:
     ) -> None:
         expressions = [*constraints, *(one.observable.value for one in targets)]
         entries = jacobian(expressions, list(unknowns)) if expressions else None
-        groups = (
-            InputGroup("t", (equations.time,)),
-            InputGroup("q", equations.coordinates),
-            InputGroup("u", equations.speeds),
-        )
+        groups = state_groups(equations)
         outputs = (
             OutputGroup("values", tuple(expressions)),
             OutputGroup("slopes", tuple(entries.entries) if entries else ()),
