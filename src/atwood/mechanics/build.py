@@ -32,7 +32,7 @@ from atwood.model.local import LocalConstraint, LocalPart, ParameterTable
 from atwood.model.space import Space
 from atwood.model.vector import Vector, as_vector
 from atwood.topology.bodies import Bodies
-from atwood.topology.forest import Forest
+from atwood.topology.forest import Coordinate, Forest
 from atwood.topology.graph import MechanismGraph
 
 __all__ = ["Mechanism", "build_equations", "check_closures", "extent", "make_gravity", "resolve_signals"]
@@ -130,7 +130,7 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     rows = motion_rows(site, mechanism.locals_, masses, kinematics, lifted, signals, u)
     # Before the constraints' rates, which can then be written with the slopes that the forces are made of.
     constraint_rows = force_rows(site, mechanism.locals_, kinematics, chosen, signals, u)
-    constraints = _differentiated(values, multipliers, mechanism.time, q, u, a)
+    constraints = _differentiated(values, multipliers, mechanism.time, q, u, u, a)
     return Equations(
         graph=graph,
         forest=forest,
@@ -144,6 +144,8 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
         speeds=u,
         accelerations=a,
         names=tuple(names),
+        speed_names=tuple(Coordinate(f"{c.name}'", f"{c.unit}/s") for c in names),
+        rates=u,
         rows=tuple(rows),
         constraint_rows=tuple(constraint_rows),
         constraints=tuple(constraints),
@@ -160,13 +162,14 @@ def _differentiated(
     multipliers: Sequence[Expression],
     time: Expression,
     q: Sequence[Expression],
+    rates: Sequence[Expression],
     u: Sequence[Expression],
     a: Sequence[Expression],
 ) -> list[Constraint]:
     """Return the constraints that are left with their time derivatives."""
     found = []
     for (path, one, value), multiplier in zip(values, multipliers, strict=True):
-        rate, second = constraint_levels(value, time, q, u, a)
+        rate, second = constraint_levels(value, time, q, rates, u, a)
         key = (path, one.law.name, one.index)
         found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier))
     return found

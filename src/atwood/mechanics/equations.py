@@ -14,6 +14,7 @@ from atwood.mechanics.forces import Forces, Site, constraint_forces, local_map, 
 from atwood.mechanics.inertia import Masses
 from atwood.mechanics.kinematics import BodyShape, Kinematics
 from atwood.model.local import LocalConstraint, LocalPart
+from atwood.topology.charts import Chart
 from atwood.topology.forest import Coordinate, Forest
 
 __all__ = ["Constraint", "Equations", "balance_rows", "inertia_forces"]
@@ -36,18 +37,22 @@ class Constraint:
     sign
         The reaction is `sign` times the multiplier.
     value, rate, second
-        The residual and its first and second time derivatives.
+        The residual and its first and second time derivatives; the rate is affine in the speeds. A constraint on
+        velocities that is no derivative of one on positions has no value: then the rate is its residual.
     multiplier
         The symbol of the multiplier.
+    holonomic
+        Whether it holds positions, and not only velocities.
     """
 
     key: tuple[str, str, int]
     reaction: str
     sign: float
-    value: Expression
+    value: Expression | None
     rate: Expression
     second: Expression
     multiplier: Expression
+    holonomic: bool = True
 
     @property
     def label(self) -> str:
@@ -76,9 +81,11 @@ class Equations:
     kinematics
         Positions, velocities, accelerations.
     time, coordinates, speeds, accelerations
-        The symbols.
-    names
-        Names and units of the coordinates.
+        The symbols. There may be more coordinates than speeds; accelerations are the speeds' derivatives.
+    names, speed_names
+        Names and units of the coordinates and of the speeds.
+    rates
+        Derivatives of the coordinates, affine in the speeds; the speeds themselves unless there are charts.
     rows
         For each speed, inertial less applied generalized force; zero if there are no constraints.
     constraint_rows
@@ -89,6 +96,8 @@ class Equations:
         Coordinates that linear constraints gave as functions of the others, by name.
     prescribed
         Constraints that no coordinate can change and that depend on time, with their residuals.
+    charts
+        Groups of coordinates that stand for an orientation together.
     """
 
     graph: Graph
@@ -103,11 +112,14 @@ class Equations:
     speeds: tuple[Expression, ...]
     accelerations: tuple[Expression, ...]
     names: tuple[Coordinate, ...]
+    speed_names: tuple[Coordinate, ...]
+    rates: tuple[Expression, ...]
     rows: tuple[Expression, ...]
     constraint_rows: tuple[Expression, ...]
     constraints: tuple[Constraint, ...]
     eliminated: tuple[str, ...]
     prescribed: tuple[tuple[tuple[str, str, int], Expression], ...]
+    charts: tuple[Chart, ...] = ()
 
     @property
     def multipliers(self) -> tuple[Expression, ...]:
@@ -224,11 +236,22 @@ def constraint_levels(
     value: Expression,
     time: Expression,
     coordinates: Sequence[Expression],
+    rates: Sequence[Expression],
     speeds: Sequence[Expression],
     accelerations: Sequence[Expression],
 ) -> tuple[Expression, Expression]:
-    """Return the first and second time derivative of a constraint."""
-    first: dict[Expression, Expression | float] = {time: 1.0, **dict(zip(coordinates, speeds, strict=True))}
+    """Return the first and second time derivative of a constraint on positions.
+
+    Parameters
+    ----------
+    value
+        Its residual, of time and coordinates.
+    time, coordinates, speeds, accelerations
+        The symbols.
+    rates
+        Derivatives of the coordinates.
+    """
+    first: dict[Expression, Expression | float] = {time: 1.0, **dict(zip(coordinates, rates, strict=True))}
     (rate,) = jvp([value], first)
     (second,) = jvp([rate], {**first, **dict(zip(speeds, accelerations, strict=True))})
     return rate, second
