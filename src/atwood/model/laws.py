@@ -16,6 +16,7 @@ from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.model.connectors import Frame, Point
 from atwood.model.quantities import ObservableLaw
+from atwood.model.rotation import FreeRotation, Rotation
 from atwood.model.units import parse_si_unit
 from atwood.model.vector import ZERO, Vector, as_vector
 
@@ -85,13 +86,16 @@ class BodyInertia:
     center_of_mass
         Position of the centre of mass in the axes of the frame, m.
     moment
-        Moment of inertia about the axis through the centre of mass, normal to the plane, kg m^2.
+        Moment of inertia about the axis through the centre of mass, normal to the plane, kg m^2; in space not read.
+    tensor
+        Inertia tensor about the centre of mass in the axes of the frame, row by row, kg m^2; needed in space.
     """
 
     frame: Frame
     mass: Scalar
     center_of_mass: Vector
     moment: Scalar
+    tensor: Sequence[Sequence[Scalar]] | None = None
 
 
 @dataclass(frozen=True)
@@ -126,13 +130,14 @@ class Placement:
     displacement
         Position of b minus position of a, m.
     rotation
-        Rotation of frame b from frame a in the plane, rad; None for a joint between points.
+        Rotation of frame b from frame a: an angle in the plane, counter-clockwise, rad, which in space is one about
+        -y; in space also a `Rotation`, or `FREE` where every rotation is free. None for a joint between points.
     axes
         ``"a"`` if the displacement is given in the axes of frame a, ``"world"`` if in world axes.
     """
 
     displacement: Vector
-    rotation: Scalar = None
+    rotation: Scalar | Rotation | FreeRotation = None
     axes: Literal["a", "world"] = "world"
 
 
@@ -145,6 +150,7 @@ class ConstraintOptions:
     sign: float
     doc: str
     modes: tuple[str, ...]
+    spaces: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -213,7 +219,13 @@ def inertia(function: _F) -> _F:
 
 
 def constraint(
-    *, reaction: str | Sequence[str], unit: str = "N", doc: str, sign: float = 1.0, modes: Sequence[str] = ()
+    *,
+    reaction: str | Sequence[str],
+    unit: str = "N",
+    doc: str,
+    sign: float = 1.0,
+    modes: Sequence[str] = (),
+    spaces: Sequence[str] = ("line", "plane", "space"),
 ) -> Callable[[_F], _F]:
     """Mark a method that returns what must stay zero: one scalar, a `Vector`, or a sequence of scalars.
 
@@ -230,10 +242,12 @@ def constraint(
         The reaction is `sign` times the multiplier. With +1 it is the generalized force along the residual.
     modes
         The modes of the component in which the constraint acts; all when empty.
+    spaces
+        The spaces in which it acts.
     """
     parse_si_unit(unit)
     names = (reaction,) if isinstance(reaction, str) else tuple(reaction)
-    options = ConstraintOptions(names, unit, sign, doc, tuple(modes))
+    options = ConstraintOptions(names, unit, sign, doc, tuple(modes), tuple(spaces))
     return lambda function: _mark(function, Law("constraint", function.__name__, options))
 
 

@@ -18,6 +18,7 @@ from atwood.model.connectors import Frame, Motion
 from atwood.model.fields import ParameterSpec
 from atwood.model.flatten import FlatScene, Part
 from atwood.model.laws import BodyInertia, Law, Load, Placement, PointInertia, scalars
+from atwood.model.rotation import Axes
 from atwood.model.space import FIXED_AXES, Space, planar_axes
 from atwood.model.vector import Vector
 
@@ -50,13 +51,31 @@ class LocalConnector:
     position, velocity
         One symbol for each free position component of the space.
     angle, angular_speed
-        Rotation in the plane and its rate, for a frame; None for a point.
+        Rotation in the plane and its rate, for a frame in the plane; else None.
+    axes, angular_velocity
+        The frame's axes and its angular velocity, in world axes, for a frame in space; else None.
     """
 
     position: tuple[Expression, ...]
     velocity: tuple[Expression, ...]
-    angle: Expression | None
-    angular_speed: Expression | None
+    angle: Expression | None = None
+    angular_speed: Expression | None = None
+    axes: Axes | None = None
+    angular_velocity: Vector | None = None
+
+    @property
+    def orientation(self) -> tuple[Expression, ...]:
+        """The symbols that say how it is turned."""
+        if self.axes is not None:
+            return tuple(component for axis in self.axes for component in axis)
+        return () if self.angle is None else (self.angle,)
+
+    @property
+    def spin(self) -> tuple[Expression, ...]:
+        """The symbols that say how fast it turns."""
+        if self.angular_velocity is not None:
+            return tuple(self.angular_velocity)
+        return () if self.angular_speed is None else (self.angular_speed,)
 
 
 @dataclass(frozen=True)
@@ -209,7 +228,7 @@ def _check_reads(
 ) -> None:
     """Refuse energies that depend on velocities, and Rayleigh functions that do not: their forces would be lost."""
     velocities = [symbol for one in connectors.values() for symbol in one.velocity]
-    velocities += [one.angular_speed for one in connectors.values() if one.angular_speed is not None]
+    velocities += [symbol for one in connectors.values() for symbol in one.spin]
     if any(depends_on(value, velocities) for value in potentials):
         raise DeclarationError(
             "a potential depends on positions, angles and time, not on velocities",
@@ -284,26 +303,32 @@ def _source_value(source: Part, observable: str, flat: FlatScene, time: Expressi
 
 
 def _local_connector(path: str, is_frame: bool, space: Space, graph: Graph) -> LocalConnector:
-    turns = is_frame and space.has_rotation
-    return LocalConnector(
-        position=tuple(graph.symbol(f"{path}.position.{axis}") for axis in space.axis_names),
-        velocity=tuple(graph.symbol(f"{path}.velocity.{axis}") for axis in space.axis_names),
-        angle=graph.symbol(f"{path}.angle") if turns else None,
-        angular_speed=graph.symbol(f"{path}.angular_speed") if turns else None,
-    )
+    position = tuple(graph.symbol(f"{path}.position.{axis}") for axis in space.axis_names)
+    velocity = tuple(graph.symbol(f"{path}.velocity.{axis}") for axis in space.axis_names)
+    if not is_frame or not space.has_rotation:
+        return LocalConnector(position, velocity)
+    if space.name == "plane":
+        turns = graph.symbol(f"{path}.angle"), graph.symbol(f"{path}.angular_speed")
+        return LocalConnector(position, velocity, *turns)
+    x, y, z = (Vector(*(graph.symbol(f"{path}.{axis}_axis.{c}") for c in "xyz")) for axis in "xyz")
+    spin = Vector(*(graph.symbol(f"{path}.angular_velocity.{c}") for c in "xyz"))
+    return LocalConnector(position, velocity, axes=(x, y, z), angular_velocity=spin)
 
 
 def local_motion(symbols: LocalConnector, space: Space) -> Motion:
     """Return the motion of a connector in terms of its symbols; the plane's rotation is about -y."""
-    turns = symbols.angle is not None
+    position, velocity = space.vector(symbols.position), space.vector(symbols.velocity)
+    if symbols.axes is not None:
+        return Motion(position, velocity, axes=symbols.axes, angular_velocity=symbols.angular_velocity)
+    if symbols.angle is None or symbols.angular_speed is None:
+        still = Vector(0.0, 0.0, 0.0)
+        return Motion(position, velocity, axes=FIXED_AXES, angle=0.0, angular_velocity=still)
     return Motion(
-        position=space.vector(symbols.position),
-        velocity=space.vector(symbols.velocity),
-        axes=planar_axes(symbols.angle) if turns else FIXED_AXES,
-        angle=symbols.angle if turns else 0.0,
-        angular_velocity=Vector(0.0, -symbols.angular_speed, 0.0)  # type: ignore[operator]
-        if turns
-        else Vector(0.0, 0.0, 0.0),
+        position,
+        velocity,
+        axes=planar_axes(symbols.angle),
+        angle=symbols.angle,
+        angular_velocity=Vector(0.0, -symbols.angular_speed, 0.0),
     )
 
 

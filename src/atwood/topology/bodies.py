@@ -11,6 +11,9 @@ from atwood.topology.graph import WORLD, Joint, MechanismGraph
 
 __all__ = ["Bodies", "Body", "RigidStep", "find_bodies"]
 
+Key = tuple[str, str, int]
+"""A scalar constraint: (part, law, number within the law)."""
+
 
 @dataclass(frozen=True)
 class RigidStep:
@@ -74,7 +77,7 @@ class Bodies:
     body_of: Mapping[int, int]
     closures: tuple[Joint, ...]
     oriented: frozenset[int]
-    idle: frozenset[tuple[str, str, int]]
+    idle: frozenset[Key]
 
 
 def find_bodies(graph: MechanismGraph, locals_: Mapping[str, LocalPart]) -> Bodies:
@@ -122,53 +125,51 @@ def _lead(members: list[int], graph: MechanismGraph, locals_: Mapping[str, Local
 
 def _orientations(
     bodies: list[Body], body_of: Mapping[int, int], graph: MechanismGraph, locals_: Mapping[str, LocalPart]
-) -> tuple[frozenset[int], frozenset[tuple[str, str, int]]]:
+) -> tuple[frozenset[int], frozenset[Key]]:
     needed: set[int] = set()
-    locks: list[tuple[tuple[str, str, int], set[int]]] = []
+    locks: list[tuple[list[Key], set[int]]] = []
     for path, local in locals_.items():
 
         def body(name: str, path: str = path) -> int:
             return body_of[graph.node_of[(path, name)]]
 
         for one in local.body_inertias:
-            if not (is_zero(one.moment) and all(is_zero(c) for c in one.center_of_mass)):
+            tensor = [one.moment] if one.tensor is None else [entry for row in one.tensor for entry in row]
+            if not all(is_zero(c) for c in (*tensor, *one.center_of_mass)):
                 needed.add(body(one.frame.name))
         plain: list[Scalar] = [*local.potentials, *local.dissipations]
         for load in local.loads:
-            plain += list(load.force)
+            plain += [*load.force, *load.torque]
             if any(not is_zero(c) for c in load.torque):
                 needed.add(body(load.at.name))
         for name in _angles_read(local, plain):
             needed.add(body(name))
-        for constraint in local.constraints:
-            turned = {body(name) for name in _angles_read(local, [constraint.value])} - {0}
-            if reads_position(local, constraint):
+        for law in dict.fromkeys(constraint.law.name for constraint in local.constraints):
+            rows = [constraint for constraint in local.constraints if constraint.law.name == law]
+            turned = {body(name) for name in _angles_read(local, [one.value for one in rows])} - {0}
+            if any(reads_position(local, one) for one in rows):
                 needed |= turned
             else:
-                locks.append(((path, constraint.law.name, constraint.index), turned))
+                locks.append(([(path, law, one.index) for one in rows], turned))
     for one_body in bodies:
         if any(not all(is_zero(c) for c in step.joint.local.placement.displacement) for step in one_body.steps):
             needed.add(one_body.index)
     return _peel(needed, locks)
 
 
-def _peel(
-    needed: set[int], locks: list[tuple[tuple[str, str, int], set[int]]]
-) -> tuple[frozenset[int], frozenset[tuple[str, str, int]]]:
+def _peel(needed: set[int], locks: list[tuple[list[Key], set[int]]]) -> tuple[frozenset[int], frozenset[Key]]:
     """Drop, one after another, locks at whose end hangs a body that needs no orientation."""
-    left = [(key, turned) for key, turned in locks if turned]
-    idle: set[tuple[str, str, int]] = set()
+    left = [(keys, turned) for keys, turned in locks if turned]
+    idle: set[Key] = set()
     while True:
         counts: dict[int, int] = {}
         for _, turned in left:
             for body in turned:
                 counts[body] = counts.get(body, 0) + 1
-        loose = [
-            (key, turned) for key, turned in left if any(body not in needed and counts[body] == 1 for body in turned)
-        ]
+        loose = [one for one in left if any(body not in needed and counts[body] == 1 for body in one[1])]
         if not loose:
             break
-        idle.add(loose[0][0])
+        idle |= set(loose[0][0])
         left.remove(loose[0])
     for _, turned in left:
         needed |= turned
@@ -178,14 +179,14 @@ def _peel(
 def _angles_read(local: LocalPart, values: list[Scalar]) -> list[str]:
     found = []
     for name, symbols in local.connectors.items():
-        if symbols.angle is None or symbols.angular_speed is None:
-            continue
-        wanted = [symbols.angle, symbols.angular_speed]
-        if any(isinstance(value, Expression) and depends_on(value, wanted) for value in values):
+        wanted = [*symbols.orientation, *symbols.spin]
+        if wanted and any(isinstance(value, Expression) and depends_on(value, wanted) for value in values):
             found.append(name)
     return found
 
 
 def reads_position(local: LocalPart, constraint: LocalConstraint) -> bool:
-    """Return whether a constraint depends on a position, and not on orientations alone."""
-    return any(depends_on(constraint.value, list(symbols.position)) for symbols in local.connectors.values())
+    """Return whether a constraint depends on a position or a velocity, and not on orientations alone."""
+    return any(
+        depends_on(constraint.value, [*symbols.position, *symbols.velocity]) for symbols in local.connectors.values()
+    )

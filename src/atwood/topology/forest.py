@@ -17,6 +17,7 @@ from atwood.errors import DeclarationError
 from atwood.model.local import LocalPart
 from atwood.model.space import Space
 from atwood.topology.bodies import Bodies, reads_position
+from atwood.topology.charts import Chart
 from atwood.topology.graph import Joint, MechanismGraph
 
 __all__ = ["Attachment", "Coordinate", "Forest", "OrientationStep", "grow_forest"]
@@ -55,7 +56,15 @@ class Attachment:
     backwards
         Whether the joint is walked from b to a.
     coordinates
-        Numbers of the coordinates that are used, in the forest's list.
+        Numbers of the coordinates that are used, in the forest's list: those of the joint, or of the position.
+    speeds
+        Numbers of their speeds.
+    chart
+        In space: numbers of the quaternion's coordinates, if the body has an orientation of its own.
+    spin
+        Numbers of the speeds that belong to the chart.
+    turns_with_joint
+        In space: whether the joint also gives the orientation.
     """
 
     body: int
@@ -64,6 +73,10 @@ class Attachment:
     parent: int
     backwards: bool
     coordinates: tuple[int, ...]
+    speeds: tuple[int, ...] = ()
+    chart: tuple[int, ...] = ()
+    spin: tuple[int, ...] = ()
+    turns_with_joint: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,6 +111,10 @@ class Forest:
         ``"reduced"`` or ``"dae"``.
     coordinates
         The coordinates, in the order in which they are met.
+    speeds
+        The speeds; as many as coordinates, except where there are charts.
+    charts
+        The coordinates that stand for an orientation together.
     attachments
         The bodies, in an order in which they can be placed.
     orientations
@@ -112,6 +129,8 @@ class Forest:
 
     form: Literal["reduced", "dae"]
     coordinates: tuple[Coordinate, ...]
+    speeds: tuple[Coordinate, ...]
+    charts: tuple[Chart, ...]
     attachments: tuple[Attachment, ...]
     orientations: tuple[OrientationStep, ...]
     solved: frozenset[tuple[str, str, int]]
@@ -159,6 +178,8 @@ def grow_forest(
     return Forest(
         form,
         tuple(grower.coordinates),
+        tuple(grower.speeds),
+        tuple(grower.charts),
         tuple(grower.attachments),
         tuple(grower.orientations),
         frozenset(solved),
@@ -177,6 +198,8 @@ class _Grower:
     def __init__(self, graph: MechanismGraph, bodies: Bodies, locals_: Mapping[str, LocalPart], space: Space) -> None:
         self.graph, self.bodies, self.locals, self.space = graph, bodies, locals_, space
         self.coordinates: list[Coordinate] = []
+        self.speeds: list[Coordinate] = []
+        self.charts: list[Chart] = []
         self.attachments: list[Attachment] = []
         self.orientations: list[OrientationStep] = []
         self.placed: dict[int, int] = {0: 0}  # body -> depth
@@ -187,8 +210,7 @@ class _Grower:
         for joint in joints:
             at.setdefault(self.bodies.body_of[joint.a], []).append((joint, False))
             at.setdefault(self.bodies.body_of[joint.b], []).append((joint, True))
-        dimension = len(self.space.basis)
-        cheapest = {body: min(len(j.moves) for j, _ in around) for body, around in at.items()}
+        cheapest = {body: min(self._cost(j, body) for j, _ in around) for body, around in at.items()}
         frontier = list(at.get(0, []))
         waiting = [body.index for body in self.bodies.bodies if not body.is_fixed]
         while True:
@@ -199,9 +221,9 @@ class _Grower:
                 if child in self.placed or not self._usable(joint):
                     continue
                 open_ends.append((joint, backwards))
-                cost = len(joint.moves)
+                cost = self._cost(joint, child)
                 key = (cost - cheapest[child], self.placed[parent], order)
-                if cost <= dimension and (best is None or key < best[0]):
+                if cost <= self._freedom(child) and (best is None or key < best[0]):
                     best = (key, joint, backwards)
             frontier = open_ends
             if best is not None:
@@ -225,18 +247,50 @@ class _Grower:
         body = self.bodies.body_of[joint.a]
         return body == 0 or body in self.bodies.oriented
 
+    def _cost(self, joint: Joint, child: int) -> int:
+        """Return how many speeds it takes to hang a body on a joint; in a plane, orientations are counted apart."""
+        if self.space.name != "space":
+            return len(joint.moves)
+        own = len({*joint.moves, *joint.turns}) if child in self.bodies.oriented else len(joint.moves)
+        return own + (3 if child in self.bodies.oriented and not joint.says_rotation else 0)
+
+    def _freedom(self, child: int) -> int:
+        """Return how many speeds a free body has, orientations in a plane not counted."""
+        dimension = len(self.space.basis)
+        return dimension + 3 if self.space.name == "space" and child in self.bodies.oriented else dimension
+
     def _hang(self, joint: Joint, backwards: bool) -> None:
         parent, child = self._ends(joint, backwards)
+        in_space, oriented = self.space.name == "space", child in self.bodies.oriented
+        follows = in_space and oriented and joint.says_rotation and (parent == 0 or parent in self.bodies.oriented)
         numbers = []
-        for symbol in joint.moves:
-            if symbol in joint.turns:
+        for symbol in joint.local.coordinates if follows else joint.moves:
+            if symbol in joint.turns and not in_space:
                 continue
-            unit = _unit_of(self.locals[joint.part], symbol.name)
-            numbers.append(len(self.coordinates))
-            self.coordinates.append(Coordinate(symbol.name, unit))
+            numbers.append(self._coordinate(symbol.name, _unit_of(self.locals[joint.part], symbol.name)))
+        chart, spin = self._chart(child) if in_space and oriented and not follows else ((), ())
         node, other = (joint.a, joint.b) if backwards else (joint.b, joint.a)
-        self.attachments.append(Attachment(child, joint, node, other, backwards, tuple(numbers)))
+        coordinates, speeds = tuple(q for q, _ in numbers), tuple(u for _, u in numbers)
+        self.attachments.append(
+            Attachment(child, joint, node, other, backwards, coordinates, speeds, chart, spin, follows)
+        )
         self.placed[child] = self.placed[parent] + 1
+
+    def _coordinate(self, name: str, unit: str) -> tuple[int, int]:
+        """Add a coordinate and its speed; return their numbers."""
+        self.coordinates.append(Coordinate(name, unit))
+        self.speeds.append(Coordinate(f"{name}'", f"{unit}/s"))
+        return len(self.coordinates) - 1, len(self.speeds) - 1
+
+    def _chart(self, index: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Add a quaternion and the angular velocity in body axes; return their numbers."""
+        body = self.bodies.bodies[index].name
+        first, start = len(self.coordinates), len(self.speeds)
+        self.coordinates += [Coordinate(f"{body}.quaternion.{part}", "1") for part in "wxyz"]
+        self.speeds += [Coordinate(f"{body}.spin.{axis}", "rad/s") for axis in "xyz"]
+        chart, spin = tuple(range(first, first + 4)), tuple(range(start, start + 3))
+        self.charts.append(Chart("quaternion", chart, spin, body))
+        return chart, spin
 
     def attach_free(self) -> None:
         """Give every body that is left coordinates of its own."""
@@ -246,11 +300,10 @@ class _Grower:
 
     def _free(self, index: int) -> None:
         body = self.bodies.bodies[index]
-        numbers = []
-        for axis in self._axis_labels():
-            numbers.append(len(self.coordinates))
-            self.coordinates.append(Coordinate(f"{body.name}.position.{axis}", "m"))
-        self.attachments.append(Attachment(index, None, body.root, 0, False, tuple(numbers)))
+        numbers = [self._coordinate(f"{body.name}.position.{axis}", "m") for axis in self._axis_labels()]
+        chart, spin = self._chart(index) if self.space.name == "space" and index in self.bodies.oriented else ((), ())
+        coordinates, speeds = tuple(q for q, _ in numbers), tuple(u for _, u in numbers)
+        self.attachments.append(Attachment(index, None, body.root, 0, False, coordinates, speeds, chart, spin))
         self.placed[index] = 1
 
     def _axis_labels(self) -> tuple[str, ...]:
@@ -262,6 +315,8 @@ class _Grower:
         """Give orientations to the bodies that need one; return which joints' locks hold by construction."""
         if not self.space.has_rotation:
             return {id(joint) for joint in joints if joint.locks}
+        if self.space.name == "space":
+            return {id(one.joint) for one in self.attachments if one.joint is not None and one.turns_with_joint}
         known = {0}
         locked: set[int] = set()
         lock_joints = [joint for joint in joints if joint.locks]
@@ -287,8 +342,8 @@ class _Grower:
             spread(oriented)
         for index in self._order_of_angles():
             if index in oriented and index not in known:
-                self.orientations.append(OrientationStep(index, len(self.coordinates)))
-                self.coordinates.append(Coordinate(f"{self.bodies.bodies[index].name}.angle", "rad"))
+                number, _ = self._coordinate(f"{self.bodies.bodies[index].name}.angle", "rad")
+                self.orientations.append(OrientationStep(index, number))
                 known.add(index)
                 if use_locks:
                     spread(oriented)

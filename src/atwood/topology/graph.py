@@ -12,6 +12,7 @@ from atwood.expr import Expression, depends_on
 from atwood.model.connectors import Frame
 from atwood.model.flatten import FlatScene
 from atwood.model.local import LocalJoint, LocalPart
+from atwood.model.rotation import FREE, Rotation
 
 __all__ = ["WORLD", "Joint", "MechanismGraph", "Node", "build_graph"]
 
@@ -74,7 +75,12 @@ class Joint:
     @property
     def locks(self) -> bool:
         """Whether it prescribes the rotation of b against a, as a constant or a function of time."""
-        return self.local.placement.rotation is not None and not self.turns
+        return self.says_rotation and not self.turns
+
+    @property
+    def says_rotation(self) -> bool:
+        """Whether its coordinates, and time, tell the rotation of b against a."""
+        return self.local.placement.rotation is not None and self.local.placement.rotation is not FREE
 
     @property
     def label(self) -> str:
@@ -197,5 +203,7 @@ def _joint(path: str, local: LocalPart, joint: LocalJoint, node_of: Mapping[tupl
     shifts = list(placement.displacement)
     moves = tuple(q for q in joint.coordinates if any(isinstance(s, Expression) and depends_on(s, [q]) for s in shifts))
     rotation = placement.rotation
-    turns = tuple(q for q in joint.coordinates if isinstance(rotation, Expression) and depends_on(rotation, [q]))
+    angles = [one.angle for one in rotation.turns] if isinstance(rotation, Rotation) else [rotation]
+    angles = [angle for angle in angles if isinstance(angle, Expression)]
+    turns = tuple(q for q in joint.coordinates if any(depends_on(angle, [q]) for angle in angles))
     return Joint(path, ends[0], ends[1], joint, moves, turns)
