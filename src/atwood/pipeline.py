@@ -16,7 +16,7 @@ from atwood.expr import Graph
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import LEVELS
 from atwood.mechanics.build import Mechanism, check_closures, make_gravity
-from atwood.mechanics.kinematics import body_offsets
+from atwood.mechanics.orientation import body_offsets
 from atwood.model.composite import Model
 from atwood.model.flatten import FlatScene, flatten
 from atwood.model.local import LocalPart, ParameterTable, localize

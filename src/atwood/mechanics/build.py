@@ -2,73 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
-from atwood.errors import DeclarationError, TopologyError, UnsupportedError
-from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, substitute
-from atwood.mechanics.equations import (
-    Constraint,
-    Equations,
-    constraint_levels,
-    force_rows,
-    motion_rows,
-    put_in_place,
-)
+from atwood.errors import DeclarationError, TopologyError
+from atwood.expr import Expression, Graph, Scalar, depends_on, evaluate, substitute
+from atwood.mechanics.constraints import constraint_values, find_constraints, levels, velocity_levels
+from atwood.mechanics.elimination import CLOSES, SOLVED, check_held, drop_closed, eliminate_linear
+from atwood.mechanics.equations import Equations, force_rows, motion_rows, put_in_place
 from atwood.mechanics.forces import Site, local_map
-from atwood.mechanics.inertia import Masses, add_masses
-from atwood.mechanics.kinematics import (
-    Kinematics,
-    Placements,
-    body_offsets,
-    differentiate,
-    lifted_accelerations,
-    place,
-    rotate,
-    shapes,
-)
+from atwood.mechanics.inertia import add_masses
+from atwood.mechanics.kinematics import Kinematics, shapes
+from atwood.mechanics.mechanism import Mechanism, extent, make_gravity
+from atwood.mechanics.motion import motion_in_plane, motion_in_space
+from atwood.mechanics.orientation import NodeTurn, body_offsets, plain, rotate
 from atwood.model.component import bind
-from atwood.model.local import LocalConstraint, LocalPart, ParameterTable
+from atwood.model.local import LocalConstraint
+from atwood.model.rotation import as_rotation, compose
 from atwood.model.space import Space
-from atwood.model.vector import Vector, as_vector
-from atwood.topology.bodies import Bodies
-from atwood.topology.forest import Coordinate, Forest
-from atwood.topology.graph import MechanismGraph
+from atwood.model.vector import Vector
+from atwood.topology.forest import Forest
+from atwood.topology.graph import Joint
 
 __all__ = ["Mechanism", "build_equations", "check_closures", "extent", "make_gravity", "resolve_signals"]
-
-_CLOSES = 1e-9
-"""Relative to the extent of the mechanism: how far rigid parts may miss each other and still count as joined."""
-
-
-@dataclass(frozen=True)
-class Mechanism:
-    """A scene as bodies and joints on local symbols, before a form is chosen.
-
-    Attributes
-    ----------
-    table
-        The parameters.
-    time
-        The symbol of time.
-    space
-        What the scene lives in.
-    gravity
-        Acceleration of free fall, m/s^2, a symbol or zero.
-    locals_, graph, bodies
-        Parts, nodes and bodies.
-    links
-        For each linked input, the output that feeds it.
-    """
-
-    table: ParameterTable
-    time: Expression
-    space: Space
-    gravity: Vector
-    locals_: Mapping[str, LocalPart]
-    graph: MechanismGraph
-    bodies: Bodies
-    links: Mapping[tuple[str, str], tuple[str, str]]
 
 
 def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
@@ -90,47 +46,25 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     """
     graph, bodies, space = mechanism.table.graph, mechanism.bodies, mechanism.space
     layouts = {body.index: body_offsets(body, space) for body in bodies.bodies}
-    masses = add_masses(mechanism.graph, bodies, mechanism.locals_, layouts)
-    shape_of = shapes(bodies, {index: one.center for index, one in masses.bodies.items()}, space)
-    site = Site(
-        graph,
-        mechanism.graph,
-        bodies,
-        space,
-        {node: turn for _, turns in layouts.values() for node, turn in turns.items()},
-    )
-    q = tuple(graph.symbol(f"q:{c.name}") for c in forest.coordinates)
-    origin = tuple(graph.symbol(f"origin:{axis}") for axis in space.axis_names)
-    movable = place(graph, mechanism.graph, bodies, forest, shape_of, mechanism.locals_, q, space, origin)
-    placements = _substituted(movable, dict.fromkeys(origin, graph.zero))
-    left = _unsolved(mechanism, forest)
-    values = _constraint_values(mechanism, site, placements, left)
-    _check_held(mechanism, masses, forest, q, values)
-    names, eliminated = list(forest.coordinates), []
-    if forest.form == "reduced":
-        solution = _eliminate(mechanism, masses, forest, q, values)
-        if solution:
-            placements, movable = _substituted(placements, solution), _substituted(movable, solution)
-            values = [(path, c, substitute([v], solution)[0]) for path, c, v in values if v is not _SOLVED]
-            gone = set(solution)
-            eliminated = [c.name for c, s in zip(forest.coordinates, q, strict=True) if s in gone]
-            names = [c for c, s in zip(forest.coordinates, q, strict=True) if s not in gone]
-            q = tuple(s for s in q if s not in gone)
-    values, prescribed = _drop_closed(mechanism, q, values)
-    u = tuple(graph.symbol(f"u:{c.name}") for c in names)
-    a = tuple(graph.symbol(f"a:{c.name}") for c in names)
-    kinematics = differentiate(placements, mechanism.time, q, u, a)
-    lifted = lifted_accelerations(movable, origin, space.components(mechanism.gravity), mechanism.time, q, u, a)
-    signals = resolve_signals(mechanism, site, kinematics)
-    multipliers = [
-        graph.symbol(f"lambda:{path}.{local_constraint.law.name}[{local_constraint.index}]")
-        for path, local_constraint, _ in values
-    ]
-    chosen = [(path, c, multiplier) for (path, c, _), multiplier in zip(values, multipliers, strict=True)]
-    rows = motion_rows(site, mechanism.locals_, masses, kinematics, lifted, signals, u)
+    masses = add_masses(mechanism.graph, bodies, mechanism.locals_, layouts, space)
+    shape_of = shapes(bodies, layouts, {index: one.center for index, one in masses.bodies.items()})
+    turns = {node: turn for _, body_turns in layouts.values() for node, turn in body_turns.items()}
+    site = Site(graph, mechanism.graph, bodies, space, turns)
+    motion = (motion_in_space if space.name == "space" else motion_in_plane)(mechanism, forest, shape_of)
+    left = find_constraints(mechanism, forest)
+    values = constraint_values(mechanism, site, motion.placements, left.on_positions)
+    every = motion.all_coordinates
+    check_held(mechanism, masses, forest, every, values, left.on_velocities)
+    solution = eliminate_linear(mechanism, masses, forest, every, values) if forest.form == "reduced" else {}
+    values = [(path, c, substitute([v], solution)[0] if solution else v) for path, c, v in values if v is not SOLVED]
+    state = motion.finish(solution)
+    values, prescribed = drop_closed(mechanism, state.coordinates, values)
+    signals = resolve_signals(mechanism, site, state.kinematics)
+    held = [(path, c, _multiplier(graph, path, c)) for path, c, _ in values]
+    rolling = [(path, c, _multiplier(graph, path, c)) for path, c in left.on_velocities]
+    rows = motion_rows(site, mechanism.locals_, masses, state.kinematics, state.lifted, signals, state.speeds)
     # Before the constraints' rates, which can then be written with the slopes that the forces are made of.
-    constraint_rows = force_rows(site, mechanism.locals_, kinematics, chosen, signals, u)
-    constraints = _differentiated(values, multipliers, mechanism.time, q, u, u, a)
+    forces = force_rows(site, mechanism.locals_, state.kinematics, [*held, *rolling], signals, state.speeds)
     return Equations(
         graph=graph,
         forest=forest,
@@ -138,192 +72,28 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
         locals_=mechanism.locals_,
         masses=masses,
         shapes=shape_of,
-        kinematics=kinematics,
+        kinematics=state.kinematics,
         time=mechanism.time,
-        coordinates=q,
-        speeds=u,
-        accelerations=a,
-        names=tuple(names),
-        speed_names=tuple(Coordinate(f"{c.name}'", f"{c.unit}/s") for c in names),
-        rates=u,
+        coordinates=state.coordinates,
+        speeds=state.speeds,
+        accelerations=state.accelerations,
+        names=state.names,
+        speed_names=state.speed_names,
+        rates=state.rates,
         rows=tuple(rows),
-        constraint_rows=tuple(constraint_rows),
-        constraints=tuple(constraints),
-        eliminated=tuple(eliminated),
+        constraint_rows=tuple(forces),
+        constraints=(
+            *levels(mechanism, site, state, held, [value for _, _, value in values]),
+            *velocity_levels(mechanism, site, state, rolling, signals),
+        ),
+        eliminated=tuple(c.name for c, s in zip(forest.coordinates, every, strict=True) if s in solution),
         prescribed=prescribed,
+        charts=state.charts,
     )
 
 
-Values = list[tuple[str, LocalConstraint, Expression]]
-
-
-def _differentiated(
-    values: Values,
-    multipliers: Sequence[Expression],
-    time: Expression,
-    q: Sequence[Expression],
-    rates: Sequence[Expression],
-    u: Sequence[Expression],
-    a: Sequence[Expression],
-) -> list[Constraint]:
-    """Return the constraints that are left with their time derivatives."""
-    found = []
-    for (path, one, value), multiplier in zip(values, multipliers, strict=True):
-        rate, second = constraint_levels(value, time, q, rates, u, a)
-        key = (path, one.law.name, one.index)
-        found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier))
-    return found
-
-
-def _unsolved(mechanism: Mechanism, forest: Forest) -> list[tuple[str, LocalConstraint]]:
-    found = []
-    for path, local in mechanism.locals_.items():
-        for constraint in local.constraints:
-            velocities = [v for c in local.connectors.values() for v in c.velocity]
-            velocities += [c.angular_speed for c in local.connectors.values() if c.angular_speed is not None]
-            where = f"{path}.{constraint.law.name}"
-            if depends_on(constraint.value, velocities):
-                raise UnsupportedError("a constraint on velocities cannot be handled yet", where=where)
-            if depends_on(constraint.value, list(local.signal_symbols.values())):
-                raise UnsupportedError(
-                    "a constraint cannot follow the output of another component",
-                    where=where,
-                    advice="Give the input as a function of time.",
-                )
-            if (path, constraint.law.name, constraint.index) not in forest.solved and not constraint.value.is_zero:
-                found.append((path, constraint))
-    return found
-
-
-def _constraint_values(
-    mechanism: Mechanism, site: Site, placements: Placements, left: Sequence[tuple[str, LocalConstraint]]
-) -> Values:
-    still = Kinematics(placements, placements.positions, {}, placements.angles, {}, {}, {})
-    maps = {path: local_map(site, mechanism.locals_[path], still) for path in {path for path, _ in left}}
-    return [(path, c, put_in_place(c.value, maps[path])) for path, c in left]
-
-
-def _check_held(
-    mechanism: Mechanism, masses: Masses, forest: Forest, q: tuple[Expression, ...], values: Values
-) -> None:
-    """Refuse a body that has no mass and that no joint or constraint holds."""
-    weightless = _weightless(mechanism, masses, forest)
-    for one in forest.attachments:
-        if one.joint is not None or not weightless.issuperset(one.coordinates):
-            continue
-        own = [q[number] for number in one.coordinates]
-        if not any(depends_on(value, own) for _, _, value in values):
-            raise TopologyError(
-                "it hangs free and has no mass: a force would accelerate it without bound",
-                where=mechanism.bodies.bodies[one.body].name,
-                advice="Connect it to something that has a mass or holds it, give it a mass, or remove it.",
-            )
-
-
-class _Solved:
-    """Marks a constraint that elimination has used up."""
-
-
-_SOLVED: Expression = _Solved()  # type: ignore[assignment]
-
-
-def _eliminate(
-    mechanism: Mechanism, masses: Masses, forest: Forest, q: tuple[Expression, ...], values: Values
-) -> dict[Expression, Expression]:
-    """Solve linear constraints for one coordinate each; mark them in `values`.
-
-    Coordinates of what has no mass go first, then those that were met last, so that the names that a reader expects
-    stay.
-    """
-    parameters = mechanism.table.values
-    weightless = _weightless(mechanism, masses, forest)
-    solution: dict[Expression, Expression] = {}
-    for number, (path, constraint, original) in enumerate(values):
-        value = substitute([original], solution)[0]
-        free = [s for s in q if s not in solution]
-        affine = affine_coefficients(value, free, list(parameters))
-        if affine is None:
-            continue
-        coefficients, remainder = affine
-        sizes = [abs(c) for c in evaluate(list(coefficients), parameters)] if coefficients else []
-        largest = max(sizes, default=0.0)
-        if largest == 0.0:
-            continue
-        usable = [i for i, size in enumerate(sizes) if size >= 0.1 * largest]
-        index = max(usable, key=lambda i: (q.index(free[i]) in weightless, i))
-        pivot = coefficients[index]
-        total = remainder
-        for i, coefficient in enumerate(coefficients):
-            if i != index:
-                total = total + coefficient * free[i]
-        expression = -total / pivot
-        solution = {s: substitute([e], {free[index]: expression})[0] for s, e in solution.items()}
-        solution[free[index]] = mechanism.table.graph.convert(expression)
-        values[number] = (path, constraint, _SOLVED)
-    return solution
-
-
-def _weightless(mechanism: Mechanism, masses: Masses, forest: Forest) -> set[int]:
-    """Return the numbers of the coordinates that only place a body without mass."""
-    massive = {mechanism.bodies.body_of[node] for one in masses.coupled for node in one.nodes} | set(masses.bodies)
-    return {number for one in forest.attachments if one.body not in massive for number in one.coordinates}
-
-
-def _substituted(placements: Placements, solution: Mapping[Expression, Expression]) -> Placements:
-    """Return placements with coordinates replaced: one walk over the whole position program."""
-    positions, references = placements.positions, placements.references
-    points = [c for group in (positions, references) for p in group.values() for c in p]
-    values = iter(substitute([*points, *placements.angles.values(), *placements.joint_coordinates.values()], solution))
-    return Placements(
-        positions={i: tuple(next(values) for _ in p) for i, p in positions.items()},
-        references={i: tuple(next(values) for _ in p) for i, p in references.items()},
-        angles={i: next(values) for i in placements.angles},
-        joint_coordinates={s: next(values) for s in placements.joint_coordinates},
-    )
-
-
-Prescribed = tuple[tuple[tuple[str, str, int], Expression], ...]
-
-
-def _drop_closed(mechanism: Mechanism, q: tuple[Expression, ...], values: Values) -> tuple[Values, Prescribed]:
-    """Take out the constraints that no coordinate can change; return the rest, and those that depend on time.
-
-    Those that do not are checked here; functions of time are checked when it is known for which times.
-    """
-    kept: Values = []
-    prescribed = []
-    parameters = mechanism.table.values
-    for path, constraint, value in values:
-        if value is _SOLVED:
-            continue
-        if depends_on(value, q):
-            kept.append((path, constraint, value))
-            continue
-        if depends_on(value, [mechanism.time]):
-            prescribed.append(((path, constraint.law.name, constraint.index), value))
-            continue
-        (miss,) = evaluate([value], parameters)
-        if not abs(miss) <= _CLOSES * (extent(mechanism) or 1.0):
-            raise TopologyError(
-                f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
-                where=f"{path}.{constraint.law.name}",
-                advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
-            )
-    return kept, tuple(prescribed)
-
-
-def extent(mechanism: Mechanism) -> float:
-    """Return the extent of a mechanism, m: the largest length among the parameters of what moves; 0 if none is."""
-    sizes = [0.0]
-    for path, local in mechanism.locals_.items():
-        bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors}
-        if bodies == {0}:
-            continue  # where the ground is says nothing about the size of what moves
-        for name, spec in local.part.component.parameter_specs().items():
-            value = local.part.values[name]
-            if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
-                sizes += [abs(v) for v in (value if isinstance(value, tuple) else (value,))]
-    return max(sizes)
+def _multiplier(graph: Graph, path: str, one: LocalConstraint) -> Expression:
+    return graph.symbol(f"lambda:{path}.{one.law.name}[{one.index}]")
 
 
 def check_closures(mechanism: Mechanism) -> None:
@@ -343,20 +113,29 @@ def check_closures(mechanism: Mechanism) -> None:
         if placement.axes == "a" and space.has_rotation:
             from_a = rotate(from_a, turns[joint.a])
         gap = offsets[joint.b] - offsets[joint.a] - from_a
-        rotation = 0.0 if placement.rotation is None else placement.rotation
         graph = mechanism.table.graph
-        misses = [*gap, turns[joint.b] - turns[joint.a] - rotation if space.has_rotation else 0.0]
+        misses = [*gap, *_turns_missed(joint, turns[joint.a], turns[joint.b], space)]
         numbers = evaluate([graph.convert(m) for m in misses], mechanism.table.values)
-        if (
-            not all(abs(m) <= _CLOSES * (extent(mechanism) or 1.0) for m in numbers[:3])
-            or not abs(numbers[3]) <= _CLOSES
-        ):
+        turned = max((abs(m) for m in numbers[3:]), default=0.0)
+        if not all(abs(m) <= CLOSES * (extent(mechanism) or 1.0) for m in numbers[:3]) or not turned <= CLOSES:
             kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
             raise TopologyError(
-                f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {numbers[3]:g} rad",
+                f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {turned:g} rad",
                 where=joint.label,
                 advice="Two rigid connections say different things about the same place; remove or change one.",
             )
+
+
+def _turns_missed(joint: Joint, turn_a: NodeTurn, turn_b: NodeTurn, space: Space) -> list[Scalar]:
+    """Return by what angles, while they are small, a rigid joint's end is turned from where it should be."""
+    if not space.has_rotation:
+        return []
+    rotation = joint.local.placement.rotation
+    if isinstance(turn_a, tuple) and isinstance(turn_b, tuple):
+        wanted = compose(turn_a, as_rotation(0.0 if rotation is None else rotation).axes())
+        return [component for mine, theirs in zip(turn_b, wanted, strict=True) for component in mine - theirs]
+    angle: Any = 0.0 if rotation is None else rotation
+    return [plain(turn_b) - plain(turn_a) - angle]
 
 
 def resolve_signals(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[Expression, Expression]:
@@ -394,9 +173,3 @@ def resolve_signals(mechanism: Mechanism, site: Site, kinematics: Kinematics) ->
         names = ", ".join(f"{path}.{name}" for path, name in mechanism.links)
         raise DeclarationError(f"inputs and outputs feed each other in a circle: {names}")
     return raw
-
-
-def make_gravity(table: ParameterTable, value: float) -> Vector:
-    """Return the acceleration of free fall as a vector."""
-    pull = table.scalar("gravity", value)
-    return as_vector((0.0, 0.0, -pull))

@@ -13,6 +13,7 @@ from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
 from atwood.mechanics.forces import Forces, Site, constraint_forces, local_map, part_forces
 from atwood.mechanics.inertia import Masses
 from atwood.mechanics.kinematics import BodyShape, Kinematics
+from atwood.mechanics.orientation import inertial_torque
 from atwood.model.local import LocalConstraint, LocalPart
 from atwood.topology.charts import Chart
 from atwood.topology.forest import Coordinate, Forest
@@ -150,7 +151,8 @@ def inertia_forces(
     for index, one in masses.bodies.items():
         at_centers[index] = [site.graph.convert(one.mass * a) for a in at_references[index]]
         if index in kinematics.angular_accelerations:
-            forces.twist(index, -(one.moment * kinematics.angular_accelerations[index]))
+            spins = kinematics.angular_velocities[index], kinematics.angular_accelerations[index]
+            forces.twist(index, [-c for c in inertial_torque(one.moment, *spins)])
     for spread in masses.coupled:
         for i, node in enumerate(spread.nodes):
             total: list[Scalar] = [0.0] * len(at_nodes[node])
@@ -188,9 +190,9 @@ def balance_rows(
         outputs += kinematics.velocities[node]
         cotangents += [-f for f in force]
     for body, torque in forces.on_bodies.items():
-        if body in kinematics.angular_speeds:
-            outputs.append(kinematics.angular_speeds[body])
-            cotangents.append(-torque)
+        if body in kinematics.angular_velocities:
+            outputs += kinematics.angular_velocities[body]
+            cotangents += [-c for c in torque]
     kept = [(o, c) for o, c in zip(outputs, cotangents, strict=True) if not c.is_zero and not o.is_zero]
     if not kept:
         zero = forces.graph.constant(0.0)
@@ -211,7 +213,7 @@ def motion_rows(
     forces = Forces(site.graph)
     at_centers = inertia_forces(site, masses, kinematics, lifted, forces)
     for local in locals_.values():
-        part_forces(site, local, {**local_map(site, local, kinematics), **signals}, forces)
+        part_forces(site, local, kinematics, {**local_map(site, local, kinematics), **signals}, forces)
     return balance_rows(kinematics, at_centers, forces, speeds)
 
 

@@ -9,10 +9,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from atwood.errors import TopologyError
-from atwood.expr import Expression, Graph, Scalar, substitute, vjp
+from atwood.expr import Expression, Graph, Scalar, depends_on, is_zero, substitute, vjp
 from atwood.mechanics.kinematics import Kinematics
+from atwood.mechanics.orientation import NodeTurn, node_axes, spin_in_world, torque_components
 from atwood.model.local import LocalPart
+from atwood.model.rotation import Axes, from_axes
 from atwood.model.space import Space
+from atwood.model.vector import Vector, dot
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
@@ -28,15 +31,15 @@ class Forces:
     on_nodes
         Force components by node, N.
     on_bodies
-        Torque by body, counter-clockwise, N m.
+        Torque components by body, N m: counter-clockwise in a plane, in the axes of the body in space.
     at_nodes
         The same torques by the node at which they act.
     """
 
     graph: Graph
     on_nodes: dict[int, list[Expression]] = field(default_factory=dict)
-    on_bodies: dict[int, Expression] = field(default_factory=dict)
-    at_nodes: dict[int, Expression] = field(default_factory=dict)
+    on_bodies: dict[int, list[Expression]] = field(default_factory=dict)
+    at_nodes: dict[int, list[Expression]] = field(default_factory=dict)
 
     def push(self, node: int, components: Sequence[Scalar]) -> None:
         """Add a force on a node."""
@@ -44,12 +47,13 @@ class Forces:
         new = [self.graph.convert(c) for c in components]
         self.on_nodes[node] = new if held is None else [a + b for a, b in zip(held, new, strict=True)]
 
-    def twist(self, body: int, torque: Scalar, node: int | None = None) -> None:
+    def twist(self, body: int, torque: Sequence[Scalar], node: int | None = None) -> None:
         """Add a torque on a body, at a node of it."""
-        new = self.graph.convert(torque)
-        self.on_bodies[body] = self.on_bodies[body] + new if body in self.on_bodies else new
-        if node is not None:
-            self.at_nodes[node] = self.at_nodes[node] + new if node in self.at_nodes else new
+        new = [self.graph.convert(c) for c in torque]
+        for sums, key in ((self.on_bodies, body), (self.at_nodes, node)):
+            if key is not None:
+                held = sums.get(key)
+                sums[key] = new if held is None else [a + b for a, b in zip(held, new, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -63,14 +67,14 @@ class Site:
     mechanism, bodies, space
         The mechanism.
     node_turns
-        Rotation of each node from its body.
+        How each node is turned from its body.
     """
 
     graph: Graph
     mechanism: MechanismGraph
     bodies: Bodies
     space: Space
-    node_turns: Mapping[int, Scalar]
+    node_turns: Mapping[int, NodeTurn]
 
     def node(self, path: str, connector: str) -> int:
         """Return the node of a connector."""
@@ -90,13 +94,24 @@ def local_map(site: Site, local: LocalPart, kinematics: Kinematics) -> dict[Expr
         body = site.bodies.body_of[node]
         found.update(zip(symbols.position, kinematics.placements.positions[node], strict=True))
         found.update(zip(symbols.velocity, kinematics.velocities[node], strict=True))
-        if symbols.angle is not None and symbols.angular_speed is not None and body in kinematics.placements.angles:
-            found[symbols.angle] = site.graph.convert(kinematics.placements.angles[body] + site.node_turns[node])
-            found[symbols.angular_speed] = kinematics.angular_speeds[body]
+        placements = kinematics.placements
+        if symbols.angle is not None and symbols.angular_speed is not None and body in placements.angles:
+            found[symbols.angle] = site.graph.convert(placements.angles[body] + site.node_turns[node])
+            if body in kinematics.angular_velocities:
+                found[symbols.angular_speed] = kinematics.angular_velocities[body][0]
+        if symbols.axes is not None and symbols.angular_velocity is not None and body in placements.axes:
+            axes = node_axes(None, placements.axes[body], site.node_turns[node])
+            assert axes is not None
+            found.update(zip(symbols.orientation, (site.graph.convert(c) for v in axes for c in v), strict=True))
+            if body in kinematics.angular_velocities:
+                spin_W = spin_in_world(kinematics.angular_velocities[body], placements.axes[body])
+                found.update(zip(symbols.spin, (site.graph.convert(c) for c in spin_W), strict=True))
     return found
 
 
-def part_forces(site: Site, local: LocalPart, mapping: Mapping[Expression, Expression], forces: Forces) -> None:
+def part_forces(
+    site: Site, local: LocalPart, kinematics: Kinematics, mapping: Mapping[Expression, Expression], forces: Forces
+) -> None:
     """Add the forces of a part's potentials, Rayleigh functions and loads."""
     _add_gradient(site, local, local.potentials, mapping, forces, of_velocities=False)
     _add_gradient(site, local, local.dissipations, mapping, forces, of_velocities=True)
@@ -104,12 +119,13 @@ def part_forces(site: Site, local: LocalPart, mapping: Mapping[Expression, Expre
     for load in local.loads:
         force = substitute([site.graph.convert(c) for c in site.space.components(load.force)], mapping)
         forces.push(site.node(path, load.at.name), force)
-        torque = site.graph.convert(-load.torque.y)
-        if not torque.is_zero:
+        if any(not is_zero(c) for c in load.torque):
             body = site.body(path, load.at.name)
             if site.space.has_rotation and body not in site.bodies.oriented and body != 0:
                 raise TopologyError("it puts a torque on something that cannot turn", where=path)
-            forces.twist(body, substitute([torque], mapping)[0], site.node(path, load.at.name))
+            torque_W = Vector(*substitute([site.graph.convert(c) for c in load.torque], mapping))
+            torque = torque_components(torque_W, kinematics.placements.axes.get(body), site.space)
+            forces.twist(body, torque, site.node(path, load.at.name))
 
 
 def _add_gradient(
@@ -121,26 +137,59 @@ def _add_gradient(
     of_velocities: bool,
 ) -> None:
     for function in functions:
-        for name, slopes, turning in _slopes(local, function, site.graph.constant(-1.0), of_velocities):
+        for name, slopes, turning in slopes_of(local, function, site.graph.constant(-1.0), of_velocities):
             _push_mapped(site, local, name, slopes, turning, mapping, forces)
 
 
-def _slopes(
+def slopes_of(
     local: LocalPart, function: Expression, factor: Expression, of_velocities: bool = False
-) -> list[tuple[str, list[Expression], Expression | None]]:
-    """Return, for each connector, the derivatives of a function times a factor: one reverse sweep."""
+) -> list[tuple[str, list[Expression], list[Expression]]]:
+    """Return, for each connector, force and torque of a function: its derivatives times a factor, in one reverse sweep.
+
+    Parameters
+    ----------
+    local
+        The part.
+    function
+        Of the local symbols.
+    factor
+        What the derivatives are multiplied by.
+    of_velocities
+        Whether to differentiate with respect to velocities, and not to positions and orientations.
+
+    Returns
+    -------
+    list
+        Name of each connector, force components in world axes, and torque components: counter-clockwise in a plane,
+        in the axes of the connector in space; empty at a point.
+    """
     wanted: list[Expression] = []
     for symbols in local.connectors.values():
-        wanted += symbols.velocity if of_velocities else symbols.position
-        angle = symbols.angular_speed if of_velocities else symbols.angle
-        if angle is not None:
-            wanted.append(angle)
+        wanted += [*symbols.velocity, *symbols.spin] if of_velocities else [*symbols.position, *symbols.orientation]
     slopes = iter(vjp([function], [factor], wanted))
-    found: list[tuple[str, list[Expression], Expression | None]] = []
+    found = []
     for name, symbols in local.connectors.items():
-        components = [next(slopes) for _ in symbols.position]
-        found.append((name, components, next(slopes) if symbols.angle is not None else None))
+        force = [next(slopes) for _ in symbols.position]
+        turning = [next(slopes) for _ in (symbols.spin if of_velocities else symbols.orientation)]
+        if symbols.axes is not None:
+            turning = _torque_of_axes(symbols.axes, turning) if not of_velocities else _along(symbols.axes, turning)
+        found.append((name, force, turning))
     return found
+
+
+def _torque_of_axes(axes: Axes, slopes: Sequence[Expression]) -> list[Expression]:
+    """Return the torque along the axes of a frame from derivatives with respect to the components of its axes.
+
+    Turning by a small angle about x moves y along z and z against y; so its virtual work is ``g_y . z - g_z . y``.
+    """
+    x, y, z = axes
+    gx, gy, gz = (Vector(*slopes[3 * i : 3 * i + 3]) for i in range(3))
+    return [dot(gy, z) - dot(gz, y), dot(gz, x) - dot(gx, z), dot(gx, y) - dot(gy, x)]
+
+
+def _along(axes: Axes, slopes: Sequence[Expression]) -> list[Expression]:
+    """Return the components of a torque in world axes along the axes of a frame."""
+    return [dot(axis, Vector(*slopes)) for axis in axes]
 
 
 def _push_mapped(
@@ -148,15 +197,21 @@ def _push_mapped(
     local: LocalPart,
     name: str,
     slopes: list[Expression],
-    turning: Expression | None,
+    turning: list[Expression],
     mapping: Mapping[Expression, Expression],
     forces: Forces,
 ) -> None:
-    path = local.part.path
+    path, node = local.part.path, site.node(local.part.path, name)
     if not all(slope.is_zero for slope in slopes):
-        forces.push(site.node(path, name), substitute(slopes, mapping))
-    if turning is not None and not turning.is_zero:
-        forces.twist(site.body(path, name), substitute([turning], mapping)[0], site.node(path, name))
+        forces.push(node, substitute(slopes, mapping))
+    if not all(slope.is_zero for slope in turning):
+        forces.twist(site.body(path, name), in_body(site, node, substitute(turning, mapping)), node)
+
+
+def in_body(site: Site, node: int, torque: Sequence[Expression]) -> list[Scalar]:
+    """Return torque components of a node as those of its body."""
+    turn = site.node_turns[node]
+    return list(from_axes(turn, Vector(*torque))) if isinstance(turn, tuple) else list(torque)
 
 
 def constraint_forces(
@@ -169,6 +224,12 @@ def constraint_forces(
 ) -> None:
     """Add the forces of a constraint: its multiplier times its derivatives (Goldstein, section 2.4)."""
     # The derivatives first, and then times the multiplier: so both sets of multipliers and the rate share them.
-    for name, slopes, turning in _slopes(local, value, site.graph.constant(1.0)):
-        pushes = [slope * multiplier for slope in slopes]
-        _push_mapped(site, local, name, pushes, None if turning is None else turning * multiplier, mapping, forces)
+    of_velocities = is_on_velocities(local, value)
+    for name, slopes, turning in slopes_of(local, value, site.graph.constant(1.0), of_velocities):
+        pushes, twists = [slope * multiplier for slope in slopes], [slope * multiplier for slope in turning]
+        _push_mapped(site, local, name, pushes, twists, mapping, forces)
+
+
+def is_on_velocities(local: LocalPart, value: Expression) -> bool:
+    """Return whether a constraint is one on velocities, and not on positions."""
+    return depends_on(value, [s for one in local.connectors.values() for s in (*one.velocity, *one.spin)])

@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from atwood.errors import DeclarationError
 from atwood.expr import Expression, Scalar, is_zero
-from atwood.mechanics.kinematics import rotate
+from atwood.mechanics.orientation import NodeTurn, rotate
+from atwood.model.laws import BodyInertia
 from atwood.model.local import LocalPart
-from atwood.model.vector import Vector
+from atwood.model.rotation import Axes, from_axes, transposed
+from atwood.model.space import Space
+from atwood.model.vector import ZERO as _ZERO
+from atwood.model.vector import Vector, dot
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
-__all__ = ["CoupledMass", "Masses", "RigidMass", "add_masses"]
+__all__ = ["CoupledMass", "Masses", "RigidMass", "add_masses", "tensor_of", "turned_tensor"]
 
 
 @dataclass(frozen=True)
@@ -26,14 +31,14 @@ class RigidMass:
     center
         Centre of mass in the axes of the body, m.
     moment
-        Moment of inertia about it, kg m^2.
+        Moment of inertia about it, kg m^2; in space the tensor, as its columns in the axes of the body.
     parts
         Paths of the parts it comes from.
     """
 
     mass: Scalar
     center: Vector
-    moment: Scalar
+    moment: Scalar | Axes
     parts: tuple[str, ...]
 
 
@@ -69,13 +74,14 @@ def add_masses(
     mechanism: MechanismGraph,
     bodies: Bodies,
     locals_: Mapping[str, LocalPart],
-    layouts: Mapping[int, tuple[Mapping[int, Vector], Mapping[int, Scalar]]],
+    layouts: Mapping[int, tuple[Mapping[int, Vector], Mapping[int, NodeTurn]]],
+    space: Space,
 ) -> Masses:
     """Add up the inertia of all parts, with the parallel-axis theorem (Goldstein, section 5.3).
 
     Parameters
     ----------
-    mechanism, bodies, locals_
+    mechanism, bodies, locals_, space
         The mechanism.
     layouts
         Offset and turn of each node in each body.
@@ -84,31 +90,64 @@ def add_masses(
     coupled: list[CoupledMass] = []
     fixed: list[str] = []
 
-    def share(part: str, node: int, mass: Scalar, center: Vector, moment: Scalar) -> None:
+    def share(part: str, node: int, mass: Scalar, center: Vector, moment: Scalar | Axes) -> None:
         body = bodies.body_of[node]
-        if is_zero(mass) and is_zero(moment):
+        if is_zero(mass) and _is_nothing(moment):
             return
         if body == 0:
             fixed.append(part)
             return
         offsets, turns = layouts[body]
-        shares.setdefault(body, []).append(
-            RigidMass(mass, offsets[node] + rotate(center, turns[node]), moment, (part,))
-        )
+        turn = turns[node]
+        if isinstance(moment, tuple):
+            moment = turned_tensor(moment, turn)
+        shares.setdefault(body, []).append(RigidMass(mass, offsets[node] + rotate(center, turn), moment, (part,)))
 
+    nothing: Scalar | Axes = (_ZERO, _ZERO, _ZERO) if space.name == "space" else 0.0
     for path, local in locals_.items():
         for point in local.point_inertias:
             nodes = tuple(mechanism.node_of[(path, p.name)] for p in point.points)
             if len(nodes) == 1:
-                share(path, nodes[0], point.masses[0][0], Vector(0.0, 0.0, 0.0), 0.0)
+                share(path, nodes[0], point.masses[0][0], Vector(0.0, 0.0, 0.0), nothing)
             elif not all(is_zero(m) for row in point.masses for m in row):
                 if all(bodies.body_of[node] == 0 for node in nodes):
                     fixed.append(path)
                 else:
                     coupled.append(CoupledMass(path, nodes, tuple(tuple(row) for row in point.masses)))
         for body in local.body_inertias:
-            share(path, mechanism.node_of[(path, body.frame.name)], body.mass, body.center_of_mass, body.moment)
+            moment = tensor_of(path, body) if space.name == "space" else body.moment
+            share(path, mechanism.node_of[(path, body.frame.name)], body.mass, body.center_of_mass, moment)
     return Masses({index: _merge(found) for index, found in shares.items()}, tuple(coupled), tuple(fixed))
+
+
+def tensor_of(path: str, body: BodyInertia) -> Axes:
+    """Return the inertia tensor of a rigid body about its centre of mass, as its columns.
+
+    Raises
+    ------
+    DeclarationError
+        If the part gives none, as a part of the plane need not.
+    """
+    if body.tensor is None:
+        raise DeclarationError(
+            "in space a rigid body needs an inertia tensor, and this part gives a moment about one axis only",
+            where=path,
+            advice="Give its BodyInertia a tensor.",
+        )
+    rows = [list(row) for row in body.tensor]
+    return Vector(*rows[0]), Vector(*rows[1]), Vector(*rows[2])
+
+
+def _is_nothing(moment: Scalar | Axes) -> bool:
+    return all(is_zero(c) for v in moment for c in v) if isinstance(moment, tuple) else is_zero(moment)
+
+
+def turned_tensor(tensor: Axes, turn: NodeTurn) -> Axes:
+    """Return a tensor given in the axes of a node in those of its body: ``C J C^T``."""
+    assert isinstance(turn, tuple)
+    back = transposed(turn)
+    columns = [from_axes(turn, from_axes(tensor, column)) for column in back]
+    return columns[0], columns[1], columns[2]
 
 
 def _merge(shares: Sequence[RigidMass]) -> RigidMass:
@@ -117,19 +156,41 @@ def _merge(shares: Sequence[RigidMass]) -> RigidMass:
     parts = tuple(path for one in shares for path in one.parts)
     mass = _total([one.mass for one in shares])
     if all(_same(one.center, shares[0].center) for one in shares):
-        return RigidMass(mass, shares[0].center, _total([one.moment for one in shares]), parts)
+        return RigidMass(mass, shares[0].center, _total_moment([one.moment for one in shares]), parts)
     massive = [one for one in shares if not is_zero(one.mass)]
     if not massive:
-        return RigidMass(mass, shares[0].center, _total([one.moment for one in shares]), parts)
+        return RigidMass(mass, shares[0].center, _total_moment([one.moment for one in shares]), parts)
     center = massive[0].center * massive[0].mass
     for one in massive[1:]:
         center = center + one.center * one.mass
     center = center / mass
-    moments = []
-    for one in shares:
-        r = one.center - center
-        moments.append(one.moment + one.mass * (r.x * r.x + r.z * r.z))
-    return RigidMass(mass, center, _total(moments), parts)
+    moments = [_shifted(one.moment, one.mass, one.center - center) for one in shares]
+    return RigidMass(mass, center, _total_moment(moments), parts)
+
+
+def _shifted(moment: Scalar | Axes, mass: Scalar, r: Vector) -> Scalar | Axes:
+    """Return a moment or tensor about a point at a distance from the centre of mass: ``J + m (r^2 1 - r r)``."""
+    if not isinstance(moment, tuple):
+        return moment + mass * (r.x * r.x + r.z * r.z)
+    square = dot(r, r)
+    units = (Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0))
+    x, y, z = (moment[i] + (units[i] * square - r * r[i]) * mass for i in range(3))
+    return x, y, z
+
+
+def _total_moment(moments: Sequence[Scalar | Axes]) -> Scalar | Axes:
+    if not isinstance(moments[0], tuple):
+        return _total(moments)
+    x, y, z = (sum_vectors([one[i] for one in moments if isinstance(one, tuple)]) for i in range(3))
+    return x, y, z
+
+
+def sum_vectors(vectors: Sequence[Vector]) -> Vector:
+    """Return the sum of some vectors."""
+    total = vectors[0]
+    for vector in vectors[1:]:
+        total = total + vector
+    return total
 
 
 def _total(values: Sequence[Scalar]) -> Scalar:

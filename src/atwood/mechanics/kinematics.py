@@ -6,13 +6,15 @@ One recursion gives positions and orientations; velocities and accelerations are
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute
+from atwood.mechanics.orientation import NodeTurn, rotate
 from atwood.model.local import LocalPart
-from atwood.model.space import FIXED_AXES, Space, planar_axes
+from atwood.model.rotation import Axes
+from atwood.model.space import Space
 from atwood.model.vector import Vector
-from atwood.topology.bodies import Bodies, Body, RigidStep
+from atwood.topology.bodies import Bodies, Body
 from atwood.topology.forest import Attachment, Forest
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
 
@@ -30,13 +32,13 @@ class BodyShape:
     offsets
         Position of each node, in the axes of the body.
     turns
-        Rotation of each node from the body, rad.
+        Rotation of each node from the body: an angle in the plane, rad; in space its axes in those of the body.
     reference
         The point that a free body's coordinates are taken at: its centre of mass, or its root.
     """
 
     offsets: Mapping[int, Vector]
-    turns: Mapping[int, Scalar]
+    turns: Mapping[int, NodeTurn]
     reference: Vector
 
 
@@ -49,17 +51,21 @@ class Placements:
     positions
         Free position components of each node.
     angles
-        Angle of each body that has an orientation.
+        In a plane: angle of each body that has an orientation.
     references
         Free position components of the reference point of each body.
     joint_coordinates
         Value of each joint coordinate symbol of a joint that a body hangs on.
+    axes, quaternions
+        In space: axes of each body that has an orientation, in world axes; and its quaternion, scalar part first.
     """
 
     positions: Mapping[int, Components]
     angles: Mapping[int, Expression]
     references: Mapping[int, Components]
     joint_coordinates: Mapping[Expression, Expression]
+    axes: Mapping[int, Axes] = field(default_factory=dict)
+    quaternions: Mapping[int, Components] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -72,8 +78,9 @@ class Kinematics:
         Positions and orientations.
     velocities, accelerations
         Of the nodes.
-    angular_speeds, angular_accelerations
-        Of the bodies.
+    angular_velocities, angular_accelerations
+        Of the bodies that have an orientation: one component in a plane, counter-clockwise; three in space, in the
+        axes of the body.
     reference_velocities, reference_accelerations
         Of the reference points.
     """
@@ -81,58 +88,33 @@ class Kinematics:
     placements: Placements
     velocities: Mapping[int, Components]
     accelerations: Mapping[int, Components]
-    angular_speeds: Mapping[int, Expression]
-    angular_accelerations: Mapping[int, Expression]
+    angular_velocities: Mapping[int, Components]
+    angular_accelerations: Mapping[int, Components]
     reference_velocities: Mapping[int, Components]
     reference_accelerations: Mapping[int, Components]
 
 
-def shapes(bodies: Bodies, references: Mapping[int, Vector], space: Space) -> dict[int, BodyShape]:
+def shapes(
+    bodies: Bodies,
+    layouts: Mapping[int, tuple[Mapping[int, Vector], Mapping[int, NodeTurn]]],
+    references: Mapping[int, Vector],
+) -> dict[int, BodyShape]:
     """Return the shape of every body.
 
     Parameters
     ----------
     bodies
         The bodies.
+    layouts
+        Offset and turn of each node in each body.
     references
         Reference point of each body in its own axes; the root where it is not given.
-    space
-        What the scene lives in.
     """
     found = {}
     for body in bodies.bodies:
-        offsets, turns = body_offsets(body, space)
+        offsets, turns = layouts[body.index]
         found[body.index] = BodyShape(offsets, turns, references.get(body.index, offsets[body.root]))
     return found
-
-
-def body_offsets(body: Body, space: Space) -> tuple[dict[int, Vector], dict[int, Scalar]]:
-    """Return offset and turn of each node in the axes of a body."""
-    offsets: dict[int, Vector] = {body.root: Vector(0.0, 0.0, 0.0)}
-    turns: dict[int, Scalar] = {body.root: 0.0}
-    for step in body.steps:
-        offsets[step.child], turns[step.child] = _rigid_step(step, offsets[step.parent], turns[step.parent], space)
-    return offsets, turns
-
-
-def _rigid_step(step: RigidStep, offset: Vector, turn: Scalar, space: Space) -> tuple[Vector, Scalar]:
-    placement = step.joint.local.placement
-    rotation = 0.0 if placement.rotation is None else placement.rotation
-    child_turn = turn - rotation if step.backwards else turn + rotation
-    turn_of_a = child_turn if step.backwards else turn
-    shift = placement.displacement
-    if placement.axes == "a" and space.has_rotation:
-        shift = rotate(shift, turn_of_a)
-    return (offset - shift if step.backwards else offset + shift), child_turn
-
-
-def rotate(vector: Vector, angle: Scalar) -> Vector:
-    """Return a vector turned by an angle in the plane, counter-clockwise as seen on the page."""
-    if angle.is_zero if isinstance(angle, Expression) else angle == 0.0:
-        return vector
-    x_axis, y_axis, z_axis = planar_axes(angle)
-    turned: Vector = x_axis * vector.x + y_axis * vector.y + z_axis * vector.z
-    return turned
 
 
 def place(
@@ -281,11 +263,11 @@ def differentiate(
     rates = jvp(flat, first)
     second = jvp(rates, {**first, **dict(zip(speeds, accelerations, strict=True))})
 
-    def split(values: list[Expression]) -> tuple[dict[int, Components], dict[int, Expression], dict[int, Components]]:
+    def split(values: list[Expression]) -> tuple[dict[int, Components], dict[int, Components], dict[int, Components]]:
         it = iter(values)
         return (
             {i: tuple(next(it) for _ in p) for i, p in nodes.items()},
-            {i: next(it) for i in bodies},
+            {i: (next(it),) for i in bodies},
             {i: tuple(next(it) for _ in p) for i, p in references.items()},
         )
 
@@ -329,24 +311,3 @@ def lifted_accelerations(
     values = iter(substitute(second, dict.fromkeys([*origin, *drift], 0.0)))
     nodes = {i: tuple(next(values) for _ in p) for i, p in placements.positions.items()}
     return nodes, {i: tuple(next(values) for _ in p) for i, p in placements.references.items()}
-
-
-def arm_of(placements: Placements, body: int, turn: Scalar, vector: Vector, space: Space) -> tuple[Scalar, ...]:
-    """Return the free components, in world axes, of a vector that is given in the axes of a node.
-
-    Parameters
-    ----------
-    placements
-        Positions and orientations.
-    body
-        The body of the node; without an orientation its axes are the world's.
-    turn
-        Rotation of the node from its body, rad.
-    vector
-        The vector.
-    space
-        What the scene lives in.
-    """
-    angle = placements.angles.get(body)
-    axes = FIXED_AXES if angle is None else planar_axes(angle + turn)
-    return space.components(axes[0] * vector.x + axes[1] * vector.y + axes[2] * vector.z)

@@ -7,15 +7,19 @@ from dataclasses import dataclass
 
 from atwood.errors import DeclarationError
 from atwood.expr import Expression, Scalar, substitute
+from atwood.mechanics.arms import arm_of
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.forces import local_map
-from atwood.mechanics.kinematics import arm_of
+from atwood.mechanics.inertia import tensor_of, turned_tensor
+from atwood.mechanics.orientation import NodeTurn, node_axes, spin_in_world
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, Motion
+from atwood.model.laws import BodyInertia
 from atwood.model.local import LocalPart
-from atwood.model.space import FIXED_AXES, planar_axes
-from atwood.model.vector import Vector
+from atwood.model.rotation import from_axes
+from atwood.model.space import FIXED_AXES
+from atwood.model.vector import Vector, dot
 
 __all__ = ["Observable", "Reaction", "energies", "list_reactions", "observe"]
 
@@ -65,7 +69,8 @@ class Reaction:
     sign
         It is `sign` times the multiplier of that constraint.
     axis
-        For a rigid joint: 0, 1, 2 for a force component, 3 for the torque; -1 otherwise.
+        For a rigid joint: 0, 1, 2 for a force component, 3 for the torque in a plane, 3, 4, 5 for its components in
+        space; -1 otherwise.
     """
 
     path: str
@@ -104,10 +109,13 @@ def list_reactions(mechanism: Mechanism) -> tuple[Reaction, ...]:
                 full, doc = f"{path}.force.{'xyz'[axis]}", f"Force {options.reaction_doc}, in world axes."
                 symbol = graph.symbol(f"reaction:{full}")
                 found.append(Reaction(full, "N", doc, symbol, (path, joint.law.name, -1), 1.0, axis))
-            if mechanism.space.name == "plane":
-                full, doc = f"{path}.torque", f"Torque {options.reaction_doc}, counter-clockwise."
+            turning = {"plane": ("",), "space": (".x", ".y", ".z")}.get(mechanism.space.name, ())
+            about = "counter-clockwise" if mechanism.space.name == "plane" else "in world axes"
+            for number, axis_name in enumerate(turning):
+                full, doc = f"{path}.torque{axis_name}", f"Torque {options.reaction_doc}, {about}."
                 symbol = graph.symbol(f"reaction:{full}")
-                found.append(Reaction(full, "N*m", doc, symbol, (path, joint.law.name, -1), 1.0, 3))
+                key = (path, joint.law.name, -1)
+                found.append(Reaction(full, "N*m", doc, symbol, key, 1.0, 3 + number))
     return tuple(found)
 
 
@@ -234,17 +242,20 @@ def _turned(mechanism: Mechanism, equations: Equations, motion: Motion, node: in
     if not mechanism.space.has_rotation:
         still = Vector(0.0, 0.0, 0.0)
         return Motion(motion.position, motion.velocity, motion.acceleration, FIXED_AXES, 0.0, still, still)
-    if body not in kinematics.placements.angles:
+    placements = kinematics.placements
+    turn, angle = equations.site.node_turns[node], placements.angles.get(body)
+    axes = node_axes(angle, placements.axes.get(body), turn)
+    if axes is None:
         return motion
-    angle = kinematics.placements.angles[body] + equations.site.node_turns[node]
+    body_axes = placements.axes.get(body)
     return Motion(
         motion.position,
         motion.velocity,
         motion.acceleration,
-        planar_axes(angle),
-        angle,
-        Vector(0.0, -kinematics.angular_speeds[body], 0.0),
-        Vector(0.0, -kinematics.angular_accelerations[body], 0.0),
+        axes,
+        None if angle is None else angle + turn,
+        spin_in_world(kinematics.angular_velocities[body], body_axes),
+        spin_in_world(kinematics.angular_accelerations[body], body_axes),
     )
 
 
@@ -269,18 +280,24 @@ def part_energies(
     for body in local.body_inertias:
         node = site.node(path, body.frame.name)
         index = site.bodies.body_of[node]
-        arm = arm_of(kinematics.placements, index, site.node_turns[node], body.center_of_mass, space)
-        speed = kinematics.angular_speeds.get(index, graph.constant(0.0))
-        # In the plane the centre moves with the frame plus w x arm, w counter-clockwise.
-        swing = (-speed * arm[1], speed * arm[0]) if space.name == "plane" else (0.0,) * len(pull)
+        turn = site.node_turns[node]
+        arm = arm_of(kinematics, index, turn, body.center_of_mass, space)
         for k, g in enumerate(pull):
-            v = kinematics.velocities[node][k] + swing[k]
+            v = kinematics.velocities[node][k] + arm.velocity[k]
             kinetic = kinetic + 0.5 * (body.mass * (v * v))
-            potential = potential - body.mass * (g * (kinematics.placements.positions[node][k] + arm[k]))
-        kinetic = kinetic + 0.5 * (body.moment * (speed * speed))
+            potential = potential - body.mass * (g * (kinematics.placements.positions[node][k] + arm.position[k]))
+        kinetic = kinetic + _energy_of_turning(path, body, turn, kinematics.angular_velocities.get(index, ()))
     for value in local.potentials:
         potential = potential + substitute([value], mapping)[0]
     return graph.convert(kinetic), graph.convert(potential)
+
+
+def _energy_of_turning(path: str, body: BodyInertia, turn: NodeTurn, spin: Sequence[Expression]) -> Scalar:
+    """Return ``1/2 omega . J omega`` (Goldstein, section 5.3)."""
+    if len(spin) == 3:
+        omega = Vector(*spin)
+        return 0.5 * dot(omega, from_axes(turned_tensor(tensor_of(path, body), turn), omega))
+    return 0.5 * (body.moment * (spin[0] * spin[0])) if spin else 0.0
 
 
 def energies(mechanism: Mechanism, equations: Equations) -> tuple[Expression, Expression]:

@@ -31,13 +31,13 @@ def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
     total = graph.constant(0.0)
     for local in mechanism.locals_.values():
         mapping = {**local_map(equations.site, local, kinematics), **signals}
-        part_forces(equations.site, replace(local, potentials=()), mapping, forces)
+        part_forces(equations.site, replace(local, potentials=()), kinematics, mapping, forces)
         for slope in jvp(list(local.potentials), {mechanism.time: 1.0}) if local.potentials else ():
             total = total + substitute([slope], mapping)[0]
     for node, force in forces.on_nodes.items():
         for f, v in zip(force, kinematics.velocities[node], strict=True):
             total = total + f * v
     for body, torque in forces.on_bodies.items():
-        if body in kinematics.angular_speeds:
-            total = total + torque * kinematics.angular_speeds[body]
+        for c, w in zip(torque, kinematics.angular_velocities.get(body, ()), strict=False):
+            total = total + c * w
     return total

@@ -10,12 +10,16 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar
+from atwood.mechanics.arms import arm_of
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.forces import Forces, constraint_forces, local_map, part_forces
-from atwood.mechanics.kinematics import arm_of
+from atwood.mechanics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.observables import Reaction
-from atwood.model.vector import Vector
+from atwood.mechanics.orientation import inertial_torque, spin_in_world, torque_components
+from atwood.model.laws import BodyInertia
+from atwood.model.space import Space
+from atwood.model.vector import Vector, cross
 from atwood.topology.bodies import Body
 from atwood.topology.graph import Joint
 
@@ -50,7 +54,7 @@ def release_program(
     loads = _all_forces(mechanism, equations)
     expressions: list[Expression] = []
     rows: dict[str, int] = {}
-    cache: dict[tuple[str, str, int], tuple[list[Scalar], Scalar] | None] = {}
+    cache: dict[tuple[str, str, int], tuple[Vector, Vector] | None] = {}
     for reaction in wanted:
         if reaction.key not in cache:
             cache[reaction.key] = _through(mechanism, equations, loads, reaction)
@@ -58,7 +62,7 @@ def release_program(
         if passed is None:
             continue
         force, torque = passed
-        value = torque if reaction.axis == 3 else mechanism.space.vector(tuple(force))[reaction.axis]
+        value = force[reaction.axis] if reaction.axis < 3 else _counted(torque, reaction.axis - 3, mechanism.space)
         rows[reaction.path] = len(expressions)
         expressions.append(equations.graph.convert(value))
     groups = (
@@ -72,6 +76,11 @@ def release_program(
     return Release(program, rows)
 
 
+def _counted(torque_W: Vector, axis: int, space: Space) -> Scalar:
+    """Return a component of a torque as it is reported: counter-clockwise in a plane, in world axes in space."""
+    return torque_W[axis] if space.name == "space" else -torque_W.y
+
+
 def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:
     """Return inertia less all other forces, with the sign reversed, node by node."""
     graph, kinematics, site = equations.graph, equations.kinematics, equations.site
@@ -83,7 +92,7 @@ def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:
     pull = mechanism.space.components(mechanism.gravity)
     for path, local in mechanism.locals_.items():
         mapping = {**local_map(site, local, kinematics), **signals}
-        part_forces(site, local, mapping, forces)
+        part_forces(site, local, kinematics, mapping, forces)
         for constraint in local.constraints:
             for law, index, multiplier in by_part.get(path, ()):
                 if (law, index) == (constraint.law.name, constraint.index):
@@ -97,61 +106,56 @@ def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:
                     push = [p - inertia.masses[i][j] * (a - g) for p, (a, g) in zip(push, lifted, strict=True)]
                 forces.push(node, push)
         for body in local.body_inertias:
-            node = site.node(path, body.frame.name)
-            _push_body(mechanism, equations, forces, node, body.mass, body.center_of_mass, body.moment)
+            _push_body(mechanism, equations, forces, path, body)
     return forces
 
 
-def _push_body(
-    mechanism: Mechanism,
-    equations: Equations,
-    forces: Forces,
-    node: int,
-    mass: Scalar,
-    center: Vector,
-    moment: Scalar,
-) -> None:
+def _push_body(mechanism: Mechanism, equations: Equations, forces: Forces, path: str, body: BodyInertia) -> None:
     """Add the inertial force of a rigid body, taken to its frame's node."""
-    kinematics, space = equations.kinematics, mechanism.space
-    index = equations.site.bodies.body_of[node]
-    arm = arm_of(kinematics.placements, index, equations.site.node_turns[node], center, space)
+    kinematics, space, site = equations.kinematics, mechanism.space, equations.site
+    node = site.node(path, body.frame.name)
+    index, turn = site.bodies.body_of[node], site.node_turns[node]
+    arm = arm_of(kinematics, index, turn, body.center_of_mass, space)
     pull = space.components(mechanism.gravity)
-    acceleration = list(kinematics.accelerations[node])
-    turning: Scalar = 0.0
-    if space.name == "plane" and index in kinematics.angular_speeds:
-        w, turning = kinematics.angular_speeds[index], kinematics.angular_accelerations[index]
-        acceleration = [
-            acceleration[0] - turning * arm[1] - w * w * arm[0],
-            acceleration[1] + turning * arm[0] - w * w * arm[1],
-        ]
-    force = [-mass * (a - g) for a, g in zip(acceleration, pull, strict=True)]
+    accelerations = zip(kinematics.accelerations[node], arm.acceleration, pull, strict=True)
+    force = [-body.mass * (a + swing - g) for a, swing, g in accelerations]
     forces.push(node, force)
-    if space.name == "plane":
-        forces.twist(index, arm[0] * force[1] - arm[1] * force[0] - moment * turning, node)
+    if not space.has_rotation:
+        return
+    about_node = torque_components(
+        cross(space.vector(arm.position), space.vector(tuple(force))), kinematics.placements.axes.get(index), space
+    )
+    spins = kinematics.angular_velocities.get(index), kinematics.angular_accelerations.get(index)
+    if spins[0] is None or spins[1] is None:
+        forces.twist(index, about_node, node)
+        return
+    moment = turned_tensor(tensor_of(path, body), turn) if space.name == "space" else body.moment
+    turning = inertial_torque(moment, spins[0], spins[1])
+    forces.twist(index, [t - i for t, i in zip(about_node, turning, strict=True)], node)
 
 
 def _through(
     mechanism: Mechanism, equations: Equations, forces: Forces, reaction: Reaction
-) -> tuple[list[Scalar], Scalar] | None:
-    """Return the force and torque that a rigid joint exerts on its b side; None where it is not unique."""
+) -> tuple[Vector, Vector] | None:
+    """Return the force and torque, in world axes, that a rigid joint exerts on its b side; None if not unique."""
     part, law, _ = reaction.key
     joint = next(j for j in mechanism.graph.joints if j.part == part and j.local.law.name == law)
     body = mechanism.bodies.bodies[mechanism.bodies.body_of[joint.b]]
     far = _far_side(body, joint)
     if far is None:
         return None
-    zero = equations.graph.constant(0.0)
-    total: list[Scalar] = [zero for _ in mechanism.space.basis]
-    torque: Scalar = zero
-    positions = equations.kinematics.placements.positions
+    space, positions = mechanism.space, equations.kinematics.placements.positions
+    axes = equations.kinematics.placements.axes.get(body.index)
+    total, torque = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
     for node in far:
         push = forces.on_nodes.get(node)
         if push is not None:
-            total = [t - f for t, f in zip(total, push, strict=True)]
-            if mechanism.space.name == "plane":
-                arm = [p - o for p, o in zip(positions[node], positions[joint.b], strict=True)]
-                torque = torque - (arm[0] * push[1] - arm[1] * push[0])
-        torque = torque - forces.at_nodes.get(node, zero)
+            force_W = space.vector(tuple(push))
+            total = total - force_W
+            arm = [p - o for p, o in zip(positions[node], positions[joint.b], strict=True)]
+            torque = torque - cross(space.vector(tuple(arm)), force_W)
+        if node in forces.at_nodes:
+            torque = torque - spin_in_world(forces.at_nodes[node], axes)
     return total, torque
 
 

@@ -166,7 +166,8 @@ def spin_through(turn_: Turn, rate: Scalar, spin: Vector) -> Vector:
     spin
         Angular velocity before the turn, in the axes before it.
     """
-    return to_axes(turn_.axes(), spin) + turn_.axis * rate
+    found: Vector = to_axes(turn_.axes(), spin) + turn_.axis * rate
+    return found
 
 
 def spin_rate_through(turn_: Turn, rate: Scalar, second: Scalar, spin: Vector, spin_rate: Vector) -> Vector:
@@ -175,7 +176,8 @@ def spin_rate_through(turn_: Turn, rate: Scalar, second: Scalar, spin: Vector, s
     With T the turn and n its axis: ``T^T alpha + n theta'' + (T^T omega) x n theta'``.
     """
     axes = turn_.axes()
-    return to_axes(axes, spin_rate) + turn_.axis * second + cross(to_axes(axes, spin), turn_.axis * rate)
+    found: Vector = to_axes(axes, spin_rate) + turn_.axis * second + cross(to_axes(axes, spin), turn_.axis * rate)
+    return found
 
 
 def _number(value: Scalar) -> float | None:

@@ -203,7 +203,7 @@ def _joint(path: str, local: LocalPart, joint: LocalJoint, node_of: Mapping[tupl
     shifts = list(placement.displacement)
     moves = tuple(q for q in joint.coordinates if any(isinstance(s, Expression) and depends_on(s, [q]) for s in shifts))
     rotation = placement.rotation
-    angles = [one.angle for one in rotation.turns] if isinstance(rotation, Rotation) else [rotation]
-    angles = [angle for angle in angles if isinstance(angle, Expression)]
+    found = [one.angle for one in rotation.turns] if isinstance(rotation, Rotation) else [rotation]
+    angles = [angle for angle in found if isinstance(angle, Expression)]
     turns = tuple(q for q in joint.coordinates if any(depends_on(angle, [q]) for angle in angles))
     return Joint(path, ends[0], ends[1], joint, moves, turns)
