@@ -67,6 +67,7 @@ from atwood.model.laws import (
     observable,
     potential,
 )
+from atwood.model.rotation import FREE, Rotation, turn
 from atwood.model.scene import Scene
 from atwood.model.vector import Vector, as_vector, cross, dot, norm
 
@@ -95,6 +96,7 @@ __all__ = [
     "Expression",
     "ExternalFunction",
     "Formula",
+    "FREE",
     "Frame",
     "Groove",
     "KernelEvaluationError",
@@ -107,6 +109,7 @@ __all__ = [
     "PointInertia",
     "Result",
     "ResultError",
+    "Rotation",
     "SavedResult",
     "Scalar",
     "Scene",
@@ -170,6 +173,7 @@ __all__ = [
     "tan",
     "tanh",
     "to_data",
+    "turn",
 ]
 
 _LATER = {

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from atwood.errors import StartError, UnsupportedError, UsageError, suggestion
+from atwood.errors import StartError, UsageError, suggestion
 from atwood.expr import Graph
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import LEVELS
@@ -131,13 +131,6 @@ def read_mechanism(
         locals_ = localize(flat, space, time, table, modes, sides)
         network = build_graph(flat, locals_)
         bodies = find_bodies(network, locals_)
-    if space.name == "space" and bodies.oriented:
-        body = bodies.bodies[min(bodies.oriented)]
-        raise UnsupportedError(
-            "rigid bodies in space are not available yet",
-            where=body.name,
-            advice="Use points, rods, ropes and springs in space, or the plane.",
-        )
     gravity = make_gravity(table, flat.gravity)
     mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links)
     check_closures(mechanism)

@@ -141,6 +141,11 @@ class Component:
         return self._binding().space == "line"
 
     @property
+    def in_space(self) -> bool:
+        """Whether the scene is in space; only within a law."""
+        return self._binding().space == "space"
+
+    @property
     def line(self) -> Vector:
         """Unit vector of the scene's line; only within a law of a scene on a line."""
         line = self._binding().line

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
 from atwood.errors import DeclarationError, UsageError
 from atwood.expr import Scalar
-from atwood.model.vector import Vector
+from atwood.model.vector import Vector, dot
 
 if TYPE_CHECKING:
     from atwood.model.component import Component
@@ -148,10 +148,19 @@ class Frame(Point):
         value: Vector = self._read("angular_acceleration")
         return value
 
+    @property
+    def axes(self) -> tuple[Vector, Vector, Vector]:
+        """Its x, y and z axes, in world axes."""
+        value: tuple[Vector, Vector, Vector] = self._read("axes")
+        return value
+
+    def to_frame(self, vector: Vector) -> Vector:
+        """Return, in the axes of this frame, a vector that is given in world axes."""
+        return Vector(*(dot(axis, vector) for axis in self.axes))
+
     def to_world(self, vector: Vector) -> Vector:
         """Return, in world axes, a vector that is given in the axes of this frame."""
-        axes: tuple[Vector, Vector, Vector] = self._read("axes")
-        x_axis, y_axis, z_axis = axes
+        x_axis, y_axis, z_axis = self.axes
         world: Vector = x_axis * vector.x + y_axis * vector.y + z_axis * vector.z
         return world
 
