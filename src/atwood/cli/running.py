@@ -115,7 +115,7 @@ def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
         **{key: data.pop(key) for key in ("scene", "form", "level")},
         "degrees_of_freedom": degrees_of_freedom(result),
         "coordinates": coordinates,
-        "speeds": [f"{name}'" for name in coordinates],
+        "speeds": [one.name for one in assembly.equations.speed_names],
         "multipliers": multiplier_labels(result),
         "states": result.run.segments[0].plan.program.size,
         "solver": data.pop("solver"),
@@ -137,7 +137,7 @@ def degrees_of_freedom(result: Result) -> int:
         The run.
     """
     plan = result.run.segments[0].plan
-    return len(plan.assembly.equations.names) - plan.finding.rank
+    return len(plan.assembly.equations.speeds) - plan.finding.rank
 
 
 def multiplier_labels(result: Result) -> list[str]:

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Literal
 from atwood.errors import AtwoodError
 from atwood.expr import (
     Expression,
-    InputGroup,
     OutputGroup,
     Program,
     collect,
@@ -30,6 +29,7 @@ from atwood.expr import (
     substitute,
 )
 from atwood.expr.collect import cost
+from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.mechanics.augmented import (
     Step,
     SymmetricSystem,
@@ -72,7 +72,8 @@ class AccelerationProgram:
     Attributes
     ----------
     program
-        Program of (t, q, u) with the accelerations.
+        Program of (t, q, u) with the accelerations; before them the rates of the coordinates, unless these are the
+        speeds.
     method
         How the balance of forces is solved.
     """
@@ -106,13 +107,11 @@ def acceleration_program(assembly: Assembly, method: Method | None = None) -> Ac
             best = price, name, found
     if best is None:
         return None
-    groups = (
-        InputGroup("t", (equations.time,)),
-        InputGroup("q", equations.coordinates),
-        InputGroup("u", equations.speeds),
-    )
+    groups = state_groups(equations)
     title = f"{assembly.flat.name} (accelerations)"
-    outputs = (OutputGroup("accelerations", tuple(best[2])),)
+    outputs: tuple[OutputGroup, ...] = (OutputGroup("accelerations", tuple(best[2])),)
+    if not rates_are_speeds(equations):
+        outputs = (OutputGroup("rates", equations.rates), *outputs)
     return AccelerationProgram(Program(title, groups, assembly.parameters, outputs), best[1])
 
 
@@ -130,7 +129,7 @@ def _waves(values: Sequence[Expression], in_pairs: bool = False) -> int:
 def _candidates(assembly: Assembly, method: Method | None) -> Iterator[tuple[Method, list[Expression]]]:
     """Yield the accelerations in the ways that apply."""
     equations = assembly.reduced
-    if not equations.coordinates:
+    if not equations.speeds:
         yield "mass matrix", []
         return
     tree: _Tree | None = None
@@ -184,7 +183,9 @@ def _is_tree(assembly: Assembly) -> bool:
         not reduced.eliminated
         and not reduced.forest.cuts
         and len(maximal.constraints) > 0
-        and len(reduced.coordinates) == len(maximal.coordinates) - len(maximal.constraints)
+        and rates_are_speeds(reduced)
+        and rates_are_speeds(maximal)
+        and len(reduced.speeds) == len(maximal.speeds) - len(maximal.constraints)
     )
 
 

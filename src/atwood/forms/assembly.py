@@ -14,7 +14,14 @@ from atwood.errors import ParameterError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.collect import collect
 from atwood.forms.dae import dae_form, keep_constraints
-from atwood.forms.program import BalanceProgram, FormProgram, balance_program, state_groups
+from atwood.forms.program import (
+    BalanceProgram,
+    FormProgram,
+    RatesProgram,
+    balance_program,
+    rates_program,
+    state_groups,
+)
 from atwood.forms.reduced import reduced_form
 from atwood.kernels import BoundKernel, compile_program
 from atwood.mechanics.build import Mechanism, build_equations
@@ -105,7 +112,12 @@ class Assembly:
 
     # -- programs -------------------------------------------------------------------------------------------------
 
-    def form_program(self, kept: Sequence[int] | None = None, dependent: Sequence[int] = ()) -> FormProgram:
+    def form_program(
+        self,
+        kept: Sequence[int] | None = None,
+        dependent: Sequence[int] = (),
+        dependent_speeds: Sequence[int] | None = None,
+    ) -> FormProgram:
         """Return the programs for the solver.
 
         Parameters
@@ -114,13 +126,16 @@ class Assembly:
             Numbers of the constraints that are independent; all when None.
         dependent
             Reduced form with loops: the coordinates that follow from the others.
+        dependent_speeds
+            The same for the speeds; those of the dependent coordinates when None.
         """
-        key = ("form", None if kept is None else tuple(kept), tuple(dependent))
+        speeds = None if dependent_speeds is None else tuple(dependent_speeds)
+        key = ("form", None if kept is None else tuple(kept), tuple(dependent), speeds)
         if key not in self._made:
             equations = self.equations if kept is None else keep_constraints(self.equations, kept)
             name = f"{self.flat.name} ({self.form})"
             if self.form == "reduced":
-                self._made[key] = reduced_form(name, equations, self.parameters, self.rows, dependent)
+                self._made[key] = reduced_form(name, equations, self.parameters, self.rows, dependent, speeds)
             else:
                 residual = partial(self._tidy, equations)
                 self._made[key] = dae_form(name, equations, self.parameters, self.level, residual)
@@ -134,6 +149,15 @@ class Assembly:
             equations = self.reduced if form == "reduced" else self.maximal
             self._made[key] = balance_program(f"{self.flat.name} ({form})", equations, self.parameters)
         made: BalanceProgram = self._made[key]
+        return made
+
+    def rates(self, form: FormName) -> RatesProgram:
+        """Return how the coordinates of either form move with its speeds."""
+        key = ("rates", form)
+        if key not in self._made:
+            equations = self.reduced if form == "reduced" else self.maximal
+            self._made[key] = rates_program(f"{self.flat.name} ({form})", equations, self.parameters)
+        made: RatesProgram = self._made[key]
         return made
 
     def kernel(self, program: Program, vectorized: bool = False) -> BoundKernel:
@@ -211,17 +235,20 @@ class Assembly:
     def to_maximal(self) -> Program:
         """The program of (t, q, u) of the reduced form that gives maximal coordinates and speeds."""
         reduced, forest = self.reduced, self.maximal.forest
-        count = len(forest.coordinates)
-        positions: list[Expression] = [reduced.graph.constant(0.0)] * count
-        speeds = list(positions)
+        positions: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.coordinates)
+        speeds: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.speeds)
         kinematics = reduced.kinematics
         for one in forest.attachments:
-            for k, number in enumerate(one.coordinates):
-                positions[number] = kinematics.placements.references[one.body][k]
-                speeds[number] = kinematics.reference_velocities[one.body][k]
+            for k, (coordinate, speed) in enumerate(zip(one.coordinates, one.speeds, strict=True)):
+                positions[coordinate] = kinematics.placements.references[one.body][k]
+                speeds[speed] = kinematics.reference_velocities[one.body][k]
+            for k, number in enumerate(one.chart):
+                positions[number] = kinematics.placements.quaternions[one.body][k]
+            for k, number in enumerate(one.spin):
+                speeds[number] = kinematics.angular_velocities[one.body][k]
         for turn in forest.orientations:
             if turn.coordinate is not None:
                 positions[turn.coordinate] = kinematics.placements.angles[turn.body]
-                speeds[turn.coordinate] = kinematics.angular_speeds[turn.body]
+                speeds[turn.coordinate] = kinematics.angular_velocities[turn.body][0]
         outputs = (OutputGroup("q", tuple(positions)), OutputGroup("u", tuple(speeds)))
         return Program(f"{self.flat.name} to maximal coordinates", state_groups(reduced), self.parameters, outputs)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, substitute
-from atwood.forms.program import FormProgram, Level, either_sign, make_form_program, rate_symbols
+from atwood.forms.program import FormProgram, Level, either_sign, kinematic_rows, make_form_program
 from atwood.mechanics.equations import Equations
 
 __all__ = ["LEVELS", "dae_form", "keep_constraints"]
@@ -49,24 +49,33 @@ def dae_form(
     """
     if level not in LEVELS:
         raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
-    rates = rate_symbols(equations)
     multipliers = equations.multipliers
-    kinematic: list[Expression] = [r - u for r, u in zip(rates, equations.speeds, strict=True)]
     dynamic = [r - f for r, f in zip(equations.rows, equations.constraint_rows, strict=True)]
     if not multipliers:
-        return make_form_program(name, "dae", "ggl", equations, parameters, tidy(kinematic + dynamic))
+        return make_form_program(name, "dae", "ggl", equations, parameters, tidy(kinematic_rows(equations) + dynamic))
     if level == "ggl":
-        extra = tuple(equations.graph.symbol(f"mu:{m.name}") for m in multipliers)
-        shift = substitute(list(equations.constraint_rows), dict(zip(multipliers, extra, strict=True)))
-        kinematic = [k + s for k, s in zip(kinematic, shift, strict=True)]
-        held = [one.value for one in equations.constraints] + [one.rate for one in equations.constraints]
+        kinematic, extra = _shifted(equations)
+        values = [one.value for one in equations.constraints if one.value is not None]
+        held = values + [one.rate for one in equations.constraints]
     else:
-        extra = ()
+        kinematic, extra = kinematic_rows(equations), ()
         held = [one.second for one in equations.constraints]
     held = [either_sign(one) for one in held]
     chosen: Level = "ggl" if level == "ggl" else ("index1" if level == "index1" else "index1-projected")
     residual = tidy(kinematic + dynamic + held)
     return make_form_program(name, "dae", chosen, equations, parameters, residual, multipliers, extra)
+
+
+def _shifted(equations: Equations) -> tuple[list[Expression], tuple[Expression, ...]]:
+    """Return the kinematic rows that keep positions on the constraints, and the multipliers that do so."""
+    symbols: dict[Expression, Expression] = {
+        one.multiplier: equations.graph.symbol(f"mu:{one.multiplier.name}")
+        if one.value is not None
+        else equations.graph.zero
+        for one in equations.constraints
+    }
+    shift = substitute(list(equations.constraint_rows), symbols)
+    return kinematic_rows(equations, shift=shift), tuple(s for s in symbols.values() if s.is_symbol)
 
 
 def keep_constraints(equations: Equations, kept: Sequence[int]) -> Equations:

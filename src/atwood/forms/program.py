@@ -12,14 +12,27 @@ from numpy.typing import NDArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, live, substitute
 from atwood.mechanics.equations import Equations
 
-__all__ = ["BalanceProgram", "FormProgram", "Level", "balance_program", "either_sign", "make_form_program"]
+__all__ = [
+    "BalanceProgram",
+    "FormProgram",
+    "Level",
+    "RatesProgram",
+    "balance_program",
+    "either_sign",
+    "kinematic_rows",
+    "make_form_program",
+    "rates_are_speeds",
+    "rates_program",
+    "state_groups",
+]
 
+FloatArray = NDArray[np.float64]
 Level = Literal["", "ggl", "index1", "index1-projected"]
 
 
 @dataclass(frozen=True)
 class FormProgram:
-    """The equations ``F(t, y, y') = 0`` of one form, with ``y = (q, u, multipliers)``.
+    """The equations ``F(t, y, y') = 0`` of one form, with ``y = (q, u, multipliers, extra)``.
 
     Attributes
     ----------
@@ -31,8 +44,8 @@ class FormProgram:
         Program of (t, y, yp, cj) with the entries of ``dF/dy + cj dF/dy'``.
     rows, columns
         Where these entries are, by column and then by row.
-    coordinates
-        Number of coordinates; there are as many speeds.
+    coordinates, speeds
+        Number of coordinates and of speeds.
     multipliers
         Number of multipliers of constraint forces.
     extra
@@ -50,6 +63,7 @@ class FormProgram:
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
     coordinates: int
+    speeds: int
     multipliers: int
     extra: int
     algebraic: tuple[int, ...]
@@ -58,7 +72,12 @@ class FormProgram:
     @property
     def size(self) -> int:
         """Length of y."""
-        return 2 * self.coordinates + self.multipliers + self.extra
+        return self.coordinates + self.speeds + self.multipliers + self.extra
+
+    def split(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return coordinates and speeds of a vector y, without copying."""
+        n = self.coordinates
+        return y[:n], y[n : n + self.speeds]
 
     @property
     def operations(self) -> dict[str, int]:
@@ -74,13 +93,16 @@ class BalanceProgram:
     ----------
     program
         Program of (t, q, u) with the entries of M, bias, the constraints' values, rates and gamma, the entries of G,
-        and the rates' part that is not linear in the speeds.
+        and the rates' part that is not linear in the speeds. M and G belong to the speeds. The value of a constraint
+        on velocities alone is zero.
     mass_rows, mass_columns, slope_rows, slope_columns
         Where the entries of M and G are.
-    size
-        Number of coordinates.
+    speeds
+        Number of speeds.
     constraints
         Number of constraints.
+    holonomic
+        Numbers of the constraints that hold positions.
     """
 
     program: Program
@@ -88,8 +110,33 @@ class BalanceProgram:
     mass_columns: NDArray[np.intp]
     slope_rows: NDArray[np.intp]
     slope_columns: NDArray[np.intp]
-    size: int
+    speeds: int
     constraints: int
+    holonomic: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class RatesProgram:
+    """How coordinates move with the speeds: ``q' = B(q, t) u + b(q, t)``.
+
+    Attributes
+    ----------
+    program
+        Program of (t, q, u) with the rates and the entries of B; None if the rates are the speeds.
+    rows, columns
+        Where the entries of B are.
+    coordinates, speeds
+        Number of coordinates and of speeds.
+    charts
+        Coordinates whose common factor means nothing, group by group.
+    """
+
+    program: Program | None
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    coordinates: int
+    speeds: int
+    charts: tuple[tuple[int, ...], ...]
 
 
 def state_groups(equations: Equations) -> tuple[InputGroup, ...]:
@@ -104,6 +151,40 @@ def state_groups(equations: Equations) -> tuple[InputGroup, ...]:
 def rate_symbols(equations: Equations) -> tuple[Expression, ...]:
     """Return the symbols of the coordinates' derivatives in y'."""
     return tuple(equations.graph.symbol(f"rate:{c.name}") for c in equations.names)
+
+
+def rates_are_speeds(equations: Equations) -> bool:
+    """Return whether the rate of every coordinate is the speed of the same number."""
+    return equations.rates == equations.speeds
+
+
+def kinematic_rows(
+    equations: Equations, chosen: Sequence[int] | None = None, shift: Sequence[Expression] | None = None
+) -> list[Expression]:
+    """Return the rows that say how coordinates move with the speeds.
+
+    Parameters
+    ----------
+    equations
+        The equations.
+    chosen
+        Numbers of the coordinates; all when None.
+    shift
+        For each speed, what is taken from it first.
+    """
+    symbols = rate_symbols(equations)
+    number = {speed: i for i, speed in enumerate(equations.speeds)}
+    rows = []
+    for i in range(len(symbols)) if chosen is None else chosen:
+        rate = equations.rates[i]
+        if shift is None:
+            rows.append(symbols[i] - rate)
+        elif rate in number:
+            rows.append(symbols[i] - rate + shift[number[rate]])
+        else:
+            less = {speed: speed - by for speed, by in zip(equations.speeds, shift, strict=True)}
+            rows.append(symbols[i] - substitute([rate], less)[0])
+    return rows
 
 
 def either_sign(row: Expression) -> Expression:
@@ -163,6 +244,7 @@ def make_form_program(
         np.asarray(entries.rows, dtype=np.intp),
         np.asarray(entries.columns, dtype=np.intp),
         len(equations.coordinates),
+        len(equations.speeds),
         len(multipliers),
         len(extra),
         tuple(i for i, rate in enumerate(yp) if rate not in appearing),
@@ -185,12 +267,13 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
     at_rest = dict.fromkeys(equations.accelerations, 0.0)
     mass = jacobian(list(equations.rows), list(equations.accelerations))
     rates = [one.rate for one in equations.constraints]
+    values = [one.value for one in equations.constraints]
     slope = jacobian(rates, list(equations.speeds))
     still = dict.fromkeys(equations.speeds, 0.0)
     outputs = (
         OutputGroup("mass", tuple(mass.entries)),
         OutputGroup("bias", tuple(substitute(list(equations.rows), at_rest))),
-        OutputGroup("value", tuple(one.value for one in equations.constraints)),
+        OutputGroup("value", tuple(equations.graph.zero if v is None else v for v in values)),
         OutputGroup("rate", tuple(rates)),
         OutputGroup("gamma", tuple(substitute([one.second for one in equations.constraints], at_rest))),
         OutputGroup("slope", tuple(slope.entries)),
@@ -203,6 +286,35 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
         np.asarray(mass.columns, dtype=np.intp),
         np.asarray(slope.rows, dtype=np.intp),
         np.asarray(slope.columns, dtype=np.intp),
-        len(equations.coordinates),
+        len(equations.speeds),
         len(equations.constraints),
+        tuple(i for i, one in enumerate(equations.constraints) if one.holonomic),
+    )
+
+
+def rates_program(name: str, equations: Equations, parameters: Collection[Expression]) -> RatesProgram:
+    """Return how the coordinates of a set of equations move with its speeds.
+
+    Parameters
+    ----------
+    name
+        Named in messages.
+    equations
+        The equations, of either form.
+    parameters
+        The symbols of parameters.
+    """
+    sizes = (len(equations.coordinates), len(equations.speeds))
+    charts = tuple(chart.coordinates for chart in equations.charts)
+    if rates_are_speeds(equations):
+        everyone = np.arange(sizes[0], dtype=np.intp)
+        return RatesProgram(None, everyone, everyone, *sizes, charts)
+    tangent = jacobian(list(equations.rates), list(equations.speeds))
+    outputs = (OutputGroup("rates", equations.rates), OutputGroup("tangent", tuple(tangent.entries)))
+    return RatesProgram(
+        Program(f"{name} rates", state_groups(equations), tuple(parameters), outputs),
+        np.asarray(tangent.rows, dtype=np.intp),
+        np.asarray(tangent.columns, dtype=np.intp),
+        *sizes,
+        charts,
     )

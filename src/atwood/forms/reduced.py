@@ -12,7 +12,7 @@ from collections.abc import Collection, Sequence
 import networkx as nx
 
 from atwood.expr import Expression, jacobian, solve
-from atwood.forms.program import FormProgram, either_sign, make_form_program, rate_symbols
+from atwood.forms.program import FormProgram, either_sign, kinematic_rows, make_form_program
 from atwood.mechanics.equations import Equations
 
 __all__ = ["reduced_form"]
@@ -24,6 +24,7 @@ def reduced_form(
     parameters: Collection[Expression],
     rows: Sequence[Expression],
     dependent: Sequence[int] = (),
+    dependent_speeds: Sequence[int] | None = None,
 ) -> FormProgram:
     """Return the reduced form of a scene.
 
@@ -38,23 +39,28 @@ def reduced_form(
     rows
         The equations' rows, perhaps rewritten.
     dependent
-        With loops: one coordinate for each constraint, chosen so that the constraints can be solved for them.
+        With loops: one coordinate for each constraint on positions, chosen so that these can be solved for them.
+    dependent_speeds
+        One speed for each constraint; those of the dependent coordinates when None.
     """
-    rates = rate_symbols(equations)
-    n = len(rates)
-    kinematic = [r - u for r, u in zip(rates, equations.speeds, strict=True)]
     if not equations.constraints:
-        return make_form_program(name, "reduced", "", equations, parameters, [*kinematic, *rows])
-    chosen = sorted(dependent)
-    independent = [i for i in range(n) if i not in set(chosen)]
-    projected = _project(equations, rows, chosen, independent)
+        residual = [*kinematic_rows(equations), *rows]
+        return make_form_program(name, "reduced", "", equations, parameters, residual)
+    independent = _others(equations.coordinates, dependent)
+    given = sorted(dependent if dependent_speeds is None else dependent_speeds)
+    projected = _project(equations, rows, given, _others(equations.speeds, given))
     residual = [
-        *(kinematic[i] for i in independent),
-        *(either_sign(one.value) for one in equations.constraints),
+        *kinematic_rows(equations, independent),
+        *(either_sign(one.value) for one in equations.constraints if one.value is not None),
         *projected,
         *(either_sign(one.rate) for one in equations.constraints),
     ]
     return make_form_program(name, "reduced", "", equations, parameters, residual, independent=independent)
+
+
+def _others(symbols: Sequence[Expression], chosen: Sequence[int]) -> list[int]:
+    """Return the numbers of the symbols that were not chosen."""
+    return [i for i in range(len(symbols)) if i not in set(chosen)]
 
 
 def _project(

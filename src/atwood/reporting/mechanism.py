@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood.forms.assembly import Assembly
 from atwood.model.composite import Model
@@ -26,7 +25,7 @@ from atwood.reporting.parts import (
     list_ties,
 )
 from atwood.solve.problem import Plan, make_plan
-from atwood.solve.start import Start, find_start
+from atwood.solve.start import Start, find_start, own_state
 
 __all__ = [
     "BodyEntry",
@@ -200,7 +199,7 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
         scene=given.flat.name,
         space=given.flat.space,
         gravity=given.flat.gravity,
-        degrees_of_freedom=len(names) - plans["reduced"].finding.rank,
+        degrees_of_freedom=len(reduced.reduced.speeds) - plans["reduced"].finding.rank,
         coordinates=tuple(names),
         eliminated=reduced.reduced.eliminated,
         dependent=tuple(names[i] for i in plans["reduced"].dependent),
@@ -226,21 +225,13 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
 
 def _plan(assembly: Assembly, start: Start) -> Plan:
     span = max(assembly.flat.t_end - start.time, 1e-3)
-    return make_plan(assembly, start.time, *_state(assembly, start), start.length, span)
-
-
-def _state(assembly: Assembly, start: Start) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the start in the coordinates of the form."""
-    if assembly.form == "reduced":
-        return start.coordinates, start.speeds
-    q, u = assembly.kernel(assembly.to_maximal)([start.time], start.coordinates, start.speeds)
-    return np.asarray(q, dtype=float), np.asarray(u, dtype=float)
+    return make_plan(assembly, start.time, *own_state(assembly, start), start.length, span)
 
 
 def _not_unique(assembly: Assembly, plan: Plan, start: Start) -> tuple[str, ...]:
     """Return the reactions that a stress without any force from outside could change."""
-    q, _ = _state(assembly, start)
-    slope = plan.balance.at(start.time, q, np.zeros_like(q)).slope * plan.sizes
+    q, u = own_state(assembly, start)
+    slope = plan.balance.at(start.time, q, np.zeros_like(u)).slope * plan.sizes
     sizes = np.maximum(np.max(np.abs(slope), axis=1), 1e-300)
     _, values, directions = np.linalg.svd((slope / sizes[:, None]).T)
     rank = int(np.sum(values > 1e-9 * values[0]))

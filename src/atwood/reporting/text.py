@@ -132,7 +132,8 @@ def _warnings(report: MechanismReport) -> Iterator[tuple[str, str]]:
         yield "singular start", "here constraints lose rank; the motion from this position is not unique"
     if report.repeated:
         yield "start", f"{shorten(report.repeated)} follows from the other start values"
-    free = [*report.free_coordinates, *(f"{name}'" for name in report.free_speeds)]
+    own = set(report.coordinates)
+    free = [*report.free_coordinates, *(f"{name}'" if name in own else name for name in report.free_speeds)]
     if free:
         yield "start", f"nothing fixes {shorten(free)}: guesses and zeros decide"
 

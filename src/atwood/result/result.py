@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import ResultError, suggestion
-from atwood.expr import depends_on
+from atwood.expr import depends_on, substitute
 from atwood.forms.assembly import Assembly
+from atwood.mechanics.equations import Constraint, Equations
 from atwood.mechanics.power import applied_power
 from atwood.model.quantities import Quantity
 from atwood.result.angles import unwrap
@@ -28,6 +29,13 @@ from atwood.solve.run import Run
 __all__ = ["Result"]
 
 FloatArray = NDArray[np.float64]
+
+
+def _moves_by_itself(equations: Equations, constraint: Constraint) -> bool:
+    """Return whether a constraint can put power into a scene: it moves with time."""
+    if constraint.value is not None:
+        return depends_on(constraint.value, [equations.time])
+    return not substitute([constraint.rate], dict.fromkeys(equations.speeds, 0.0))[0].is_zero
 
 
 class Result:
@@ -257,7 +265,7 @@ class Result:
         """Return the power that is put into the scene, or None if nothing can."""
         assembly = segment.assembly
         applied = applied_power(assembly.mechanism, assembly.equations)
-        moving = [one for one in assembly.maximal.constraints if depends_on(one.value, [assembly.mechanism.time])]
+        moving = [one for one in assembly.maximal.constraints if _moves_by_itself(assembly.maximal, one)]
         if applied.is_zero and not moving:
             return None
         total = np.zeros(len(segment.time))

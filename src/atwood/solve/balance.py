@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import SolveError
+from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.program import BalanceProgram
 from atwood.kernels import BoundKernel
+from atwood.solve.turning import Turning, turning_of
 
-__all__ = ["Balance", "BalanceValues"]
+__all__ = ["Balance", "BalanceValues", "balance_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -21,7 +23,7 @@ _RANK = 1e-9
 
 @dataclass(frozen=True)
 class BalanceValues:
-    """The balance ``M a + bias = G^T lambda``, ``G a + gamma = 0`` at one state."""
+    """The balance ``M a + bias = G^T lambda``, ``G a + gamma = 0`` at one state, along the speeds."""
 
     mass: FloatArray
     bias: FloatArray
@@ -41,10 +43,14 @@ class Balance:
         The program.
     kernel
         The same, ready to run on one state.
+    turning
+        How the coordinates move with the speeds.
     """
 
-    def __init__(self, program: BalanceProgram, kernel: BoundKernel) -> None:
-        self.program, self.kernel = program, kernel
+    def __init__(self, program: BalanceProgram, kernel: BoundKernel, turning: Turning) -> None:
+        self.program, self.kernel, self.turning = program, kernel, turning
+        self._all = len(program.holonomic) == program.constraints
+        self.holonomic = np.asarray(program.holonomic, dtype=np.intp)
 
     @property
     def constraints(self) -> int:
@@ -55,9 +61,9 @@ class Balance:
         """Return the balance at a state."""
         p = self.program
         mass, bias, value, rate, gamma, slope, drift = self.kernel([t], q, u)
-        matrix = np.zeros((p.size, p.size))
+        matrix = np.zeros((p.speeds, p.speeds))
         matrix[p.mass_rows, p.mass_columns] = mass
-        jacobian = np.zeros((p.constraints, p.size))
+        jacobian = np.zeros((p.constraints, p.speeds))
         if p.constraints:
             jacobian[p.slope_rows, p.slope_columns] = slope
         parts = (np.asarray(x, dtype=float) for x in (bias, value, rate, gamma))
@@ -88,34 +94,42 @@ class Balance:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the nearest state that fulfils the constraints on position and velocity.
 
+        Orientations come out with coordinates of size one.
+
         Parameters
         ----------
         t, q, u
             A state near the constraints.
         scales
-            Size of each coordinate; nearness is measured in these.
+            Size of a displacement along each speed; nearness is measured in these.
         iterations
             The largest number of Newton steps.
         """
+        q = self.turning.normalized(q)
         if not self.constraints:
             return q, u
-        q = q.copy()
         still = np.zeros_like(u)
         last = np.inf
-        for _ in range(iterations):
-            now = self.at(t, q, still)
-            rows = row_scales(now.slope, scales)
-            miss = float(np.max(np.abs(now.value / rows)))
+        for _ in range(iterations if len(self.holonomic) else 0):
+            slope, value = self.on_positions(self.at(t, q, still))
+            rows = row_scales(slope, scales)
+            miss = float(np.max(np.abs(value / rows)))
             if miss == 0.0 or (miss < 1e-11 and miss >= 0.5 * last):
                 break
             last = miss
-            q -= scales * least_norm(now.slope * scales / rows[:, None], now.value / rows)
+            q = self.turning.moved(t, q, -scales * least_norm(slope * scales / rows[:, None], value / rows))
         now = self.at(t, q, u)
         rows = row_scales(now.slope, scales)
         for _ in range(2):  # the second pass takes out the rounding of the first
             rate = now.slope @ u + now.drift
             u = u - scales * least_norm(now.slope * scales / rows[:, None], rate / rows)
         return q, u
+
+    def on_positions(self, now: BalanceValues) -> tuple[FloatArray, FloatArray]:
+        """Return slopes and values of the constraints that hold positions."""
+        if self._all:
+            return now.slope, now.value
+        return now.slope[self.holonomic], now.value[self.holonomic]
 
     def misses(self, t: float, q: FloatArray, u: FloatArray, scales: FloatArray) -> tuple[float, float]:
         """Return by how much a state misses the constraints on position and on velocity, relative to the scales."""
@@ -124,6 +138,12 @@ class Balance:
         now = self.at(t, q, u)
         rows = row_scales(now.slope, scales)
         return float(np.max(np.abs(now.value / rows))), float(np.max(np.abs(now.rate / rows)))
+
+
+def balance_of(assembly: Assembly, form: FormName) -> Balance:
+    """Return the balance of forces of a scene in the coordinates of either form."""
+    program = assembly.balance(form)
+    return Balance(program, assembly.kernel(program.program), turning_of(assembly, form))
 
 
 def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -> tuple[FloatArray, FloatArray]:
@@ -160,7 +180,7 @@ def _undetermined(t: float) -> SolveError:
 
 
 def row_scales(slope: FloatArray, scales: FloatArray) -> FloatArray:
-    """Return the size of each constraint: how much it changes when a coordinate changes by its scale."""
+    """Return the size of each constraint: how much it changes with a displacement of the size that counts."""
     rows: FloatArray = np.max(np.abs(slope * scales), axis=1, initial=0.0)
     rows[rows == 0.0] = 1.0
     return rows

@@ -37,8 +37,8 @@ def find_breaks(assembly: Assembly, start: float, end: float) -> FloatArray:
     if not conditions:
         return np.zeros((0, 2))
     equations = assembly.equations
-    n = len(equations.coordinates)
-    idle = (np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(len(assembly.reactions)))
+    n, m = len(equations.coordinates), len(equations.speeds)
+    idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
     kernel = assembly.kernel(assembly.state_program("switches", conditions), vectorized=True)
 
     def signs(times: FloatArray) -> FloatArray:

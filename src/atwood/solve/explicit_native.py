@@ -47,7 +47,8 @@ class CompiledAccelerations:
     Parameters
     ----------
     program
-        A program of (t, q, u) with one output group, the accelerations.
+        A program of (t, q, u) with the accelerations, and before them the rates of the coordinates unless these are
+        the speeds.
 
     Raises
     ------
@@ -59,8 +60,9 @@ class CompiledAccelerations:
         if any(node.operation == "external" for node in program.nodes):
             raise UnsupportedError("a program that calls functions in Python has no compiled rates", where=program.name)
         part = Part("kernel", program)
-        self.program, self.size = program, 2 * len(program.results)
-        more = _rates_code(len(program.results))
+        _, q, u = (len(group.symbols) for group in program.inputs)
+        self.program, self.size = program, q + u
+        more = _rates_code(q, u, given=len(program.outputs) == 2)
         self._built = build_code([part], default_options([part]), more=more, exports=["rates"])
         self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
 
@@ -231,25 +233,37 @@ def _functions() -> tuple[Callable[..., int], ...]:
     return tuple(ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items())
 
 
-def _rates_code(count: int) -> str:
-    """Return the function that gives ``(u, accelerations)`` from ``(q, u)``; its data: derived values and scratch."""
+def _rates_code(coordinates: int, speeds: int, given: bool) -> str:
+    """Return the function that gives ``(q', u')`` from ``(q, u)``; its data: derived values and scratch.
+
+    Parameters
+    ----------
+    coordinates, speeds
+        Their numbers.
+    given
+        Whether the kernel gives both, or ``q'`` is u.
+    """
+    copied = f"call void @llvm.memcpy.p0.p0.i64(ptr %yp, ptr %u, i64 {8 * speeds}, i1 false)"
+    written = """store ptr %yp, ptr %outputs
+  %behind = getelementptr ptr, ptr %outputs, i64 1
+  store ptr %a, ptr %behind"""
     return f"""define i32 @rates(double %t, ptr %y, ptr %yp, ptr %data) #0 {{
   %time = alloca double
   %inputs = alloca [3 x ptr]
-  %outputs = alloca ptr
+  %outputs = alloca [2 x ptr]
   store double %t, ptr %time
-  %u = getelementptr double, ptr %y, i64 {count}
-  %a = getelementptr double, ptr %yp, i64 {count}
+  %u = getelementptr double, ptr %y, i64 {coordinates}
+  %a = getelementptr double, ptr %yp, i64 {coordinates}
   %second = getelementptr ptr, ptr %inputs, i64 1
   %third = getelementptr ptr, ptr %inputs, i64 2
   store ptr %time, ptr %inputs
   store ptr %y, ptr %second
   store ptr %u, ptr %third
-  store ptr %a, ptr %outputs
+  {written if given else "store ptr %a, ptr %outputs"}
   %derived = load ptr, ptr %data
   %scratch.at = getelementptr ptr, ptr %data, i64 1
   %scratch = load ptr, ptr %scratch.at
-  call void @llvm.memcpy.p0.p0.i64(ptr %yp, ptr %u, i64 {8 * count}, i1 false)
+  {"" if given else copied}
   %code = call i32 @kernel(ptr %inputs, ptr %derived, ptr %scratch, ptr %outputs)
   ret i32 %code
 }}

@@ -36,16 +36,17 @@ def explicit_problem(
         None if the scene has no coordinates, or constraints are left among them.
     """
     program = found or acceleration_program(assembly)
-    n = len(assembly.reduced.coordinates)
+    n, m = len(assembly.reduced.coordinates), len(assembly.reduced.speeds)
     if program is None or n == 0:
         return None
     kernel = assembly.kernel(program.program)
 
     def rates(t: float, y: FloatArray) -> Sequence[float]:
-        return [*y[n:], *kernel([t], y[:n], y[n:])[0]]
+        found = kernel([t], y[:n], y[n:])
+        return [*(y[n:] if len(found) == 1 else found[0]), *found[-1]]
 
     return ExplicitProblem(
-        size=2 * n,
+        size=n + m,
         rates=rates,
         events=events,
         event_count=len(directions),

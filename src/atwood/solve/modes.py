@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import SolveError
-from atwood.expr import depends_on
+from atwood.expr import OutputGroup, Program, depends_on, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.watches import Watch, list_watches
-from atwood.solve.balance import Balance, least_norm
+from atwood.solve.balance import Balance, balance_of, least_norm
 from atwood.solve.reactions import ReactionSolver, maximal_state
-from atwood.solve.scales import Scales, coordinate_scales
+from atwood.solve.scales import Scales, motion_scales
 from atwood.solve.sides import actual_sides
+from atwood.solve.turning import resting_place, turning_of
 
 __all__ = ["EventProbe", "Happening", "enter_mode"]
 
@@ -117,8 +118,8 @@ class EventProbe:
         """Return the events as a function of the solver's vector; None if nothing is watched."""
         if not self.watches:
             return None
-        n = len(self.assembly.equations.coordinates)
-        return lambda t, y, yp: self.values(t, y[:n], y[n : 2 * n])
+        n, m = len(self.assembly.equations.coordinates), len(self.assembly.equations.speeds)
+        return lambda t, y, yp: self.values(t, y[:n], y[n : n + m])
 
     def broken_at_start(self, t: float) -> Happening | None:
         """Return the first event whose one-sided bound does not hold from the outset."""
@@ -181,12 +182,11 @@ def enter_mode(
     big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
     sides = actual_sides(assembly, t, q, u, assembly.form)
     after = reassemble({**assembly.modes, happening.part: happening.target}, sides)
-    sizes = coordinate_scales(after.maximal, length)
-    program = after.balance("dae")
-    balance = Balance(program, after.kernel(program.program))
+    sizes = motion_scales(after.maximal, length)
+    balance = balance_of(after, "dae")
     if happening.impact:
         met, _ = balance.project(t, big_q, big_u, sizes)
-        _check_in_place(happening, (met - big_q) / sizes)
+        _check_in_place(happening, balance.turning.difference(t, big_q, met) / sizes)
         big_u = _plastic_impact(after, balance, happening, t, met, big_u)
         big_q = met
     if after.form == "dae":
@@ -245,37 +245,34 @@ def _to_reduced(
     happening: Happening,
 ) -> tuple[FloatArray, FloatArray]:
     """Find the generalized coordinates of a mode that give the same maximal coordinates and speeds."""
-    from atwood.expr import InputGroup, OutputGroup, Program, jacobian
-
     equations, to_maximal = after.reduced, after.to_maximal
-    positions = list(to_maximal.outputs[0].expressions)
-    slope = jacobian(positions, list(equations.coordinates))
-    groups = (
-        InputGroup("t", (equations.time,)),
-        InputGroup("q", equations.coordinates),
-    )
-    outputs = (OutputGroup("values", tuple(positions)), OutputGroup("slopes", tuple(slope.entries)))
-    kernel = after.kernel(Program("change of mode", groups, after.parameters, outputs))
+    own_turning, turning = turning_of(after, "reduced"), turning_of(after, "dae")
+    # Speeds of bodies change with generalized speeds as their places do with displacements along these.
+    slope = jacobian(list(to_maximal.outputs[1].expressions), list(equations.speeds))
+    outputs = (*to_maximal.outputs, OutputGroup("slopes", tuple(slope.entries)))
+    kernel = after.kernel(Program("change of mode", to_maximal.inputs, after.parameters, outputs))
     names = tuple(c.name for c in equations.names)
     known = [name for name in names if name in before.observables]
-    q = np.zeros(len(names))
+    q, still = resting_place(equations), np.zeros(len(equations.speeds))
     if known:
         read = before.kernel(before.observer(tuple(known)))
         idle = [0.0] * len(before.reactions)
         values = read([t], *own, np.zeros_like(own[1]), idle)[0]
         for name, value in zip(known, values, strict=True):
             q[names.index(name)] = value
-    scales = coordinate_scales(after.maximal, length)
-    matrix = np.zeros((len(positions), len(names)))
+    q = own_turning.normalized(q)
+    scales = motion_scales(after.maximal, length)
+    matrix = np.zeros((len(scales), len(still)))
     for _ in range(30):
-        now, entries = kernel([t], q)
+        now, _, entries = kernel([t], q, still)
         matrix[slope.rows, slope.columns] = entries
-        miss = (maximal[0] - np.asarray(now)) / scales
+        miss = turning.difference(t, turning.normalized(np.asarray(now)), maximal[0]) / scales
         step = least_norm(matrix / scales[:, None], miss)
-        q = q + step
+        q = own_turning.moved(t, q, step)
         if float(np.max(np.abs(step), initial=0.0)) < 1e-14 * max(1.0, float(np.max(np.abs(q), initial=0.0))):
             break
     _check_in_place(happening, miss)
-    still = after.kernel(to_maximal)([t], q, np.zeros_like(q))[1]
-    u = least_norm(matrix / scales[:, None], (maximal[1] - np.asarray(still)) / scales)
+    _, drift, entries = kernel([t], q, still)
+    matrix[slope.rows, slope.columns] = entries
+    u = least_norm(matrix / scales[:, None], (maximal[1] - np.asarray(drift)) / scales)
     return q, u

@@ -12,10 +12,10 @@ from atwood.errors import KernelEvaluationError, SolveError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import FormProgram
 from atwood.kernels import BoundKernel
-from atwood.solve.balance import Balance, least_norm, row_scales, solve_balance
+from atwood.solve.balance import Balance, balance_of, least_norm, row_scales, solve_balance
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.solve.rank import RankFinding, choose_dependent, dependence, find_rank
-from atwood.solve.scales import Scales, coordinate_scales, find_scales
+from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_names, motion_scales
 
 __all__ = ["Plan", "make_plan", "pack_state"]
 
@@ -40,12 +40,14 @@ class Plan:
         The balance of forces in the coordinates of the form.
     finding
         Which of its constraints are independent.
-    scales, sizes
-        Sizes of the scene, and of each coordinate.
+    scales
+        Sizes of the scene.
+    sizes, coordinate_sizes
+        Size of a displacement along each speed, and of each coordinate.
     program
         The form's programs at present; with loops in the reduced form they change with the dependent coordinates.
-    dependent
-        The dependent coordinates at present.
+    dependent, dependent_speeds
+        The dependent coordinates and speeds at present.
     switches
         How often they changed.
     """
@@ -55,8 +57,10 @@ class Plan:
     finding: RankFinding
     scales: Scales
     sizes: FloatArray
+    coordinate_sizes: FloatArray
     program: FormProgram
     dependent: tuple[int, ...]
+    dependent_speeds: tuple[int, ...]
     switches: int = 0
     _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
     _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
@@ -82,16 +86,15 @@ class Plan:
 
     def review_dependent(self, t: float, q: FloatArray) -> bool:
         """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
-        if not self.dependent:
+        if not self.dependent_speeds:
             return False
-        now = self.balance.at(t, q, np.zeros_like(q))
-        slope = now.slope[list(self.finding.kept)]
-        better = choose_dependent(slope, self.sizes)
-        present = dependence(slope, self.sizes, self.dependent)
-        if better == self.dependent or present >= _POOR * dependence(slope, self.sizes, better):
+        finding = self.finding
+        coordinates, speeds = _choices(self.balance, finding, t, q, self.sizes, self.coordinate_sizes)
+        better = coordinates.better(self.dependent), speeds.better(self.dependent_speeds)
+        if better == (self.dependent, self.dependent_speeds):
             return False
-        self.dependent = better
-        self.program = self.assembly.form_program(_kept_or_none(self.finding), better)
+        self.dependent, self.dependent_speeds = better
+        self.program = self.assembly.form_program(_kept_or_none(finding), *better)
         self._kernels = None
         self.switches += 1
         return True
@@ -139,7 +142,7 @@ class Plan:
             return values
 
         def full_jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> FloatArray:
-            self._seen = (t, y[: self.program.coordinates].copy())
+            self._seen = (t, self.program.split(y)[0].copy())
             full = np.zeros(size * size)
             full[self.program.columns * size + self.program.rows] = self.kernels()[1]([t], y, yp, [cj])[0]
             return full
@@ -148,14 +151,14 @@ class Plan:
         return ImplicitProblem(
             size=size,
             residual=residual,
-            jacobian=full_jacobian if self.dependent else jacobian,
-            pattern=everywhere if self.dependent else (self.program.rows, self.program.columns),
+            jacobian=full_jacobian if self.dependent_speeds else jacobian,
+            pattern=everywhere if self.dependent_speeds else (self.program.rows, self.program.columns),
             algebraic=self.program.algebraic,
             events=events,
             event_count=len(directions),
             event_directions=directions,
             # Compiled functions cannot follow a change of the dependent coordinates.
-            native=None if self.dependent else self.compiled,
+            native=None if self.dependent_speeds else self.compiled,
         )
 
     def compiled(self, linear_solver: LinearSolver) -> NativeCallbacks:
@@ -188,16 +191,41 @@ class Plan:
 
     def tolerances(self, relative: float) -> FloatArray:
         """Return the absolute tolerance of each unknown; multipliers are kept out of the error test."""
-        n, program = self.program.coordinates, self.program
-        speeds = self.sizes / self.scales.time
-        loose = 1e3 * max(self.scales.force, 1.0)
-        return np.concatenate(
-            [
-                relative * self.sizes[:n],
-                relative * speeds[:n],
-                np.full(program.multipliers + program.extra, loose),
-            ]
-        )
+        program = self.program
+        loose = np.full(program.multipliers + program.extra, 1e3 * max(self.scales.force, 1.0))
+        return np.concatenate([relative * self.coordinate_sizes, relative * (self.sizes / self.scales.time), loose])
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """Derivatives of constraints, and the sizes of what they are derivatives by."""
+
+    slope: FloatArray
+    sizes: FloatArray
+
+    def best(self) -> tuple[int, ...]:
+        """Return what the constraints determine best."""
+        return choose_dependent(self.slope, self.sizes)
+
+    def better(self, present: tuple[int, ...]) -> tuple[int, ...]:
+        """Return what to go on with: what is there already, unless it has become a poor choice."""
+        best = self.best()
+        now = dependence(self.slope, self.sizes, present)
+        return present if best == present or now >= _POOR * dependence(self.slope, self.sizes, best) else best
+
+
+def _choices(
+    balance: Balance, finding: RankFinding, t: float, q: FloatArray, sizes: FloatArray, coordinate_sizes: FloatArray
+) -> tuple[_Choice, _Choice]:
+    """Return what dependent coordinates and dependent speeds are chosen by; the same if there is no difference."""
+    slope = balance.at(t, q, np.zeros_like(sizes)).slope
+    by_speeds = _Choice(slope[list(finding.kept)], sizes)
+    holding = [i for i in finding.kept if i in balance.program.holonomic]
+    if balance.turning.is_plain and len(holding) == len(finding.kept):
+        return by_speeds, by_speeds
+    # The size of an orientation's coordinates changes no constraint, so that slopes lie in the reach of the speeds.
+    by_coordinates = slope[holding] @ np.linalg.pinv(balance.turning.tangent(t, q))
+    return _Choice(by_coordinates, coordinate_sizes), by_speeds
 
 
 def _kept_or_none(finding: RankFinding) -> tuple[int, ...] | None:
@@ -224,9 +252,8 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
         If the forces do not determine the accelerations.
     """
     equations = assembly.equations
-    balance_program = assembly.balance(assembly.form)
-    balance = Balance(balance_program, assembly.kernel(balance_program.program))
-    sizes = coordinate_scales(equations, length)
+    balance = balance_of(assembly, assembly.form)
+    sizes, coordinate_sizes = motion_scales(equations, length), coordinate_scales(equations, length)
     finding = find_rank(balance, t, q, sizes)
     try:
         now = balance.at(t, q, u)
@@ -240,12 +267,15 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     _check_inertia(assembly, now.mass, slope, sizes)
     if finding.starts_singular:
         raise _singular_start(assembly, finding)
-    dependent = choose_dependent(slope, sizes) if assembly.form == "reduced" else ()
-    program = assembly.form_program(_kept_or_none(finding), dependent)
+    dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
+    if assembly.form == "reduced" and finding.kept:
+        coordinates, speeds = _choices(balance, finding, t, q, sizes, coordinate_sizes)
+        dependent = coordinates.best(), speeds.best()
+    program = assembly.form_program(_kept_or_none(finding), *dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = solve_balance(now, kept, t)
     scales = find_scales(assembly, length, u, accelerations, sizes, span)
-    return Plan(assembly, balance, finding, scales, sizes, program, dependent)
+    return Plan(assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent)
 
 
 def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
@@ -278,7 +308,8 @@ def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, size
     if values[0] > 1e-14 * max(values[-1], 1e-300):
         return
     moving = np.abs(vectors[:, 0] @ free)
-    names = [c.name for c, size in zip(assembly.equations.names, moving, strict=True) if size > 0.1 * np.max(moving)]
+    every = motion_names(assembly.equations)
+    names = [name for name, size in zip(every, moving, strict=True) if size > 0.1 * np.max(moving)]
     raise StartError(
         f"something without inertia is free to move along {', '.join(names)}: "
         "a force would accelerate it without bound",
@@ -299,5 +330,5 @@ def pack_state(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[Floa
     else:
         tail = []
     y = np.concatenate([q, u, *tail])
-    yp = np.concatenate([u, accelerations, *(np.zeros_like(x) for x in tail)])
+    yp = np.concatenate([plan.balance.turning.rates(t, q, u), accelerations, *(np.zeros_like(x) for x in tail)])
     return y, yp

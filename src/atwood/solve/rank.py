@@ -61,12 +61,12 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     t, q
         Time and position of the start.
     scales
-        Size of each coordinate.
+        Size of a displacement along each speed.
     """
     count = balance.constraints
     if count == 0:
         return RankFinding((), (), 0, 0)
-    still = np.zeros_like(q)
+    still = np.zeros_like(scales)
 
     def scaled(position: FloatArray) -> FloatArray:
         slope = balance.at(t, position, still).slope * scales
@@ -75,20 +75,21 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     at_start = independent_rows(scaled(q))
     best = at_start
     random = np.random.default_rng(20240229)
-    matrix = scaled(q)
+    # Constraints on velocities alone keep nothing from being reached.
+    matrix = scaled(q)[balance.holonomic]
     _, sizes, directions = np.linalg.svd(matrix)
-    rank = int(np.sum(sizes > 1e-7 * sizes[0]))
+    rank = int(np.sum(sizes > 1e-7 * np.max(sizes, initial=0.0)))
     admissible = directions[rank:]
     asked = 0
     for step in (1e-2, 3e-2, 3e-2):
         if not len(admissible):
             break
         along = random.standard_normal(len(admissible)) @ admissible
-        moved = q + step * scales * along / np.linalg.norm(along)
+        moved = balance.turning.moved(t, q, step * scales * along / np.linalg.norm(along))
         nearby, _ = balance.project(t, moved, still, scales)
         if balance.misses(t, nearby, still, scales)[0] > _ADMISSIBLE:
             # From a singular position, Newton's method falls back into it unless something holds it away.
-            held = np.where(np.arange(len(q)) == np.argmax(np.abs(along)), 0.0, scales)
+            held = np.where(np.arange(len(scales)) == np.argmax(np.abs(along)), 0.0, scales)
             nearby, _ = balance.project(t, moved, still, held, iterations=30)
             if balance.misses(t, nearby, still, scales)[0] > _ADMISSIBLE:
                 continue
@@ -105,14 +106,14 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
 
 
 def choose_dependent(slope: FloatArray, scales: FloatArray) -> tuple[int, ...]:
-    """Return the coordinates that the constraints determine best: pivoted elimination, largest entry first.
+    """Return the coordinates, or speeds, that constraints determine best: pivoted elimination, largest entry first.
 
     Parameters
     ----------
     slope
         Derivatives of independent constraints.
     scales
-        Size of each coordinate.
+        Size of each coordinate, or of a displacement along each speed.
     """
     from scipy.linalg import qr
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
 from atwood.mechanics.release import release_program
-from atwood.solve.balance import Balance
+from atwood.solve.balance import balance_of
 from atwood.solve.rank import find_rank
-from atwood.solve.scales import coordinate_scales, scene_length
+from atwood.solve.scales import motion_scales, scene_length
+from atwood.solve.turning import turning_of
 
 __all__ = ["ReactionSolver", "accelerations_and_multipliers", "maximal_state"]
 
@@ -29,7 +30,7 @@ def maximal_state(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArra
     if assembly.form == "dae":
         return q, u
     big_q, big_u = assembly.kernel(assembly.to_maximal, vectorized=True)(t[None, :], q, u)
-    return big_q, big_u
+    return turning_of(assembly, "dae").normalized(big_q), big_u
 
 
 def accelerations_and_multipliers(
@@ -53,7 +54,7 @@ def accelerations_and_multipliers(
         multipliers are those of least size.
     """
     program = assembly.balance(form)
-    n, m, samples = program.size, program.constraints, len(t)
+    n, m, samples = program.speeds, program.constraints, len(t)
     mass, bias, _, _, gamma, slope, drift = assembly.kernel(program.program, vectorized=True)(t[None, :], q, u)
     found_a, found_l = np.zeros((n, samples)), np.zeros((m, samples))
     size = n + len(kept)
@@ -104,10 +105,8 @@ class ReactionSolver:
     def __init__(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> None:
         self.assembly = assembly
         big_q, _ = maximal_state(assembly, np.array([t]), q[:, None], u[:, None])
-        program = assembly.balance("dae")
-        balance = Balance(program, assembly.kernel(program.program))
-        sizes = coordinate_scales(assembly.maximal, scene_length(assembly))
-        self.finding = find_rank(balance, t, big_q[:, 0], sizes)
+        sizes = motion_scales(assembly.maximal, scene_length(assembly))
+        self.finding = find_rank(balance_of(assembly, "dae"), t, big_q[:, 0], sizes)
         self.kept = np.asarray(self.finding.kept, dtype=np.intp)
         self._of_constraint = {one.key: i for i, one in enumerate(assembly.maximal.constraints)}
         self._release = release_program(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.parameters)

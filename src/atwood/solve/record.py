@@ -29,7 +29,8 @@ class Segment:
     time
         Sample times, shape (samples,).
     coordinates, speeds
-        Of the form, projected where the form has constraints; shape (number, samples).
+        Of the form, projected where the form has constraints, orientations with coordinates of size one; shape
+        (number, samples).
     shown
         Which samples are outputs.
     held
@@ -64,9 +65,9 @@ class Recorder:
     def take(self, t: float, y: FloatArray, shown: bool) -> tuple[FloatArray, FloatArray]:
         """Record a state of the solver, projected; return what was recorded."""
         plan = self.plan
-        n = plan.program.coordinates
-        q, u = y[:n].copy(), y[n : 2 * n].copy()
+        q, u = (part.copy() for part in plan.program.split(y))
         held = plan.balance.misses(t, q, u, plan.sizes)
+        q = plan.balance.turning.normalized(q)
         if plan.is_projected:
             q, u = plan.balance.project(t, q, u, plan.sizes)
             plan.check_held(t, q, u)
@@ -96,7 +97,7 @@ class Recorder:
             impact,
             np.array(self.time),
             np.array(self.q).T.reshape(self.plan.program.coordinates, len(self.time)),
-            np.array(self.u).T.reshape(self.plan.program.coordinates, len(self.time)),
+            np.array(self.u).T.reshape(self.plan.program.speeds, len(self.time)),
             np.array(self.shown),
             np.array(self.held).T,
         )

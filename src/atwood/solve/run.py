@@ -17,7 +17,7 @@ from atwood.solve.options import RunOptions, choose_solver, sample_times
 from atwood.solve.problem import Plan, make_plan, pack_state
 from atwood.solve.record import Recorder, Segment
 from atwood.solve.scales import scene_length
-from atwood.solve.start import Start
+from atwood.solve.start import Start, own_state
 
 __all__ = ["Run", "run"]
 
@@ -94,7 +94,7 @@ def run(
     solver = choose_solver(options.solver)
     times, shown = sample_times(t, options)
     _check_prescribed(assembly, times)
-    q, u = _own_state(assembly, start)
+    q, u = own_state(assembly, start)
     breaks = find_breaks(assembly, t, options.t_end)
     segments: list[Segment] = []
     happenings: list[Happening] = []
@@ -149,8 +149,8 @@ def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
     if not prescribed:
         return
     program = assembly.state_program("prescribed", [value for _, value in prescribed])
-    n = len(assembly.equations.coordinates)
-    idle = (np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(len(assembly.reactions)))
+    n, m = len(assembly.equations.coordinates), len(assembly.equations.speeds)
+    idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
     misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])
     if float(np.max(misses)) > 1e-9 * scene_length(assembly):
         worst, moment = np.unravel_index(int(np.argmax(misses)), misses.shape)
@@ -245,10 +245,10 @@ def _integrate(
     options: RunOptions,
 ) -> _Outcome:
     """Advance from sample to sample."""
-    n = plan.program.coordinates
+    split = plan.program.split
     for moment, show in zip(times, shown, strict=True):
         advance = session.advance(float(moment))
-        if advance.status is Status.FAILED and plan.review_dependent(advance.t, advance.y[:n]):
+        if advance.status is Status.FAILED and plan.review_dependent(advance.t, split(advance.y)[0]):
             _restart(plan, session, advance)
             advance = session.advance(float(moment))
         if advance.status is Status.REACHED:
@@ -330,8 +330,8 @@ def _open_explicit(
 
 
 def _restart(plan: Plan, session: Session, advance: Advance) -> None:
-    n = plan.program.coordinates
-    q, u = plan.balance.project(advance.t, advance.y[:n].copy(), advance.y[n : 2 * n].copy(), plan.sizes)
+    q, u = (part.copy() for part in plan.program.split(advance.y))
+    q, u = plan.balance.project(advance.t, q, u, plan.sizes)
     session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
 
 
@@ -344,15 +344,12 @@ def _repair(
     u: FloatArray,
     options: RunOptions,
 ) -> None:
-    """At index 1 with projection: go on from the projected state once the drift outgrows the error of the steps."""
-    if plan.program.level == "index1-projected" and max(recorder.held[-1]) > 100.0 * options.relative_tolerance:
+    """Go on from the recorded state where the solver's own has strayed.
+
+    At index 1 with projection that is where the drift outgrows the error of the steps; for any orientation, where the
+    size of its coordinates is no longer near one.
+    """
+    drift = max(recorder.held[-1]) if plan.program.level == "index1-projected" else 0.0
+    strays = plan.balance.turning.strays(plan.program.split(advance.y)[0])
+    if strays or drift > 100.0 * options.relative_tolerance:
         session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
-
-
-def _own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
-    """Return the start in the coordinates of the form."""
-    if assembly.form == "reduced":
-        return start.coordinates, start.speeds
-    kernel = assembly.kernel(assembly.to_maximal)
-    q, u = kernel([start.time], start.coordinates, start.speeds)
-    return np.asarray(q, dtype=float), np.asarray(u, dtype=float)

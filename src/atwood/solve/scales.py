@@ -12,7 +12,7 @@ from atwood.forms.assembly import Assembly
 from atwood.mechanics.build import extent
 from atwood.mechanics.equations import Equations
 
-__all__ = ["Scales", "coordinate_scales", "find_scales", "scene_length"]
+__all__ = ["Scales", "coordinate_scales", "find_scales", "motion_names", "motion_scales", "scene_length"]
 
 FloatArray = NDArray[np.float64]
 
@@ -47,8 +47,22 @@ def scene_length(assembly: Assembly) -> float:
 
 
 def coordinate_scales(equations: Equations, length: float) -> FloatArray:
-    """Return the size of each coordinate: the extent for a length, one radian for an angle."""
+    """Return the size of each coordinate: the extent for a length, one radian for an angle, else one."""
     return np.array([length if one.unit == "m" else 1.0 for one in equations.names])
+
+
+def motion_scales(equations: Equations, length: float) -> FloatArray:
+    """Return the size of a displacement along each speed: the extent, or one radian."""
+    return np.array([length if one.unit == "m/s" else 1.0 for one in equations.speed_names])
+
+
+def motion_names(equations: Equations) -> tuple[str, ...]:
+    """Return what moves with each speed: a coordinate, or the speed's own name where none does so alone."""
+    alone = dict(zip(equations.rates, equations.names, strict=True))
+    return tuple(
+        alone[speed].name if speed in alone else one.name
+        for speed, one in zip(equations.speeds, equations.speed_names, strict=True)
+    )
 
 
 def find_scales(
@@ -68,9 +82,9 @@ def find_scales(
     length
         Its extent.
     speeds, accelerations
-        At the start, of generalized coordinates.
+        At the start.
     sizes
-        Size of each of these coordinates.
+        Size of a displacement along each speed.
     span
         Length of the run, s.
     """

@@ -23,9 +23,10 @@ from atwood.kernels import compile_program
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.observables import Observable
 from atwood.solve.balance import independent_rows, least_norm, row_scales
-from atwood.solve.scales import coordinate_scales, scene_length
+from atwood.solve.scales import motion_names, motion_scales, scene_length
+from atwood.solve.turning import Turning, resting_place, turning_of
 
-__all__ = ["Start", "find_start"]
+__all__ = ["Start", "find_start", "own_state"]
 
 FloatArray = NDArray[np.float64]
 
@@ -46,7 +47,8 @@ class Start:
     length
         Extent of the scene, m.
     free_coordinates, free_speeds
-        Paths of the coordinates and speeds that nothing fixed: they kept their guess as far as they could.
+        Names of the coordinates that nothing fixed, and of those whose speed nothing fixed: they kept their guess as
+        far as they could. A speed that is the rate of no coordinate has its own name.
     repeated
         Paths of fixed values that follow from the others.
     """
@@ -58,6 +60,14 @@ class Start:
     free_coordinates: tuple[str, ...]
     free_speeds: tuple[str, ...]
     repeated: tuple[str, ...]
+
+
+def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
+    """Return a start in the coordinates of the form of an assembly."""
+    if assembly.form == "reduced":
+        return start.coordinates, start.speeds
+    q, u = assembly.kernel(assembly.to_maximal)([start.time], start.coordinates, start.speeds)
+    return turning_of(assembly, "dae").normalized(np.asarray(q, dtype=float)), np.asarray(u, dtype=float)
 
 
 @dataclass(frozen=True)
@@ -90,7 +100,7 @@ def find_start(assembly: Assembly) -> Start:
     """
     equations, length = assembly.reduced, scene_length(assembly)
     positions, speeds = _sort_targets(assembly, equations)
-    scales = coordinate_scales(equations, length)
+    scales = motion_scales(equations, length)
     t = assembly.flat.t_start
     q, free_q, repeated_q = _solve_positions(assembly, equations, positions, scales, t)
     u, free_u, repeated_u = _solve_speeds(assembly, equations, speeds, scales, t, q)
@@ -128,7 +138,7 @@ def _sort_targets(assembly: Assembly, equations: Equations) -> tuple[_Level, _Le
 
 
 class _System:
-    """Values and derivatives of targets and constraints with respect to coordinates or speeds."""
+    """Values and derivatives of targets and constraints along the speeds: of places, or of speeds themselves."""
 
     def __init__(
         self,
@@ -136,10 +146,12 @@ class _System:
         equations: Equations,
         targets: Sequence[_Target],
         constraints: Sequence[Expression],
-        unknowns: Sequence[Expression],
+        of_places: bool,
     ) -> None:
         expressions = [*constraints, *(one.observable.value for one in targets)]
-        entries = jacobian(expressions, list(unknowns)) if expressions else None
+        unknowns = list(equations.coordinates if of_places else equations.speeds)
+        entries = jacobian(expressions, unknowns) if expressions else None
+        self.turning = turning_of(assembly, "reduced") if of_places else None
         groups = state_groups(equations)
         outputs = (
             OutputGroup("values", tuple(expressions)),
@@ -157,6 +169,8 @@ class _System:
         values, slopes = self.kernel([t], q, u)
         matrix = np.zeros(self.shape)
         matrix[self.rows, self.columns] = slopes
+        if self.turning is not None and not self.turning.is_plain:
+            matrix = matrix @ self.turning.tangent(t, q)
         missing = np.asarray(values, dtype=float)
         for i, target in enumerate(self.targets, start=self.constraints):
             missing[i] -= target.value
@@ -169,7 +183,8 @@ def _newton(
     system: _System, scales: FloatArray, t: float, q: FloatArray, iterations: int = 60
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Move to the nearest configuration that fulfils a system; return it with what is missing, scaled."""
-    still = np.zeros_like(q)
+    still = np.zeros_like(scales)
+    assert system.turning is not None
     missing, matrix = system.at(t, q, still)
     rows = row_scales(matrix, scales)
     for _ in range(iterations):
@@ -180,7 +195,7 @@ def _newton(
         longest = float(np.max(np.abs(step / scales), initial=0.0))
         step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
         for _ in range(8):
-            trial = q - step
+            trial = system.turning.moved(t, q, -step)
             new_missing, new_matrix = system.at(t, trial, still)
             if float(np.max(np.abs(new_missing / rows))) < size or longest < 1e-9:
                 break
@@ -197,20 +212,35 @@ def _newton(
 def _solve_positions(
     assembly: Assembly, equations: Equations, level: _Level, scales: FloatArray, t: float
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
-    constraints = [one.value for one in equations.constraints]
-    q = np.zeros(len(equations.coordinates))
+    constraints = _values(equations)
+    turning, q = turning_of(assembly, "reduced"), resting_place(equations)
     by_symbol = {symbol: i for i, symbol in enumerate(equations.coordinates)}
     rough = [*level.guessed, *level.fixed]
     for target in rough:  # what is said of a coordinate itself needs no iteration
         if target.observable.value in by_symbol:
             q[by_symbol[target.observable.value]] = target.value
+    q = _turned(equations, turning, q)
     if any(target.observable.value not in by_symbol for target in rough):
-        q, _, _ = _newton(_System(assembly, equations, rough, [], equations.coordinates), scales, t, q, iterations=20)
-    system = _System(assembly, equations, level.fixed, constraints, equations.coordinates)
+        q, _, _ = _newton(_System(assembly, equations, rough, [], True), scales, t, q, iterations=20)
+    system = _System(assembly, equations, level.fixed, constraints, True)
     q, missing, matrix = _newton(system, scales, t, q)
     if missing.size and not float(np.max(np.abs(missing))) <= _MET:
         _explain_positions(assembly, equations, level, scales, t, q, missing)
-    return q, *_counted(equations, level.fixed, len(constraints), matrix)
+    names = [one.name for one in equations.names]
+    return q, *_counted(names, turning.tangent(t, q), level.fixed, len(constraints), matrix)
+
+
+def _values(equations: Equations) -> list[Expression]:
+    """Return the constraints on positions."""
+    return [one.value for one in equations.constraints if one.value is not None]
+
+
+def _turned(equations: Equations, turning: Turning, q: FloatArray) -> FloatArray:
+    """Return rough coordinates whose orientations mean something."""
+    for chart in equations.charts:
+        if not np.any(q[list(chart.coordinates)]):
+            raise StartError("coordinates of an orientation that are all zero mean nothing", where=chart.body)
+    return turning.normalized(q)
 
 
 def _explain_positions(
@@ -223,9 +253,9 @@ def _explain_positions(
     missing: FloatArray,
 ) -> None:
     """Raise the error that says whether a loop cannot close or the start contradicts itself."""
-    constraints = [one.value for one in equations.constraints]
+    constraints = _values(equations)
     if constraints:
-        system = _System(assembly, equations, [], constraints, equations.coordinates)
+        system = _System(assembly, equations, [], constraints, True)
         nearest, alone, _ = _newton(system, scales, t, q)
         if not float(np.max(np.abs(alone))) <= _MET:
             _raise_open_loop(assembly, equations, t, nearest, alone)
@@ -236,8 +266,9 @@ def _raise_open_loop(
     assembly: Assembly, equations: Equations, t: float, nearest: FloatArray, missing: FloatArray
 ) -> None:
     """Raise the error that names the loop that cannot close."""
-    worst = equations.constraints[int(np.argmax(np.abs(missing)))]
-    values = [one.value for one in equations.constraints if one.key[0] == worst.key[0]]
+    holding = [one for one in equations.constraints if one.value is not None]
+    worst = holding[int(np.argmax(np.abs(missing)))]
+    values = [one.value for one in holding if one.key[0] == worst.key[0] and one.value is not None]
     place = {equations.time: t, **dict(zip(equations.coordinates, nearest.tolist(), strict=True))}
     miss = max(abs(v) for v in evaluate(values, {**assembly.mechanism.table.values, **place}))
     loop = _loop_through(assembly, worst.key[0])
@@ -274,7 +305,7 @@ def _raise_contradiction(fixed: Sequence[_Target], missing: FloatArray, equation
         f"{target.path} = {target.value:g}" for target, miss in zip(fixed, missing, strict=True) if abs(miss) > _MET
     ]
     names = failing or [f"{target.path} = {target.value:g}" for target in fixed]
-    freedom = len(equations.coordinates) - len(equations.constraints)
+    freedom = len(equations.speeds) - len(equations.constraints)
     where = next((t.path for t, m in zip(fixed, missing, strict=True) if abs(m) > _MET), fixed[0].path if fixed else "")
     raise StartError(
         f"the start values contradict each other or the constraints: {', '.join(names)} cannot all hold",
@@ -290,10 +321,10 @@ def _solve_speeds(
     rates = [one.rate for one in equations.constraints]
     u = np.zeros(len(equations.speeds))
     if level.guessed:
-        rough = _System(assembly, equations, level.guessed, [], equations.speeds)
+        rough = _System(assembly, equations, level.guessed, [], False)
         missing, matrix = rough.at(t, q, u)
         u = u - scales * least_norm(matrix * scales, missing)
-    system = _System(assembly, equations, level.fixed, rates, equations.speeds)
+    system = _System(assembly, equations, level.fixed, rates, False)
     for _ in range(3):  # linear: the second pass takes out rounding
         missing, matrix = system.at(t, q, u)
         if not missing.size:
@@ -310,21 +341,24 @@ def _solve_speeds(
         if not float(np.max(share)) <= 1e-8:
             _raise_contradiction(level.fixed, share[len(rates) :], equations)
         matrix = matrix * scales / rows[:, None]
-    return u, *_counted(equations, level.fixed, len(rates), matrix)
+    names = motion_names(equations)
+    return u, *_counted(names, np.eye(len(u)), level.fixed, len(rates), matrix)
 
 
 def _counted(
-    equations: Equations, fixed: Sequence[_Target], constraints: int, matrix: FloatArray
+    names: Sequence[str], tangent: FloatArray, fixed: Sequence[_Target], constraints: int, matrix: FloatArray
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return which coordinates nothing determines, and which fixed values repeat others."""
-    names = [c.name for c in equations.names]
+    """Return which coordinates or speeds nothing determines, and which fixed values repeat others.
+
+    Of coordinates, `tangent` says how they move with the speeds.
+    """
     if not matrix.size:
         return tuple(names), ()
     kept = independent_rows(matrix)
     repeated = tuple(t.path for i, t in enumerate(fixed, start=constraints) if i not in kept)
     _, sizes, directions = np.linalg.svd(matrix)
     rank = int(np.sum(sizes > 1e-9 * max(sizes[0], 1e-300))) if sizes.size else 0
-    open_directions = directions[rank:]
+    open_directions = directions[rank:] @ tangent.T
     free = tuple(
         n for i, n in enumerate(names) if open_directions.size and np.max(np.abs(open_directions[:, i])) > 1e-6
     )

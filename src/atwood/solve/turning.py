@@ -1,0 +1,97 @@
+"""Coordinates that are not integrals of speeds: how they move with the speeds, in numbers.
+
+Most coordinates have a speed of their own. Orientations in space have three speeds and four coordinates, whose common
+factor means nothing. What is small or near is therefore measured along the speeds: a displacement is what the speeds
+would do in a unit of time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.program import RatesProgram
+from atwood.kernels import BoundKernel
+from atwood.mechanics.equations import Equations
+
+__all__ = ["Turning", "resting_place", "turning_of"]
+
+FloatArray = NDArray[np.float64]
+
+
+class Turning:
+    """How the coordinates of one form move: ``q' = B u + b``.
+
+    Parameters
+    ----------
+    program
+        The rates as a program.
+    kernel
+        The same, ready to run on one state; None if the rates are the speeds.
+    """
+
+    def __init__(self, program: RatesProgram, kernel: BoundKernel | None) -> None:
+        self.program, self.kernel = program, kernel
+        self._charts = [np.asarray(chart, dtype=np.intp) for chart in program.charts]
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the rates are the speeds."""
+        return self.kernel is None
+
+    def rates(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+        """Return the derivatives of the coordinates."""
+        return u if self.kernel is None else np.asarray(self.kernel([t], q, u)[0], dtype=float)
+
+    def tangent(self, t: float, q: FloatArray) -> FloatArray:
+        """Return B, of shape (coordinates, speeds)."""
+        if self.kernel is None:
+            return np.eye(len(q))
+        matrix = np.zeros((self.program.coordinates, self.program.speeds))
+        matrix[self.program.rows, self.program.columns] = self.kernel([t], q, np.zeros(self.program.speeds))[1]
+        return matrix
+
+    def moved(self, t: float, q: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Return coordinates after a small displacement along the speeds; exact to its first order."""
+        if self.kernel is None:
+            return q + displacement
+        return self.normalized(q + self.tangent(t, q) @ displacement)
+
+    def difference(self, t: float, q: FloatArray, other: FloatArray) -> FloatArray:
+        """Return the displacement that leads from one place to another near by, exact to its first order."""
+        if self.kernel is None:
+            return other - q
+        target = other.copy()
+        for chart in self._charts:
+            along = float(q[chart] @ other[chart])
+            size = float(np.linalg.norm(other[chart]))
+            target[chart] *= np.copysign(float(np.linalg.norm(q[chart])) / size, along)
+        return np.asarray(np.linalg.lstsq(self.tangent(t, q), target - q, rcond=None)[0], dtype=float)
+
+    def normalized(self, q: FloatArray) -> FloatArray:
+        """Return coordinates with orientations of size one: one state, or many of shape (coordinates, samples)."""
+        if not self._charts:
+            return q
+        q = np.array(q, dtype=float)
+        for chart in self._charts:
+            q[chart] /= np.sqrt(np.sum(q[chart] ** 2, axis=0))
+        return q
+
+    def strays(self, q: FloatArray) -> bool:
+        """Return whether the size of an orientation has gone far from one, where tolerances mean something else."""
+        return any(not 0.25 < float(q[chart] @ q[chart]) < 4.0 for chart in self._charts)
+
+
+def resting_place(equations: Equations) -> FloatArray:
+    """Return coordinates of zero, with orientations that are not turned."""
+    q = np.zeros(len(equations.coordinates))
+    for chart in equations.charts:
+        q[chart.coordinates[0]] = 1.0
+    return q
+
+
+def turning_of(assembly: Assembly, form: FormName) -> Turning:
+    """Return how the coordinates of a scene move in either form."""
+    program = assembly.rates(form)
+    return Turning(program, None if program.program is None else assembly.kernel(program.program))
