@@ -67,7 +67,7 @@ from atwood.model.laws import (
     observable,
     potential,
 )
-from atwood.model.rotation import FREE, Rotation, turn
+from atwood.model.rotation import FREE, Rotation, normals, turn
 from atwood.model.scene import Scene
 from atwood.model.vector import Vector, as_vector, cross, dot, norm
 
@@ -84,6 +84,7 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "FREE",
     "Assembly",
     "AtwoodError",
     "BodyInertia",
@@ -96,7 +97,6 @@ __all__ = [
     "Expression",
     "ExternalFunction",
     "Formula",
-    "FREE",
     "Frame",
     "Groove",
     "KernelEvaluationError",
@@ -153,6 +153,7 @@ __all__ = [
     "maximum",
     "minimum",
     "norm",
+    "normals",
     "observable",
     "parameter",
     "plot",

@@ -193,6 +193,9 @@ def balance_rows(
         if body in kinematics.angular_velocities:
             outputs += kinematics.angular_velocities[body]
             cotangents += [-c for c in torque]
+    for symbol, force_on_joint in forces.on_joints.items():
+        outputs.append(kinematics.joint_rates[symbol])
+        cotangents.append(-force_on_joint)
     kept = [(o, c) for o, c in zip(outputs, cotangents, strict=True) if not c.is_zero and not o.is_zero]
     if not kept:
         zero = forces.graph.constant(0.0)

@@ -5,7 +5,7 @@ Each is found on the local symbols of a part, and then put where the part is.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from atwood.errors import TopologyError
@@ -34,12 +34,15 @@ class Forces:
         Torque components by body, N m: counter-clockwise in a plane, in the axes of the body in space.
     at_nodes
         The same torques by the node at which they act.
+    on_joints
+        Generalized forces on joint coordinates, by their symbols.
     """
 
     graph: Graph
     on_nodes: dict[int, list[Expression]] = field(default_factory=dict)
     on_bodies: dict[int, list[Expression]] = field(default_factory=dict)
     at_nodes: dict[int, list[Expression]] = field(default_factory=dict)
+    on_joints: dict[Expression, Expression] = field(default_factory=dict)
 
     def push(self, node: int, components: Sequence[Scalar]) -> None:
         """Add a force on a node."""
@@ -106,15 +109,48 @@ def local_map(site: Site, local: LocalPart, kinematics: Kinematics) -> dict[Expr
             if body in kinematics.angular_velocities:
                 spin_W = spin_in_world(kinematics.angular_velocities[body], placements.axes[body])
                 found.update(zip(symbols.spin, (site.graph.convert(c) for c in spin_W), strict=True))
+    for symbol in local.formulas:
+        if symbol in kinematics.joint_rates:
+            found[symbol] = kinematics.placements.joint_coordinates[symbol]
+            found[rate_symbol(symbol)] = kinematics.joint_rates[symbol]
     return found
+
+
+def rate_symbol(coordinate: Expression) -> Expression:
+    """Return the symbol of the rate of a joint coordinate."""
+    return coordinate.graph.symbol(f"{coordinate.name}'")
+
+
+def in_joint_coordinates(
+    local: LocalPart, kinematics: Kinematics, functions: Sequence[Expression]
+) -> tuple[list[Expression], list[Expression]]:
+    """Return functions with the coordinates of joints that bodies hang on in place of their formulas.
+
+    So a spring on a joint sees the coordinate itself, which counts its turns, and acts on that coordinate alone.
+
+    Returns
+    -------
+    functions
+        The functions.
+    coordinates
+        The symbols of these coordinates.
+    """
+    formulas: dict[Expression, Expression] = {}
+    hung = [symbol for symbol in local.formulas if symbol in kinematics.joint_rates]
+    for symbol in hung:
+        formula, rate = local.formulas[symbol]
+        formulas[formula] = symbol
+        if rate is not None:
+            formulas[rate] = rate_symbol(symbol)
+    return (substitute(list(functions), formulas) if formulas else list(functions)), hung
 
 
 def part_forces(
     site: Site, local: LocalPart, kinematics: Kinematics, mapping: Mapping[Expression, Expression], forces: Forces
 ) -> None:
     """Add the forces of a part's potentials, Rayleigh functions and loads."""
-    _add_gradient(site, local, local.potentials, mapping, forces, of_velocities=False)
-    _add_gradient(site, local, local.dissipations, mapping, forces, of_velocities=True)
+    _add_gradient(site, local, kinematics, local.potentials, mapping, forces, of_velocities=False)
+    _add_gradient(site, local, kinematics, local.dissipations, mapping, forces, of_velocities=True)
     path = local.part.path
     for load in local.loads:
         force = substitute([site.graph.convert(c) for c in site.space.components(load.force)], mapping)
@@ -131,12 +167,20 @@ def part_forces(
 def _add_gradient(
     site: Site,
     local: LocalPart,
-    functions: Iterable[Expression],
+    kinematics: Kinematics,
+    given: Sequence[Expression],
     mapping: Mapping[Expression, Expression],
     forces: Forces,
     of_velocities: bool,
 ) -> None:
+    functions, hung = in_joint_coordinates(local, kinematics, given)
     for function in functions:
+        for symbol in hung:
+            moved = rate_symbol(symbol) if of_velocities else symbol
+            (slope,) = vjp([function], [site.graph.constant(-1.0)], [moved])
+            if not slope.is_zero:
+                held, new = forces.on_joints.get(symbol), substitute([slope], mapping)[0]
+                forces.on_joints[symbol] = new if held is None else held + new
         for name, slopes, turning in slopes_of(local, function, site.graph.constant(-1.0), of_velocities):
             _push_mapped(site, local, name, slopes, turning, mapping, forces)
 

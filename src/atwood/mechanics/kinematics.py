@@ -83,6 +83,8 @@ class Kinematics:
         axes of the body.
     reference_velocities, reference_accelerations
         Of the reference points.
+    joint_rates
+        In space: derivative of each joint coordinate of a joint that a body hangs on.
     """
 
     placements: Placements
@@ -92,6 +94,7 @@ class Kinematics:
     angular_accelerations: Mapping[int, Components]
     reference_velocities: Mapping[int, Components]
     reference_accelerations: Mapping[int, Components]
+    joint_rates: Mapping[Expression, Expression] = field(default_factory=dict)
 
 
 def shapes(

@@ -10,7 +10,7 @@ from atwood.expr import Expression, Scalar, substitute
 from atwood.mechanics.arms import arm_of
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.equations import Equations
-from atwood.mechanics.forces import local_map
+from atwood.mechanics.forces import in_joint_coordinates, local_map
 from atwood.mechanics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.orientation import NodeTurn, node_axes, spin_in_world
 from atwood.model.component import Binding, bind
@@ -287,7 +287,7 @@ def part_energies(
             kinetic = kinetic + 0.5 * (body.mass * (v * v))
             potential = potential - body.mass * (g * (kinematics.placements.positions[node][k] + arm.position[k]))
         kinetic = kinetic + _energy_of_turning(path, body, turn, kinematics.angular_velocities.get(index, ()))
-    for value in local.potentials:
+    for value in in_joint_coordinates(local, kinematics, local.potentials)[0]:
         potential = potential + substitute([value], mapping)[0]
     return graph.convert(kinetic), graph.convert(potential)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from atwood.expr import Expression, jvp, substitute
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.equations import Equations
-from atwood.mechanics.forces import Forces, local_map, part_forces
+from atwood.mechanics.forces import Forces, in_joint_coordinates, local_map, part_forces
 
 __all__ = ["applied_power"]
 
@@ -32,7 +32,8 @@ def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
     for local in mechanism.locals_.values():
         mapping = {**local_map(equations.site, local, kinematics), **signals}
         part_forces(equations.site, replace(local, potentials=()), kinematics, mapping, forces)
-        for slope in jvp(list(local.potentials), {mechanism.time: 1.0}) if local.potentials else ():
+        potentials, _ = in_joint_coordinates(local, kinematics, local.potentials)
+        for slope in jvp(potentials, {mechanism.time: 1.0}) if potentials else ():
             total = total + substitute([slope], mapping)[0]
     for node, force in forces.on_nodes.items():
         for f, v in zip(force, kinematics.velocities[node], strict=True):
@@ -40,4 +41,6 @@ def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
     for body, torque in forces.on_bodies.items():
         for c, w in zip(torque, kinematics.angular_velocities.get(body, ()), strict=False):
             total = total + c * w
+    for symbol, force_on_joint in forces.on_joints.items():
+        total = total + force_on_joint * kinematics.joint_rates[symbol]
     return total

@@ -316,5 +316,6 @@ def _gathered(walk: _Walk) -> tuple[Kinematics, tuple[dict[int, Components], dic
         {i: components(one.spin_rate) for i, one in walk.turnings.items()},
         all_of(walk.references, "velocity"),
         all_of(walk.references, "acceleration"),
+        dict(zip(walk.known, walk.course.differentiated(list(walk.known.values()))[0], strict=True)),
     )
     return kinematics, (all_of(walk.nodes, "lifted"), all_of(walk.references, "lifted"))

@@ -115,11 +115,12 @@ class ParameterSpec(Field):
         choices: tuple[str, ...] = (),
         structural: bool = False,
         direction: bool = False,
+        turning: bool = False,
     ) -> None:
         super().__init__("parameter", default, unit, doc)
         self.minimum, self.above, self.maximum = minimum, above, maximum
         self.size, self.integer, self.choices = size, integer, choices
-        self.direction = direction
+        self.direction, self.turning = direction, turning
         self.structural = structural or direction or integer or bool(choices)
 
     def check(self, value: Any, where: str) -> Any:
@@ -239,6 +240,7 @@ def parameter(
     choices: Sequence[str] = (),
     structural: bool = False,
     direction: bool = False,
+    turning: bool = False,
 ) -> Any:
     """Declare a parameter in the class body of a component.
 
@@ -266,6 +268,8 @@ def parameter(
         parameter is a number that can change without anything being derived again.
     direction
         Whether it is a direction: three numbers, not all zero, of which a unit vector is made.
+    turning
+        Whether it is a direction about which something turns; in a plane it can only be the plane's normal.
 
     Raises
     ------
@@ -281,11 +285,12 @@ def parameter(
         minimum=minimum,
         above=above,
         maximum=maximum,
-        size=3 if direction else size,
+        size=3 if direction or turning else size,
         integer=integer,
         choices=tuple(choices),
         structural=structural,
-        direction=direction,
+        direction=direction or turning,
+        turning=turning,
     )
 
 

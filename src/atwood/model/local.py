@@ -114,6 +114,8 @@ class LocalPart:
         What its laws returned.
     signal_symbols
         Stand-ins for inputs that are linked to an output.
+    formulas
+        In space, for the symbol of each joint coordinate, the formulas of the observable of its name and of its rate.
     """
 
     part: Part
@@ -127,6 +129,7 @@ class LocalPart:
     loads: tuple[Load, ...]
     constraints: tuple[LocalConstraint, ...]
     signal_symbols: Mapping[str, Expression]
+    formulas: Mapping[Expression, tuple[Expression, Expression | None]] = field(default_factory=dict)
 
 
 def localize(
@@ -201,11 +204,12 @@ def _localize_part(
     potentials, dissipations = scalar_laws("potential"), scalar_laws("dissipation")
     _check_reads(part, connectors, potentials, dissipations)
     inertias = [one for law in laws("inertia") for one in _call(part, law, functools.partial(_listed, bound, law))]
+    joints = tuple(_local_joint(part, law, bound, graph) for law in laws("joint"))
     return LocalPart(
         part=part,
         binding=binding,
         connectors=connectors,
-        joints=tuple(_local_joint(part, law, bound, graph) for law in laws("joint")),
+        joints=joints,
         point_inertias=tuple(one for one in inertias if isinstance(one, PointInertia)),
         body_inertias=tuple(one for one in inertias if isinstance(one, BodyInertia)),
         potentials=potentials,
@@ -213,7 +217,26 @@ def _localize_part(
         loads=tuple(one for law in laws("force") for one in _call(part, law, functools.partial(_listed, bound, law))),
         constraints=tuple(one for law in laws("constraint") for one in _local_constraints(part, law, bound, graph)),
         signal_symbols=signal_symbols,
+        formulas=_formulas(part, bound, joints, graph) if space.name == "space" else {},
     )
+
+
+def _formulas(
+    part: Part, bound: Any, joints: Iterable[LocalJoint], graph: Graph
+) -> dict[Expression, tuple[Expression, Expression | None]]:
+    """Return what the coordinates of joints, and their rates, are in terms of connectors."""
+    laws = {law.name: law for law in part.component.laws("observable")}
+
+    def formula(name: str) -> Expression:
+        return graph.convert(_call(part, laws[name], getattr(bound, name)))
+
+    found = {}
+    for joint in joints:
+        for name, symbol in zip(joint.law.options.coordinates, joint.coordinates, strict=True):
+            if name in laws and laws[name].holds_in("space"):
+                rate = laws[name].options.rate
+                found[symbol] = formula(name), formula(rate) if rate in laws else None
+    return found
 
 
 def _scalar(bound: Any, law: Law, graph: Graph) -> Expression:
@@ -251,7 +274,10 @@ def _parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
     value, name = part.values[spec.name], f"{part.path}.{spec.name}"
     if value is None or spec.integer or spec.choices:
         return value
-    if spec.direction and table.space == "plane" and value[1] != 0.0:
+    if spec.turning and table.space == "plane" and (value[0] != 0.0 or value[2] != 0.0):
+        advice = "Leave its x and z components zero: (0, -1, 0) turns counter-clockwise."
+        raise ParameterError("in a plane things turn about its normal only", where=name, advice=advice)
+    if spec.direction and not spec.turning and table.space == "plane" and value[1] != 0.0:
         raise ParameterError("it points out of the plane", where=name, advice="Leave its y component zero.")
     if spec.size is None:
         return table.scalar(name, value, spec.structural)

@@ -207,3 +207,22 @@ def _sum(*terms: Scalar) -> Scalar:
             continue
         total = term if _number(total) == 0.0 else total + term
     return total
+
+
+def normals(axis: Vector) -> tuple[Vector, Vector]:
+    """Return two unit vectors n1 and n2 such that n1, n2 and a unit axis are right-handed.
+
+    For an axis along x, y or z they are along the next two; else n1 is square to the axis of the frame that the axis is
+    farthest from.
+    """
+    numbers = [_number(component) for component in axis]
+    if None in numbers:
+        raise UsageError("the direction of this axis must be known", advice="Declare it as a direction.")
+    sizes = [abs(number or 0.0) for number in numbers]
+    along = sizes.index(max(sizes))
+    helper = IDENTITY[(along + 1) % 3]
+    unit = Vector(*(number or 0.0 for number in numbers))
+    raw = helper - unit * (unit.x * helper.x + unit.y * helper.y + unit.z * helper.z)
+    size = float(raw.x**2 + raw.y**2 + raw.z**2) ** 0.5
+    first = raw / size
+    return first, cross(unit, first)

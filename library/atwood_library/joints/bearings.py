@@ -1,0 +1,73 @@
+"""What joints in space have in common: axes that stay parallel, frames that do not turn against each other."""
+
+from __future__ import annotations
+
+from atwood import Frame, Scalar, Vector, atan2, cross, dot, normals
+
+__all__ = [
+    "angle_about",
+    "axes_parallel",
+    "frames_parallel",
+    "parallel_torque",
+    "rate_about",
+    "sideways",
+    "unturned_torque",
+]
+
+
+def axes_parallel(a: Frame, b: Frame, axis: Vector) -> tuple[Scalar, Scalar]:
+    """Return two scalars that are zero when an axis, fixed in both frames, is the same direction.
+
+    Parameters
+    ----------
+    a, b
+        The frames.
+    axis
+        Unit vector in the axes of either frame.
+    """
+    first, second = normals(axis)
+    along_b = b.to_world(axis)
+    return dot(a.to_world(first), along_b), dot(a.to_world(second), along_b)
+
+
+def parallel_torque(a: Frame, axis: Vector, multipliers: tuple[Scalar, Scalar]) -> Vector:
+    """Return the torque on frame b, in world axes, N m, that the multipliers of `axes_parallel` stand for.
+
+    Turning b by a small rotation changes ``n_a . axis_b`` by its component along ``axis_b x n_a``.
+    """
+    first, second = normals(axis)
+    n: Vector = a.to_world(first) * multipliers[0] + a.to_world(second) * multipliers[1]
+    return cross(a.to_world(axis), n)
+
+
+def frames_parallel(a: Frame, b: Frame) -> tuple[Scalar, Scalar, Scalar]:
+    """Return three scalars that are zero when frame b is not turned against frame a."""
+    xa, ya, za = a.axes
+    xb, yb, zb = b.axes
+    return dot(za, yb), dot(xa, zb), dot(ya, xb)
+
+
+def unturned_torque(a: Frame, multipliers: tuple[Scalar, Scalar, Scalar]) -> Vector:
+    """Return the torque on frame b, in world axes, N m, that the multipliers of `frames_parallel` stand for."""
+    xa, ya, za = a.axes
+    total: Vector = xa * multipliers[0] + ya * multipliers[1] + za * multipliers[2]
+    return total
+
+
+def sideways(a: Frame, b: Frame, axis: Vector) -> tuple[Scalar, Scalar]:
+    """Return the distance of frame b from an axis through frame a, along the two normals of the axis, m."""
+    first, second = normals(axis)
+    arm = b.position - a.position
+    return dot(arm, a.to_world(first)), dot(arm, a.to_world(second))
+
+
+def angle_about(a: Frame, b: Frame, axis: Vector) -> Scalar:
+    """Return the angle of frame b from frame a about an axis that both share, rad, within one turn."""
+    first, second = normals(axis)
+    turned = b.to_world(first)
+    return atan2(dot(turned, a.to_world(second)), dot(turned, a.to_world(first)))
+
+
+def rate_about(a: Frame, b: Frame, axis: Vector) -> Scalar:
+    """Return the rate of the angle of frame b from frame a about an axis of frame a, rad/s."""
+    return dot(b.angular_velocity - a.angular_velocity, a.to_world(axis))
