@@ -6,15 +6,26 @@ from atwood_library.forces.spring import Spring
 from atwood_library.forces.torque import Torque
 from atwood_library.forces.torsion_damper import TorsionDamper
 from atwood_library.forces.torsion_spring import TorsionSpring
+from atwood_library.joints.constant_velocity import ConstantVelocity
+from atwood_library.joints.cylindrical import Cylindrical
 from atwood_library.joints.drive import Drive
+from atwood_library.joints.free_joint import FreeJoint
 from atwood_library.joints.pivot import Pivot
+from atwood_library.joints.planar import Planar
+from atwood_library.joints.point_on_circle import PointOnCircle
+from atwood_library.joints.point_on_line import PointOnLine
+from atwood_library.joints.point_on_plane import PointOnPlane
 from atwood_library.joints.rotary_drive import RotaryDrive
+from atwood_library.joints.screw import Screw
 from atwood_library.joints.slider import Slider
+from atwood_library.joints.spherical import Spherical
+from atwood_library.joints.universal import Universal
 from atwood_library.joints.weld import Weld
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.link import Link
 from atwood_library.parts.mass_1d import Mass1D
 from atwood_library.parts.point_mass import PointMass
+from atwood_library.parts.rigid_body import RigidBody
 from atwood_library.parts.rod import Rod
 from atwood_library.ropes.pulley import Pulley
 from atwood_library.ropes.rope import Rope
@@ -26,28 +37,39 @@ from atwood_library.sources.ramp import Ramp
 from atwood_library.sources.sine import Sine
 
 __all__ = [
+    "ConstantVelocity",
+    "Cylindrical",
     "Damper",
     "Drive",
     "EnergySensor",
     "Force",
     "ForceSensor",
+    "FreeJoint",
     "Ground",
     "Link",
     "Mass1D",
     "Pivot",
+    "Planar",
     "PointMass",
+    "PointOnCircle",
+    "PointOnLine",
+    "PointOnPlane",
     "PositionSensor",
     "Pulley",
     "Ramp",
     "RelativePositionSensor",
+    "RigidBody",
     "Rod",
     "Rope",
     "RotaryDrive",
+    "Screw",
     "Sine",
     "Slider",
+    "Spherical",
     "Spring",
     "Torque",
     "TorsionDamper",
     "TorsionSpring",
+    "Universal",
     "Weld",
 ]

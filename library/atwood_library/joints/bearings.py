@@ -10,6 +10,7 @@ __all__ = [
     "frames_parallel",
     "parallel_torque",
     "rate_about",
+    "rate_along",
     "sideways",
     "unturned_torque",
 ]
@@ -71,3 +72,9 @@ def angle_about(a: Frame, b: Frame, axis: Vector) -> Scalar:
 def rate_about(a: Frame, b: Frame, axis: Vector) -> Scalar:
     """Return the rate of the angle of frame b from frame a about an axis of frame a, rad/s."""
     return dot(b.angular_velocity - a.angular_velocity, a.to_world(axis))
+
+
+def rate_along(a: Frame, b: Frame, axis: Vector) -> Scalar:
+    """Return the speed of frame b along an axis of frame a, as seen from frame a, m/s."""
+    seen = b.velocity - a.velocity - cross(a.angular_velocity, b.position - a.position)
+    return dot(seen, a.to_world(axis))

@@ -8,7 +8,20 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, Load, Scalar, cross, dissipation, force, is_zero, maximum, minimum, parameter, potential, signal
+from atwood import (
+    Component,
+    Load,
+    Scalar,
+    cross,
+    dissipation,
+    force,
+    is_zero,
+    maximum,
+    minimum,
+    parameter,
+    potential,
+    signal,
+)
 
 __all__ = ["LoadedHinge", "LoadedSlide"]
 
@@ -19,7 +32,9 @@ class LoadedHinge(Component):
     stiffness: float = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring for one radian.")
     natural_angle: float = parameter(0.0, unit="rad", doc="Angle at which the spring has no torque.")
     damping: float = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper for one radian a second.")
-    stop_stiffness: float = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque of a stop for one radian beyond it.")
+    stop_stiffness: float = parameter(
+        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of a stop for one radian beyond it."
+    )
     lower_stop: float | None = parameter(None, unit="rad", doc="Angle below which a stop acts; none if not given.")
     upper_stop: float | None = parameter(None, unit="rad", doc="Angle above which a stop acts; none if not given.")
     motor: float = signal(0.0, unit="N*m", doc="Torque of the motor on frame b, and against frame a.")

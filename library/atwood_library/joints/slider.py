@@ -10,14 +10,13 @@ from atwood import (
     as_vector,
     connector,
     constraint,
-    cross,
     dot,
     joint,
     normals,
     observable,
     parameter,
 )
-from atwood_library.joints.bearings import frames_parallel, sideways, unturned_torque
+from atwood_library.joints.bearings import frames_parallel, rate_along, sideways, unturned_torque
 from atwood_library.joints.loaded import LoadedSlide
 
 
@@ -25,7 +24,8 @@ class Slider(LoadedSlide):
     """A guide: frame b moves along an axis of frame a and does not turn against it (a prismatic joint).
 
     What it exerts on frame b is in a plane `side_force`, along the axis turned by a quarter turn, and `torque`,
-    counter-clockwise; in space the vectors `guide_force` and `guide_torque`, in world axes. It can carry a spring, a damper, an actuator and stops.
+    counter-clockwise; in space the vectors `guide_force` and `guide_torque`, in world axes. It can carry a spring, a
+    damper, an actuator and stops.
     """
 
     axis: tuple[float, float, float] = parameter(
@@ -100,9 +100,7 @@ class Slider(LoadedSlide):
     @observable(unit="m/s", doc="Rate of the displacement.")
     def speed(self) -> Scalar:
         """Return the rate of the displacement, as seen from frame a."""
-        arm = self.b.position - self.a.position
-        v = self.b.velocity - self.a.velocity - cross(self.a.angular_velocity, arm)
-        return dot(v, self.axis_in_world())
+        return rate_along(self.a, self.b, as_vector(self.axis))
 
     @observable(unit="N", doc="Force of the guide on frame b, in world axes.", spaces=("space",))
     def guide_force(self) -> Vector:

@@ -1,0 +1,63 @@
+"""PointOnCircle: a point on a ring."""
+
+from __future__ import annotations
+
+from atwood import (
+    Component,
+    Frame,
+    Placement,
+    Point,
+    Scalar,
+    as_vector,
+    atan2,
+    connector,
+    constraint,
+    cos,
+    cross,
+    dot,
+    joint,
+    normals,
+    observable,
+    parameter,
+    sin,
+)
+
+
+class PointOnCircle(Component):
+    """A point that slides on a circle fixed in a frame, about the frame's origin. A part of space."""
+
+    axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis of the circle, in frame a.")
+    radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius of the circle.")
+    a: Frame = connector(Frame, "The frame that carries the circle; its origin is the centre.")
+    b: Point = connector(Point, "The point.")
+
+    @constraint(reaction="axial_force", unit="N", doc="Force on the point along the axis.", spaces=("space",))
+    def height(self) -> Scalar:
+        """Return the height above the plane of the circle."""
+        return dot(self.b.position - self.a.position, self.a.to_world(as_vector(self.axis)))
+
+    @constraint(reaction="radial_force", unit="N", doc="Force on the point away from the centre.", spaces=("space",))
+    def ring(self) -> Scalar:
+        """Return ``(r^2 - R^2)/(2 R)``, whose slope is one."""
+        arm = self.b.position - self.a.position
+        return dot(arm, arm) * (0.5 / self.radius) - 0.5 * self.radius
+
+    @joint("a", "b", coordinates=("angle",), solves=("height", "ring"), spaces=("space",))
+    def go_round(self, angle: Scalar) -> Placement:
+        """Place the point on the circle."""
+        first, second = normals(as_vector(self.axis))
+        return Placement((first * cos(angle) + second * sin(angle)) * self.radius, axes="a")
+
+    @observable(unit="rad", doc="Angle on the circle.", periodic=True, rate="rate", spaces=("space",))
+    def angle(self) -> Scalar:
+        """Return the angle from the first normal of the axis."""
+        first, second = normals(as_vector(self.axis))
+        arm = self.b.position - self.a.position
+        return atan2(dot(arm, self.a.to_world(second)), dot(arm, self.a.to_world(first)))
+
+    @observable(unit="rad/s", doc="Rate of the angle.", spaces=("space",))
+    def rate(self) -> Scalar:
+        """Return the rate of the angle as seen from frame a."""
+        arm = self.b.position - self.a.position
+        seen = self.b.velocity - self.a.velocity - cross(self.a.angular_velocity, arm)
+        return dot(cross(arm, seen), self.a.to_world(as_vector(self.axis))) / (self.radius * self.radius)

@@ -1,0 +1,49 @@
+"""PointOnLine: a point on a straight wire."""
+
+from __future__ import annotations
+
+from atwood import (
+    Component,
+    Frame,
+    Placement,
+    Point,
+    Scalar,
+    as_vector,
+    connector,
+    constraint,
+    dot,
+    joint,
+    normals,
+    observable,
+    parameter,
+)
+
+
+class PointOnLine(Component):
+    """A point that slides on a straight line fixed in a frame. A part of space; in a plane, see `Slider`."""
+
+    axis: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction, in frame a.")
+    a: Frame = connector(Frame, "The frame that carries the line; its origin is on it.")
+    b: Point = connector(Point, "The point.")
+
+    @constraint(
+        reaction=("side_force_1", "side_force_2"),
+        unit="N",
+        doc="Force on the point along a normal of the line.",
+        spaces=("space",),
+    )
+    def wire(self) -> tuple[Scalar, Scalar]:
+        """Return the distance from the line along its two normals."""
+        first, second = normals(as_vector(self.axis))
+        arm = self.b.position - self.a.position
+        return dot(arm, self.a.to_world(first)), dot(arm, self.a.to_world(second))
+
+    @joint("a", "b", coordinates=("displacement",), solves=("wire",), spaces=("space",))
+    def slide(self, displacement: Scalar) -> Placement:
+        """Place the point on the line."""
+        return Placement(as_vector(self.axis) * displacement, axes="a")
+
+    @observable(unit="m", doc="Distance along the line.", spaces=("space",))
+    def displacement(self) -> Scalar:
+        """Return the displacement."""
+        return dot(self.b.position - self.a.position, self.a.to_world(as_vector(self.axis)))

@@ -1,0 +1,25 @@
+"""Spherical: a ball in a socket."""
+
+from __future__ import annotations
+
+from atwood import FREE, Component, Frame, Placement, Vector, connector, constraint, joint
+
+
+class Spherical(Component):
+    """A ball and socket: the two frames share their position and turn against each other in every way.
+
+    In a plane it is a hinge. Its `force` is what it exerts on frame b.
+    """
+
+    a: Frame = connector(Frame, "The frame that carries the joint.")
+    b: Frame = connector(Frame, "The frame that moves.")
+
+    @constraint(reaction="force", unit="N", doc="Force exerted on frame b, in world axes.")
+    def coincidence(self) -> Vector:
+        """Return the distance of the two frames."""
+        return self.b.position - self.a.position
+
+    @joint("a", "b", solves=("coincidence",), spaces=("plane", "space"))
+    def meet(self) -> Placement:
+        """Place b at a; how it is turned is its own affair."""
+        return Placement(Vector(0.0, 0.0, 0.0), FREE if self.in_space else None)
