@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, live, substitute
 from atwood.mechanics.equations import Equations
+from atwood.topology.charts import Chart
 
 __all__ = [
     "BalanceProgram",
@@ -128,7 +129,7 @@ class RatesProgram:
     coordinates, speeds
         Number of coordinates and of speeds.
     charts
-        Coordinates whose common factor means nothing, group by group.
+        Coordinates that stand for an orientation together.
     """
 
     program: Program | None
@@ -136,7 +137,7 @@ class RatesProgram:
     columns: NDArray[np.intp]
     coordinates: int
     speeds: int
-    charts: tuple[tuple[int, ...], ...]
+    charts: tuple[Chart, ...]
 
 
 def state_groups(equations: Equations) -> tuple[InputGroup, ...]:
@@ -305,10 +306,9 @@ def rates_program(name: str, equations: Equations, parameters: Collection[Expres
         The symbols of parameters.
     """
     sizes = (len(equations.coordinates), len(equations.speeds))
-    charts = tuple(chart.coordinates for chart in equations.charts)
     if rates_are_speeds(equations):
         everyone = np.arange(sizes[0], dtype=np.intp)
-        return RatesProgram(None, everyone, everyone, *sizes, charts)
+        return RatesProgram(None, everyone, everyone, *sizes, equations.charts)
     tangent = jacobian(list(equations.rates), list(equations.speeds))
     outputs = (OutputGroup("rates", equations.rates), OutputGroup("tangent", tuple(tangent.entries)))
     return RatesProgram(
@@ -316,5 +316,5 @@ def rates_program(name: str, equations: Equations, parameters: Collection[Expres
         np.asarray(tangent.rows, dtype=np.intp),
         np.asarray(tangent.columns, dtype=np.intp),
         *sizes,
-        charts,
+        equations.charts,
     )

@@ -260,6 +260,10 @@ def _to_reduced(
         values = read([t], *own, np.zeros_like(own[1]), idle)[0]
         for name, value in zip(known, values, strict=True):
             q[names.index(name)] = value
+    turned = {chart.body: list(chart.coordinates) for chart in after.maximal.charts}
+    for chart in equations.charts:
+        if chart.body in turned:
+            q[list(chart.coordinates)] = maximal[0][turned[chart.body]]
     q = own_turning.normalized(q)
     scales = motion_scales(after.maximal, length)
     matrix = np.zeros((len(scales), len(still)))

@@ -289,7 +289,7 @@ def _open(
     budget = Budget(
         max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
         wall_seconds=None if options.max_seconds is None else max(0.0, options.max_seconds - spent.seconds),
-        poll=plan.between_steps if plan.dependent else None,
+        poll=plan.between_steps if plan.dependent_speeds else None,
     )
     if solver == "explicit":
         return _open_explicit(plan, probe, settings, budget, t, y)

@@ -226,8 +226,11 @@ def _solve_positions(
     q, missing, matrix = _newton(system, scales, t, q)
     if missing.size and not float(np.max(np.abs(missing))) <= _MET:
         _explain_positions(assembly, equations, level, scales, t, q, missing)
+    tangent = turning.tangent(t, q)
+    for chart in equations.charts:  # what turns at all has no orientation, whichever coordinate shows it here
+        tangent[list(chart.coordinates)] = np.max(np.abs(tangent[list(chart.coordinates)]), axis=0)
     names = [one.name for one in equations.names]
-    return q, *_counted(names, turning.tangent(t, q), level.fixed, len(constraints), matrix)
+    return q, *_counted(names, tangent, level.fixed, len(constraints), matrix)
 
 
 def _values(equations: Equations) -> list[Expression]:

@@ -33,7 +33,7 @@ class Turning:
 
     def __init__(self, program: RatesProgram, kernel: BoundKernel | None) -> None:
         self.program, self.kernel = program, kernel
-        self._charts = [np.asarray(chart, dtype=np.intp) for chart in program.charts]
+        self._charts = [np.asarray(chart.coordinates, dtype=np.intp) for chart in program.charts]
 
     @property
     def is_plain(self) -> bool:
@@ -63,10 +63,10 @@ class Turning:
         if self.kernel is None:
             return other - q
         target = other.copy()
-        for chart in self._charts:
-            along = float(q[chart] @ other[chart])
-            size = float(np.linalg.norm(other[chart]))
-            target[chart] *= np.copysign(float(np.linalg.norm(q[chart])) / size, along)
+        for chart, kind in zip(self._charts, (one.kind for one in self.program.charts), strict=True):
+            target[chart] *= float(np.linalg.norm(q[chart])) / float(np.linalg.norm(other[chart]))
+            if kind == "quaternion" and q[chart] @ other[chart] < 0.0:  # either sign is the same orientation
+                target[chart] *= -1.0
         return np.asarray(np.linalg.lstsq(self.tangent(t, q), target - q, rcond=None)[0], dtype=float)
 
     def normalized(self, q: FloatArray) -> FloatArray:
