@@ -18,7 +18,7 @@ JOINTS: dict[str, tuple[Any, int, dict[str, Any]]] = {
     "screw": (lambda: lib.Screw(axis=(0.1, 0.2, 1.0), pitch=0.7), 1, {"joint.angle": 0.4}),
     "spherical": (lambda: lib.Spherical(), 3, {"body.spin.x": 1.0, "body.spin.y": -0.5, "body.spin.z": 0.8}),
     "universal": (lambda: lib.Universal(), 2, {"joint.angle_a": 0.5, "joint.angle_b": -0.4, "joint.rate_a": 1.0}),
-    "planar": (lambda: lib.Planar(axis=(0.2, 0.3, 1.0)), 3, {"joint.displacement_1": 0.1, "joint.angular_velocity": 0.6}),
+    "planar": (lambda: lib.Planar(axis=(0.2, 0.3, 1.0)), 3, {"joint.displacement_1": 0.1}),
     "free": (lambda: lib.FreeJoint(), 6, {"joint.x": 0.1, "joint.z": -0.2, "body.spin.y": 0.5}),
     "constant-velocity": (lambda: lib.ConstantVelocity(), 2, {"body.spin.x": 0.9, "body.spin.y": -0.4}),
 }

@@ -16,7 +16,7 @@ from atwood import (
     parameter,
     turn,
 )
-from atwood_library.joints.bearings import angle_about, axes_parallel, rate_about, rate_along, sideways
+from atwood_library.interfaces.bearings import angle_about, axes_parallel, rate_about, rate_along, sideways
 
 
 class Cylindrical(Component):

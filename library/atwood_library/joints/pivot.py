@@ -15,8 +15,8 @@ from atwood import (
     parameter,
     turn,
 )
-from atwood_library.joints.bearings import angle_about, axes_parallel, parallel_torque, rate_about
-from atwood_library.joints.loaded import LoadedHinge
+from atwood_library.interfaces.bearings import angle_about, axes_parallel, parallel_torque, rate_about
+from atwood_library.interfaces.loaded_hinge import LoadedHinge
 
 
 class Pivot(LoadedHinge):

@@ -17,7 +17,7 @@ from atwood import (
     parameter,
     turn,
 )
-from atwood_library.joints.bearings import angle_about, axes_parallel, rate_about
+from atwood_library.interfaces.bearings import angle_about, axes_parallel, rate_about
 
 
 class Planar(Component):

@@ -16,8 +16,8 @@ from atwood import (
     observable,
     parameter,
 )
-from atwood_library.joints.bearings import frames_parallel, rate_along, sideways, unturned_torque
-from atwood_library.joints.loaded import LoadedSlide
+from atwood_library.interfaces.bearings import frames_parallel, rate_along, sideways, unturned_torque
+from atwood_library.interfaces.loaded_slide import LoadedSlide
 
 
 class Slider(LoadedSlide):

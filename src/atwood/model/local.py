@@ -199,7 +199,8 @@ def _localize_part(
         return [law for law in component.laws(kind) if law.holds_in(space.name) and law.acts_in(mode)]
 
     def scalar_laws(kind: Any) -> tuple[Expression, ...]:
-        return tuple(_call(part, law, functools.partial(_scalar, bound, law, graph)) for law in laws(kind))
+        found = [_call(part, law, functools.partial(_scalar, bound, law, graph)) for law in laws(kind)]
+        return tuple(one for one in found if not one.is_zero)
 
     potentials, dissipations = scalar_laws("potential"), scalar_laws("dissipation")
     _check_reads(part, connectors, potentials, dissipations)

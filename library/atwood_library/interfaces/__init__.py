@@ -1,0 +1,1 @@
+"""What parts of the library have in common; nothing here is a part by itself."""
