@@ -256,7 +256,7 @@ def _why_nothing(mechanism: Mechanism, local: LocalPart) -> str:
     inertias += [m for one in local.body_inertias for m in (one.mass, one.moment)]
     forces: list[Scalar] = [*local.potentials, *local.dissipations]
     forces += [c for one in local.loads for c in (*one.force, *one.torque)]
-    acts = any(local.part.component.laws(kind) for kind in ("potential", "dissipation", "force"))  # type: ignore[arg-type]
+    acts = any(local.part.component.laws(kind) for kind in ("potential", "dissipation", "force"))
     if not inertias and not forces and not acts:
         return "it only measures"
     if all(_is_nothing(value) for value in (*inertias, *forces)):
