@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 from atwood.errors import DeclarationError, TopologyError, UnsupportedError
 from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, substitute
@@ -24,51 +25,15 @@ from atwood.mechanics.kinematics import (
     differentiate,
     lifted_accelerations,
     place,
-    rotate,
     shapes,
 )
+from atwood.mechanics.mechanism import CLOSES, Mechanism, check_closures, decide, extent, make_gravity
 from atwood.model.component import bind
-from atwood.model.local import LocalConstraint, LocalPart, ParameterTable
-from atwood.model.space import Space
-from atwood.model.vector import Vector, as_vector
-from atwood.topology.bodies import Bodies
+from atwood.model.local import LocalConstraint
+from atwood.model.vector import Vector
 from atwood.topology.forest import Forest
-from atwood.topology.graph import MechanismGraph
 
 __all__ = ["Mechanism", "build_equations", "check_closures", "extent", "make_gravity", "resolve_signals"]
-
-_CLOSES = 1e-9
-"""Relative to the extent of the mechanism: how far rigid parts may miss each other and still count as joined."""
-
-
-@dataclass(frozen=True)
-class Mechanism:
-    """A scene as bodies and joints on local symbols, before a form is chosen.
-
-    Attributes
-    ----------
-    table
-        The parameters.
-    time
-        The symbol of time.
-    space
-        What the scene lives in.
-    gravity
-        Acceleration of free fall, m/s^2, a symbol or zero.
-    locals_, graph, bodies
-        Parts, nodes and bodies.
-    links
-        For each linked input, the output that feeds it.
-    """
-
-    table: ParameterTable
-    time: Expression
-    space: Space
-    gravity: Vector
-    locals_: Mapping[str, LocalPart]
-    graph: MechanismGraph
-    bodies: Bodies
-    links: Mapping[tuple[str, str], tuple[str, str]]
 
 
 def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
@@ -242,12 +207,10 @@ def _eliminate(
         if affine is None:
             continue
         coefficients, remainder = affine
-        sizes = [abs(c) for c in evaluate(list(coefficients), parameters)] if coefficients else []
-        largest = max(sizes, default=0.0)
-        if largest == 0.0:
+        light = [q.index(symbol) in weightless for symbol in free]
+        index = decide(mechanism, partial(_pivot, list(coefficients), light))
+        if index is None:
             continue
-        usable = [i for i, size in enumerate(sizes) if size >= 0.1 * largest]
-        index = max(usable, key=lambda i: (q.index(free[i]) in weightless, i))
         pivot = coefficients[index]
         total = remainder
         for i, coefficient in enumerate(coefficients):
@@ -258,6 +221,18 @@ def _eliminate(
         solution[free[index]] = mechanism.table.graph.convert(expression)
         values[number] = (path, constraint, _SOLVED)
     return solution
+
+
+def _pivot(coefficients: list[Expression], light: list[bool], mechanism: Mechanism) -> int | None:
+    """Return which coordinate to solve a linear constraint for: a weightless one, or the last; None if there is none.
+
+    What is smaller than a tenth of the largest coefficient is not divided by.
+    """
+    sizes = [abs(c) for c in evaluate(coefficients, mechanism.table.values)] if coefficients else []
+    largest = max(sizes, default=0.0)
+    if largest == 0.0:
+        return None
+    return max((i for i, size in enumerate(sizes) if size >= 0.1 * largest), key=lambda i: (light[i], i))
 
 
 def _weightless(mechanism: Mechanism, masses: Masses, forest: Forest) -> set[int]:
@@ -289,7 +264,6 @@ def _drop_closed(mechanism: Mechanism, q: tuple[Expression, ...], values: Values
     """
     kept: Values = []
     prescribed = []
-    parameters = mechanism.table.values
     for path, constraint, value in values:
         if value is _SOLVED:
             continue
@@ -299,61 +273,19 @@ def _drop_closed(mechanism: Mechanism, q: tuple[Expression, ...], values: Values
         if depends_on(value, [mechanism.time]):
             prescribed.append(((path, constraint.law.name, constraint.index), value))
             continue
-        (miss,) = evaluate([value], parameters)
-        if not abs(miss) <= _CLOSES * (extent(mechanism) or 1.0):
-            raise TopologyError(
-                f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
-                where=f"{path}.{constraint.law.name}",
-                advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
-            )
+        decide(mechanism, partial(_check_closed, f"{path}.{constraint.law.name}", value))
     return kept, tuple(prescribed)
 
 
-def extent(mechanism: Mechanism) -> float:
-    """Return the extent of a mechanism, m: the largest length among the parameters of what moves; 0 if none is."""
-    sizes = [0.0]
-    for path, local in mechanism.locals_.items():
-        bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors}
-        if bodies == {0}:
-            continue  # where the ground is says nothing about the size of what moves
-        for name, spec in local.part.component.parameter_specs().items():
-            value = local.part.values[name]
-            if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
-                sizes += [abs(v) for v in (value if isinstance(value, tuple) else (value,))]
-    return max(sizes)
-
-
-def check_closures(mechanism: Mechanism) -> None:
-    """Check that rigid joints between parts of one body agree.
-
-    Raises
-    ------
-    TopologyError
-        If they do not: two grounds fight, or rigid parts do not fit together.
-    """
-    bodies, space = mechanism.bodies, mechanism.space
-    for joint in bodies.closures:
-        body = bodies.bodies[bodies.body_of[joint.a]]
-        offsets, turns = body_offsets(body, space)
-        placement = joint.local.placement
-        from_a = placement.displacement
-        if placement.axes == "a" and space.has_rotation:
-            from_a = rotate(from_a, turns[joint.a])
-        gap = offsets[joint.b] - offsets[joint.a] - from_a
-        rotation = 0.0 if placement.rotation is None else placement.rotation
-        graph = mechanism.table.graph
-        misses = [*gap, turns[joint.b] - turns[joint.a] - rotation if space.has_rotation else 0.0]
-        numbers = evaluate([graph.convert(m) for m in misses], mechanism.table.values)
-        if (
-            not all(abs(m) <= _CLOSES * (extent(mechanism) or 1.0) for m in numbers[:3])
-            or not abs(numbers[3]) <= _CLOSES
-        ):
-            kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
-            raise TopologyError(
-                f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {numbers[3]:g} rad",
-                where=joint.label,
-                advice="Two rigid connections say different things about the same place; remove or change one.",
-            )
+def _check_closed(where: str, value: Expression, mechanism: Mechanism) -> None:
+    """Refuse a constraint between what is fixed that does not hold."""
+    (miss,) = evaluate([value], mechanism.table.values)
+    if not abs(miss) <= CLOSES * (extent(mechanism) or 1.0):
+        raise TopologyError(
+            f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
+            where=where,
+            advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
+        )
 
 
 def resolve_signals(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[Expression, Expression]:
@@ -391,9 +323,3 @@ def resolve_signals(mechanism: Mechanism, site: Site, kinematics: Kinematics) ->
         names = ", ".join(f"{path}.{name}" for path, name in mechanism.links)
         raise DeclarationError(f"inputs and outputs feed each other in a circle: {names}")
     return raw
-
-
-def make_gravity(table: ParameterTable, value: float) -> Vector:
-    """Return the acceleration of free fall as a vector."""
-    pull = table.scalar("gravity", value)
-    return as_vector((0.0, 0.0, -pull))

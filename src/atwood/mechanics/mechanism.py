@@ -1,0 +1,116 @@
+"""A scene as bodies and joints, and what is decided about it by the size of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from atwood.errors import TopologyError
+from atwood.expr import Expression, evaluate
+from atwood.mechanics.kinematics import body_offsets, rotate
+from atwood.model.local import LocalPart, ParameterTable
+from atwood.model.space import Space
+from atwood.model.vector import Vector, as_vector
+from atwood.topology.bodies import Bodies
+from atwood.topology.graph import MechanismGraph
+
+__all__ = ["CLOSES", "Mechanism", "check_closures", "decide", "extent", "make_gravity"]
+
+T = TypeVar("T")
+
+CLOSES = 1e-9
+"""Relative to the extent of the mechanism: how far rigid parts may miss each other and still count as joined."""
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A scene as bodies and joints on local symbols, before a form is chosen.
+
+    Attributes
+    ----------
+    table
+        The parameters.
+    time
+        The symbol of time.
+    space
+        What the scene lives in.
+    gravity
+        Acceleration of free fall, m/s^2, a symbol or zero.
+    locals_, graph, bodies
+        Parts, nodes and bodies.
+    links
+        For each linked input, the output that feeds it.
+    sides
+        On a line, the signs of lengths as the start values tell them; None elsewhere, and where they were given.
+    decisions
+        What shaped the equations by the size of numbers: how each was decided, and how it came out.
+    """
+
+    table: ParameterTable
+    time: Expression
+    space: Space
+    gravity: Vector
+    locals_: Mapping[str, LocalPart]
+    graph: MechanismGraph
+    bodies: Bodies
+    links: Mapping[tuple[str, str], tuple[str, str]]
+    sides: Mapping[tuple[str, str, str], float] | None = None
+    decisions: list[tuple[Callable[[Mechanism], object], object]] = field(default_factory=list)
+
+
+def decide(mechanism: Mechanism, how: Callable[[Mechanism], T]) -> T:
+    """Decide something by the size of numbers, and note it: other values may decide it otherwise."""
+    outcome = how(mechanism)
+    mechanism.decisions.append((how, outcome))
+    return outcome
+
+
+def extent(mechanism: Mechanism) -> float:
+    """Return the extent of a mechanism, m: the largest length among the parameters of what moves; 0 if none is."""
+    sizes = [0.0]
+    for path, local in mechanism.locals_.items():
+        bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors}
+        if bodies == {0}:
+            continue  # where the ground is says nothing about the size of what moves
+        for name, spec in local.part.component.parameter_specs().items():
+            value = local.part.values[name]
+            if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
+                sizes += [abs(v) for v in (value if isinstance(value, tuple) else (value,))]
+    return max(sizes)
+
+
+def check_closures(mechanism: Mechanism) -> None:
+    """Check that rigid joints between parts of one body agree.
+
+    Raises
+    ------
+    TopologyError
+        If they do not: two grounds fight, or rigid parts do not fit together.
+    """
+    bodies, space = mechanism.bodies, mechanism.space
+    for joint in bodies.closures:
+        body = bodies.bodies[bodies.body_of[joint.a]]
+        offsets, turns = body_offsets(body, space)
+        placement = joint.local.placement
+        from_a = placement.displacement
+        if placement.axes == "a" and space.has_rotation:
+            from_a = rotate(from_a, turns[joint.a])
+        gap = offsets[joint.b] - offsets[joint.a] - from_a
+        rotation = 0.0 if placement.rotation is None else placement.rotation
+        graph = mechanism.table.graph
+        misses = [*gap, turns[joint.b] - turns[joint.a] - rotation if space.has_rotation else 0.0]
+        numbers = evaluate([graph.convert(m) for m in misses], mechanism.table.values)
+        if not all(abs(m) <= CLOSES * (extent(mechanism) or 1.0) for m in numbers[:3]) or not abs(numbers[3]) <= CLOSES:
+            kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
+            raise TopologyError(
+                f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {numbers[3]:g} rad",
+                where=joint.label,
+                advice="Two rigid connections say different things about the same place; remove or change one.",
+            )
+
+
+def make_gravity(table: ParameterTable, value: float) -> Vector:
+    """Return the acceleration of free fall as a vector."""
+    pull = table.scalar("gravity", value)
+    return as_vector((0.0, 0.0, -pull))
