@@ -9,12 +9,14 @@ are asked for; `simulate` goes all the way.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from atwood.errors import StartError, UsageError, suggestion
 from atwood.expr import Graph
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import LEVELS
+from atwood.forms.source import Source
 from atwood.mechanics.build import Mechanism, check_closures, make_gravity
 from atwood.mechanics.orientation import body_offsets
 from atwood.model.composite import Model
@@ -60,7 +62,8 @@ def assemble(scene: Model, *, form: str = "reduced", level: str = "ggl", name: s
     AtwoodError
         If the scene is not sound; the error names the part.
     """
-    return assemble_flat(flatten(scene, name), form=form, level=level)
+    made = assemble_flat(flatten(scene, name), form=form, level=level)
+    return replace(made, source=Source(_assemble_like, scene.copy()))
 
 
 def assemble_flat(
@@ -96,7 +99,16 @@ def assemble_flat(
     all_modes.update(modes or {})
     mechanism = read_mechanism(flat, all_modes, sides)
     chosen: Any = form
-    return Assembly(flat, mechanism, chosen, level if form == "dae" else "", all_modes)
+    return Assembly(flat, mechanism, chosen, level if form == "dae" else "", all_modes, Source(_assemble_like))
+
+
+def _assemble_like(
+    flat: FlatScene,
+    like: Assembly,
+    modes: Mapping[str, str] | None = None,
+    sides: Mapping[tuple[str, str, str], float] | None = None,
+) -> Assembly:
+    return assemble_flat(flat, form=like.form, level=like.level or "ggl", modes=modes, sides=sides)
 
 
 def read_mechanism(
@@ -125,6 +137,7 @@ def read_mechanism(
     locals_: Mapping[str, LocalPart] = localize(flat, space, time, table, modes, None)
     network = build_graph(flat, locals_)
     bodies = find_bodies(network, locals_)
+    sides: Mapping[tuple[str, str, str], float] | None = None
     if space.name == "line":
         offsets = {body.index: body_offsets(body, space)[0] for body in bodies.bodies}
         sides = known_sides or find_sides(flat, network, bodies, locals_, offsets, table.values, space)
@@ -132,7 +145,8 @@ def read_mechanism(
         network = build_graph(flat, locals_)
         bodies = find_bodies(network, locals_)
     gravity = make_gravity(table, flat.gravity)
-    mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links)
+    told = None if known_sides else sides
+    mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links, told)
     check_closures(mechanism)
     return mechanism
 
@@ -209,15 +223,12 @@ def simulate(
         samples=samples,
     )
 
-    def reassemble(modes: Mapping[str, str], sides: Mapping[tuple[str, str, str], float]) -> Assembly:
-        return assemble_flat(flat, form=assembly.form, level=assembly.level or "ggl", modes=modes, sides=sides)
-
     start = find_start(assembly)
     for _ in range(3):  # on a line, lengths are signed by where things start, which is known only now
         actual = actual_sides(assembly, start.time, start.coordinates, start.speeds, "reduced")
         if not sides_differ(assembly, actual):
-            return Result(run(assembly, start, options, reassemble))
-        assembly = reassemble(assembly.modes, actual)
+            return Result(run(assembly, start, options, assembly.other_mode))
+        assembly = assembly.other_mode(assembly.modes, actual)
         start = find_start(assembly)
     raise StartError(
         "it depends on the signs of lengths where things start, and on where they start, which signs these are",

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import ParameterError, suggestion
+from atwood.errors import ParameterError, UsageError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.collect import collect
 from atwood.forms.dae import dae_form, keep_constraints
@@ -23,11 +23,13 @@ from atwood.forms.program import (
     state_groups,
 )
 from atwood.forms.reduced import reduced_form
-from atwood.kernels import BoundKernel, compile_program
+from atwood.forms.shared import Shared, with_values_of
+from atwood.forms.source import Source, no_start_quantity
+from atwood.kernels import BoundKernel, CompiledProgram, compile_program
 from atwood.mechanics.build import Mechanism, build_equations
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.observables import Observable, Reaction, energies, list_reactions, observe
-from atwood.model.flatten import FlatScene
+from atwood.model.flatten import FlatScene, flatten
 from atwood.topology.forest import grow_forest
 
 __all__ = ["Assembly", "FormName"]
@@ -55,6 +57,12 @@ class Assembly:
         Level of the dae form; empty for the reduced form.
     modes
         Mode of each part that has modes.
+    source
+        Where it comes from; None if it cannot be assembled again.
+    why_new
+        Why other values needed equations of their own; empty for what they did not.
+    shared
+        What all assemblies of this structure share: equations, programs and their code.
     """
 
     flat: FlatScene
@@ -62,19 +70,22 @@ class Assembly:
     form: FormName
     level: str
     modes: Mapping[str, str]
-    _made: dict[Any, Any] = field(default_factory=dict, repr=False)
+    source: Source | None = field(default=None, repr=False)
+    why_new: str = ""
+    shared: Shared = field(default_factory=Shared, repr=False)
+    _kernels: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     # -- equations ------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def reduced(self) -> Equations:
         """The equations in generalized coordinates."""
-        return self._equations("reduced")
+        return self.shared.get("reduced", lambda: self._equations("reduced"))
 
-    @cached_property
+    @property
     def maximal(self) -> Equations:
         """The equations in maximal coordinates, with every joint a constraint."""
-        return self._equations("dae")
+        return self.shared.get("maximal", lambda: self._equations("dae"))
 
     @property
     def equations(self) -> Equations:
@@ -86,10 +97,10 @@ class Assembly:
         forest = grow_forest(form, mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space)
         return build_equations(mechanism, forest)
 
-    @cached_property
+    @property
     def rows(self) -> tuple[Expression, ...]:
         """The equations of motion of the reduced form, as short as they come."""
-        return tuple(self._tidy(self.reduced, self.reduced.rows))
+        return self.shared.get("rows", lambda: tuple(self._tidy(self.reduced, self.reduced.rows)))
 
     def _tidy(self, equations: Equations, rows: Sequence[Expression]) -> list[Expression]:
         """Write rows as an expert would by hand, for scenes of the size that one would do by hand."""
@@ -100,15 +111,98 @@ class Assembly:
 
     # -- parameters -----------------------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Expression, ...]:
         """The symbols of the parameters."""
         return tuple(self.mechanism.table.values)
 
-    @property
+    @cached_property
     def parameter_values(self) -> FloatArray:
         """The values of the parameters."""
         return np.array(list(self.mechanism.table.values.values()), dtype=float)
+
+    def with_values(
+        self,
+        values: Mapping[str, Any] | None = None,
+        *,
+        start: Mapping[str, Any] | None = None,
+        guess: Mapping[str, Any] | None = None,
+    ) -> Assembly:
+        """Return the same scene with other parameters or another start; nothing is compiled for it.
+
+        A value that shapes the equations (a count, a choice, a direction, one that becomes or was exactly zero) has
+        the scene assembled anew; `why_new` of what is returned then says why.
+
+        Parameters
+        ----------
+        values
+            Parameters by path, as for `Model.set`: numbers in SI units, or text with a unit.
+        start, guess
+            Start values and guesses by path that change or come on top; None lets one go.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such parameter, or a value is not admissible.
+        StartError
+            If there is no such quantity to start with.
+        UsageError
+            If the scene is not known, since it was assembled from leaves.
+        """
+        if self.source is None:
+            raise UsageError("it was assembled from leaves, so that its scene is not known", where=self.flat.name)
+        for path in (*(start or ()), *(guess or ())):
+            if path not in self.start_observables and path not in (*self.flat.start, *self.flat.guess):
+                raise no_start_quantity(path, self.start_observables)
+        scene = self.source.changed(values or {}, start or {}, guess or {})
+        return self.with_flat(flatten(scene, self.flat.name), replace(self.source, scene=scene))
+
+    def with_flat(self, flat: FlatScene, source: Source | None = None) -> Assembly:
+        """Return the assembly of a scene with other values: with the same programs if it has the same structure.
+
+        Parameters
+        ----------
+        flat
+            The scene, taken apart.
+        source
+            Where it comes from.
+        """
+        source = source or self.source
+        mechanism, reason = self._moved(flat)
+        if mechanism is not None:
+            return Assembly(flat, mechanism, self.form, self.level, self.modes, source, "", self.shared)
+        if source is None:
+            raise UsageError(f"its structure changes: {reason}", where=flat.name, advice="Assemble it anew.")
+        return replace(source.assemble(flat, self), source=source, why_new=reason)
+
+    def other_mode(self, modes: Mapping[str, str], sides: Mapping[tuple[str, str, str], float]) -> Assembly:
+        """Return the scene in other modes, with lengths on a line signed as given; what was made before is used again.
+
+        Parameters
+        ----------
+        modes
+            Mode of each part that has modes.
+        sides
+            On a line, the sign of lengths.
+        """
+        if self.source is None:
+            raise UsageError("it was assembled from leaves, so that it has no other modes", where=self.flat.name)
+        source = self.source
+
+        def make() -> Assembly:
+            made = source.assemble(self.flat, self, modes, sides)
+            return replace(made, source=source, shared=Shared(self.shared.family))
+
+        known = self.shared.family.get(("mode", tuple(sorted(modes.items())), tuple(sorted(sides.items()))), make)
+        mechanism, _ = known._moved(self.flat)
+        if mechanism is None:
+            return make()
+        return Assembly(self.flat, mechanism, self.form, self.level, known.modes, source, "", known.shared)
+
+    def _moved(self, flat: FlatScene) -> tuple[Mechanism | None, str]:
+        """Return the mechanism with the values of another scene; None, and why, if its structure is another."""
+        _ = self.reduced  # what was decided by the size of numbers is known only then
+        return with_values_of(self.flat, self.mechanism, self.shared, flat)
 
     # -- programs -------------------------------------------------------------------------------------------------
 
@@ -130,61 +224,68 @@ class Assembly:
             The same for the speeds; those of the dependent coordinates when None.
         """
         speeds = None if dependent_speeds is None else tuple(dependent_speeds)
-        key = ("form", None if kept is None else tuple(kept), tuple(dependent), speeds)
-        if key not in self._made:
+
+        def make() -> FormProgram:
             equations = self.equations if kept is None else keep_constraints(self.equations, kept)
             name = f"{self.flat.name} ({self.form})"
             if self.form == "reduced":
-                self._made[key] = reduced_form(name, equations, self.parameters, self.rows, dependent, speeds)
-            else:
-                residual = partial(self._tidy, equations)
-                self._made[key] = dae_form(name, equations, self.parameters, self.level, residual)
-        made: FormProgram = self._made[key]
-        return made
+                return reduced_form(name, equations, self.parameters, self.rows, dependent, speeds)
+            return dae_form(name, equations, self.parameters, self.level, partial(self._tidy, equations))
+
+        return self.shared.get(("form", None if kept is None else tuple(kept), tuple(dependent), speeds), make)
 
     def balance(self, form: FormName) -> BalanceProgram:
         """Return the balance of forces in the coordinates of either form."""
-        key = ("balance", form)
-        if key not in self._made:
+
+        def make() -> BalanceProgram:
             equations = self.reduced if form == "reduced" else self.maximal
-            self._made[key] = balance_program(f"{self.flat.name} ({form})", equations, self.parameters)
-        made: BalanceProgram = self._made[key]
-        return made
+            return balance_program(f"{self.flat.name} ({form})", equations, self.parameters)
+
+        return self.shared.get(("balance", form), make)
 
     def rates(self, form: FormName) -> RatesProgram:
         """Return how the coordinates of either form move with its speeds."""
-        key = ("rates", form)
-        if key not in self._made:
+
+        def make() -> RatesProgram:
             equations = self.reduced if form == "reduced" else self.maximal
-            self._made[key] = rates_program(f"{self.flat.name} ({form})", equations, self.parameters)
-        made: RatesProgram = self._made[key]
-        return made
+            return rates_program(f"{self.flat.name} ({form})", equations, self.parameters)
+
+        return self.shared.get(("rates", form), make)
 
     def kernel(self, program: Program, vectorized: bool = False) -> BoundKernel:
         """Return a program with the parameters of this scene, ready to run."""
-        key = ("kernel", id(program), vectorized)
-        if key not in self._made:
-            # The program is kept with its kernel, so that its identity stays its own.
-            self._made[key] = (program, compile_program(program, vectorized=vectorized).bind(self.parameter_values))
-        made: BoundKernel = self._made[key][1]
-        return made
+        key = (id(program), vectorized)
+        if key not in self._kernels:
+            self._kernels[key] = self.compiled(program, vectorized).bind(self.parameter_values)
+        found: BoundKernel = self._kernels[key]
+        return found
+
+    def compiled(self, program: Program, vectorized: bool = False) -> CompiledProgram:
+        """Return a program as Python code, for any parameter values of this structure."""
+        # The program is kept with its code, so that its identity stays its own.
+        made = self.shared.get(
+            ("code", id(program), vectorized), lambda: (program, compile_program(program, vectorized=vectorized))
+        )
+        return made[1]
 
     # -- what can be read -----------------------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def reactions(self) -> tuple[Reaction, ...]:
         """Every reaction that the components report."""
-        return list_reactions(self.mechanism)
+        return self.shared.get("reactions", lambda: list_reactions(self.mechanism))
 
-    @cached_property
+    @property
     def observables(self) -> dict[str, Observable]:
         """Every quantity of every component, by path, in terms of this form's coordinates."""
-        return observe(self.mechanism, self.equations, self.reactions)
+        return self.shared.get("observables", lambda: observe(self.mechanism, self.equations, self.reactions))
 
-    @cached_property
+    @property
     def start_observables(self) -> dict[str, Observable]:
         """Every quantity in terms of generalized coordinates, in which the start is solved."""
-        return self.observables if self.form == "reduced" else observe(self.mechanism, self.reduced, self.reactions)
+        if self.form == "reduced":
+            return self.observables
+        return self.shared.get("start", lambda: observe(self.mechanism, self.reduced, self.reactions))
 
     def find_observables(self, paths: Sequence[str]) -> list[Observable]:
         """Return observables by path.
@@ -203,17 +304,27 @@ class Assembly:
 
     def observer(self, paths: tuple[str, ...]) -> Program:
         """Return the program of (t, q, u, a, reactions) that gives quantities by path."""
-        key = ("observer", paths)
-        if key not in self._made:
-            expressions = tuple(one.value for one in self.find_observables(paths))
-            self._made[key] = self.state_program("quantities", expressions)
-        made: Program = self._made[key]
-        return made
+        found = self.find_observables(paths)
+        return self.known_program(("observer", paths), "quantities", lambda: [one.value for one in found])
 
-    @cached_property
+    @property
     def energy_program(self) -> Program:
         """The program of (t, q, u, a, reactions) that gives kinetic and potential energy."""
-        return self.state_program("energies", energies(self.mechanism, self.equations))
+        return self.known_program("energies", "energies", lambda: energies(self.mechanism, self.equations))
+
+    def known_program(self, key: Any, name: str, expressions: Callable[[], Sequence[Expression]]) -> Program:
+        """Return a program of (t, q, u, a, reactions) that is made once for all assemblies of this structure.
+
+        Parameters
+        ----------
+        key
+            What it is.
+        name
+            Named in messages.
+        expressions
+            Gives what to compute.
+        """
+        return self.shared.get(("program", key), lambda: self.state_program(name, expressions()))
 
     def state_program(self, name: str, expressions: Sequence[Expression]) -> Program:
         """Return a program of (t, q, u, a, reactions) in the coordinates of this form."""
@@ -231,9 +342,12 @@ class Assembly:
         outputs = (OutputGroup(name, tuple(expressions)),)
         return Program(f"{self.flat.name} {name}", state_groups(equations), self.parameters, outputs)
 
-    @cached_property
+    @property
     def to_maximal(self) -> Program:
         """The program of (t, q, u) of the reduced form that gives maximal coordinates and speeds."""
+        return self.shared.get("to maximal", self._to_maximal)
+
+    def _to_maximal(self) -> Program:
         reduced, forest = self.reduced, self.maximal.forest
         positions: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.coordinates)
         speeds: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.speeds)

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
-from atwood.errors import DeclarationError, TopologyError
-from atwood.expr import Expression, Graph, Scalar, depends_on, evaluate, substitute
+from atwood.errors import DeclarationError
+from atwood.expr import Expression, Graph, depends_on, substitute
 from atwood.mechanics.constraints import constraint_values, find_constraints, levels, velocity_levels
-from atwood.mechanics.elimination import CLOSES, SOLVED, check_held, drop_closed, eliminate_linear
+from atwood.mechanics.elimination import SOLVED, check_held, drop_closed, eliminate_linear
 from atwood.mechanics.equations import Equations, force_rows, motion_rows, put_in_place
 from atwood.mechanics.forces import Site, local_map
 from atwood.mechanics.inertia import add_masses
 from atwood.mechanics.kinematics import Kinematics, shapes
-from atwood.mechanics.mechanism import Mechanism, extent, make_gravity
+from atwood.mechanics.mechanism import Mechanism, check_closures, extent, make_gravity
 from atwood.mechanics.motion import motion_in_plane, motion_in_space
-from atwood.mechanics.orientation import NodeTurn, body_offsets, plain, rotate
+from atwood.mechanics.orientation import body_offsets
 from atwood.model.component import bind
 from atwood.model.local import LocalConstraint
-from atwood.model.rotation import as_rotation, compose
-from atwood.model.space import Space
 from atwood.model.vector import Vector
 from atwood.topology.forest import Forest
-from atwood.topology.graph import Joint
 
 __all__ = ["Mechanism", "build_equations", "check_closures", "extent", "make_gravity", "resolve_signals"]
 
@@ -94,48 +90,6 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
 
 def _multiplier(graph: Graph, path: str, one: LocalConstraint) -> Expression:
     return graph.symbol(f"lambda:{path}.{one.law.name}[{one.index}]")
-
-
-def check_closures(mechanism: Mechanism) -> None:
-    """Check that rigid joints between parts of one body agree.
-
-    Raises
-    ------
-    TopologyError
-        If they do not: two grounds fight, or rigid parts do not fit together.
-    """
-    bodies, space = mechanism.bodies, mechanism.space
-    for joint in bodies.closures:
-        body = bodies.bodies[bodies.body_of[joint.a]]
-        offsets, turns = body_offsets(body, space)
-        placement = joint.local.placement
-        from_a = placement.displacement
-        if placement.axes == "a" and space.has_rotation:
-            from_a = rotate(from_a, turns[joint.a])
-        gap = offsets[joint.b] - offsets[joint.a] - from_a
-        graph = mechanism.table.graph
-        misses = [*gap, *_turns_missed(joint, turns[joint.a], turns[joint.b], space)]
-        numbers = evaluate([graph.convert(m) for m in misses], mechanism.table.values)
-        turned = max((abs(m) for m in numbers[3:]), default=0.0)
-        if not all(abs(m) <= CLOSES * (extent(mechanism) or 1.0) for m in numbers[:3]) or not turned <= CLOSES:
-            kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
-            raise TopologyError(
-                f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {turned:g} rad",
-                where=joint.label,
-                advice="Two rigid connections say different things about the same place; remove or change one.",
-            )
-
-
-def _turns_missed(joint: Joint, turn_a: NodeTurn, turn_b: NodeTurn, space: Space) -> list[Scalar]:
-    """Return by what angles, while they are small, a rigid joint's end is turned from where it should be."""
-    if not space.has_rotation:
-        return []
-    rotation = joint.local.placement.rotation
-    if isinstance(turn_a, tuple) and isinstance(turn_b, tuple):
-        wanted = compose(turn_a, as_rotation(0.0 if rotation is None else rotation).axes())
-        return [component for mine, theirs in zip(turn_b, wanted, strict=True) for component in mine - theirs]
-    angle: Any = 0.0 if rotation is None else rotation
-    return [plain(turn_b) - plain(turn_a) - angle]
 
 
 def resolve_signals(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[Expression, Expression]:

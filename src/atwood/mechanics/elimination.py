@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from atwood.errors import TopologyError
 from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, substitute
 from atwood.mechanics.constraints import Values
 from atwood.mechanics.inertia import Masses
-from atwood.mechanics.mechanism import Mechanism, extent
+from atwood.mechanics.mechanism import CLOSES, Mechanism, decide, extent
 from atwood.model.local import LocalConstraint
 from atwood.topology.forest import Forest
 
-__all__ = ["CLOSES", "SOLVED", "check_held", "drop_closed", "eliminate_linear"]
-
-CLOSES = 1e-9
-"""Relative to the extent of the mechanism: how far rigid parts may miss each other and still count as joined."""
+__all__ = ["SOLVED", "check_held", "drop_closed", "eliminate_linear"]
 
 
 def check_held(
@@ -70,12 +68,10 @@ def eliminate_linear(
         if affine is None:
             continue
         coefficients, remainder = affine
-        sizes = [abs(c) for c in evaluate(list(coefficients), parameters)] if coefficients else []
-        largest = max(sizes, default=0.0)
-        if largest == 0.0:
+        light = [q.index(symbol) in weightless for symbol in free]
+        index = decide(mechanism, partial(_pivot, list(coefficients), light))
+        if index is None:
             continue
-        usable = [i for i, size in enumerate(sizes) if size >= 0.1 * largest]
-        index = max(usable, key=lambda i: (q.index(free[i]) in weightless, i))
         pivot = coefficients[index]
         total = remainder
         for i, coefficient in enumerate(coefficients):
@@ -86,6 +82,18 @@ def eliminate_linear(
         solution[free[index]] = mechanism.table.graph.convert(expression)
         values[number] = (path, constraint, SOLVED)
     return solution
+
+
+def _pivot(coefficients: list[Expression], light: list[bool], mechanism: Mechanism) -> int | None:
+    """Return which coordinate to solve a linear constraint for: a weightless one, or the last; None if there is none.
+
+    What is smaller than a tenth of the largest coefficient is not divided by.
+    """
+    sizes = [abs(c) for c in evaluate(coefficients, mechanism.table.values)] if coefficients else []
+    largest = max(sizes, default=0.0)
+    if largest == 0.0:
+        return None
+    return max((i for i, size in enumerate(sizes) if size >= 0.1 * largest), key=lambda i: (light[i], i))
 
 
 def _weightless(mechanism: Mechanism, masses: Masses, forest: Forest) -> set[int]:
@@ -104,7 +112,6 @@ def drop_closed(mechanism: Mechanism, q: Sequence[Expression], values: Values) -
     """
     kept: Values = []
     prescribed = []
-    parameters = mechanism.table.values
     for path, constraint, value in values:
         if depends_on(value, q):
             kept.append((path, constraint, value))
@@ -112,11 +119,16 @@ def drop_closed(mechanism: Mechanism, q: Sequence[Expression], values: Values) -
         if depends_on(value, [mechanism.time]):
             prescribed.append(((path, constraint.law.name, constraint.index), value))
             continue
-        (miss,) = evaluate([value], parameters)
-        if not abs(miss) <= CLOSES * (extent(mechanism) or 1.0):
-            raise TopologyError(
-                f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
-                where=f"{path}.{constraint.law.name}",
-                advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
-            )
+        decide(mechanism, partial(_check_closed, f"{path}.{constraint.law.name}", value))
     return kept, tuple(prescribed)
+
+
+def _check_closed(where: str, value: Expression, mechanism: Mechanism) -> None:
+    """Refuse a constraint between what is fixed that does not hold."""
+    (miss,) = evaluate([value], mechanism.table.values)
+    if not abs(miss) <= CLOSES * (extent(mechanism) or 1.0):
+        raise TopologyError(
+            f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
+            where=where,
+            advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
+        )

@@ -1,18 +1,27 @@
-"""A scene as bodies and joints, before a form is chosen."""
+"""A scene as bodies and joints, and what is decided about it by the size of numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
-from atwood.expr import Expression
+from atwood.errors import TopologyError
+from atwood.expr import Expression, Scalar, evaluate
+from atwood.mechanics.orientation import NodeTurn, body_offsets, plain, rotate
 from atwood.model.local import LocalPart, ParameterTable
+from atwood.model.rotation import as_rotation, compose
 from atwood.model.space import Space
 from atwood.model.vector import Vector, as_vector
 from atwood.topology.bodies import Bodies
-from atwood.topology.graph import MechanismGraph
+from atwood.topology.graph import Joint, MechanismGraph
 
-__all__ = ["Mechanism", "extent", "make_gravity"]
+__all__ = ["CLOSES", "Mechanism", "check_closures", "decide", "extent", "make_gravity"]
+
+T = TypeVar("T")
+
+CLOSES = 1e-9
+"""Relative to the extent of the mechanism: how far rigid parts may miss each other and still count as joined."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +42,10 @@ class Mechanism:
         Parts, nodes and bodies.
     links
         For each linked input, the output that feeds it.
+    sides
+        On a line, the signs of lengths as the start values tell them; None elsewhere, and where they were given.
+    decisions
+        What shaped the equations by the size of numbers: how each was decided, and how it came out.
     """
 
     table: ParameterTable
@@ -43,6 +56,15 @@ class Mechanism:
     graph: MechanismGraph
     bodies: Bodies
     links: Mapping[tuple[str, str], tuple[str, str]]
+    sides: Mapping[tuple[str, str, str], float] | None = None
+    decisions: list[tuple[Callable[[Mechanism], object], object]] = field(default_factory=list)
+
+
+def decide(mechanism: Mechanism, how: Callable[[Mechanism], T]) -> T:
+    """Decide something by the size of numbers, and note it: other values may decide it otherwise."""
+    outcome = how(mechanism)
+    mechanism.decisions.append((how, outcome))
+    return outcome
 
 
 def extent(mechanism: Mechanism) -> float:
@@ -57,6 +79,48 @@ def extent(mechanism: Mechanism) -> float:
             if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
                 sizes += [abs(v) for v in (value if isinstance(value, tuple) else (value,))]
     return max(sizes)
+
+
+def check_closures(mechanism: Mechanism) -> None:
+    """Check that rigid joints between parts of one body agree.
+
+    Raises
+    ------
+    TopologyError
+        If they do not: two grounds fight, or rigid parts do not fit together.
+    """
+    bodies, space = mechanism.bodies, mechanism.space
+    for joint in bodies.closures:
+        body = bodies.bodies[bodies.body_of[joint.a]]
+        offsets, turns = body_offsets(body, space)
+        placement = joint.local.placement
+        from_a = placement.displacement
+        if placement.axes == "a" and space.has_rotation:
+            from_a = rotate(from_a, turns[joint.a])
+        gap = offsets[joint.b] - offsets[joint.a] - from_a
+        graph = mechanism.table.graph
+        misses = [*gap, *_turns_missed(joint, turns[joint.a], turns[joint.b], space)]
+        numbers = evaluate([graph.convert(m) for m in misses], mechanism.table.values)
+        turned = max((abs(m) for m in numbers[3:]), default=0.0)
+        if not all(abs(m) <= CLOSES * (extent(mechanism) or 1.0) for m in numbers[:3]) or not turned <= CLOSES:
+            kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
+            raise TopologyError(
+                f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {turned:g} rad",
+                where=joint.label,
+                advice="Two rigid connections say different things about the same place; remove or change one.",
+            )
+
+
+def _turns_missed(joint: Joint, turn_a: NodeTurn, turn_b: NodeTurn, space: Space) -> list[Scalar]:
+    """Return by what angles, while they are small, a rigid joint's end is turned from where it should be."""
+    if not space.has_rotation:
+        return []
+    rotation = joint.local.placement.rotation
+    if isinstance(turn_a, tuple) and isinstance(turn_b, tuple):
+        wanted = compose(turn_a, as_rotation(0.0 if rotation is None else rotation).axes())
+        return [component for mine, theirs in zip(turn_b, wanted, strict=True) for component in mine - theirs]
+    angle: Any = 0.0 if rotation is None else rotation
+    return [plain(turn_b) - plain(turn_a) - angle]
 
 
 def make_gravity(table: ParameterTable, value: float) -> Vector:

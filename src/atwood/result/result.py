@@ -264,13 +264,15 @@ class Result:
     ) -> FloatArray | None:
         """Return the power that is put into the scene, or None if nothing can."""
         assembly = segment.assembly
-        applied = applied_power(assembly.mechanism, assembly.equations)
+        program = assembly.known_program(
+            "power", "power", lambda: [applied_power(assembly.mechanism, assembly.equations)]
+        )
+        applied = program.results[0]
         moving = [one for one in assembly.maximal.constraints if _moves_by_itself(assembly.maximal, one)]
         if applied.is_zero and not moving:
             return None
         total = np.zeros(len(segment.time))
         if not applied.is_zero:
-            program = assembly.state_program("power", [applied])
             total = total + assembly.kernel(program, vectorized=True)(*state, *idle)[0][0]
         if moving:
             total = total + self._reactions(segment)[1]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from atwood.expr import Expression, depends_on, live
 from atwood.forms.assembly import Assembly
 
-__all__ = ["find_breaks"]
+__all__ = ["find_breaks", "switches_by_clock"]
 
 FloatArray = NDArray[np.float64]
 
@@ -33,13 +33,13 @@ def find_breaks(assembly: Assembly, start: float, end: float) -> FloatArray:
     start, end
         The run, s.
     """
-    conditions = _conditions(assembly)
-    if not conditions:
+    if not switches_by_clock(assembly):
         return np.zeros((0, 2))
     equations = assembly.equations
     n, m = len(equations.coordinates), len(equations.speeds)
     idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
-    kernel = assembly.kernel(assembly.state_program("switches", conditions), vectorized=True)
+    program = assembly.known_program("switches", "switches", lambda: _conditions(assembly))
+    kernel = assembly.kernel(program, vectorized=True)
 
     def signs(times: FloatArray) -> FloatArray:
         values: FloatArray = kernel(times[None, :], *idle)[0]
@@ -61,6 +61,12 @@ def find_breaks(assembly: Assembly, start: float, end: float) -> FloatArray:
     found = found[(found > start + near) & (found < end - near)]
     rounding = 4.0 * np.spacing(np.abs(found))
     return np.stack([found - rounding, found + rounding], axis=1)
+
+
+def switches_by_clock(assembly: Assembly) -> bool:
+    """Return whether any law can switch by the clock."""
+    program = assembly.known_program("switches", "switches", lambda: _conditions(assembly))
+    return bool(program.results)
 
 
 def _conditions(assembly: Assembly) -> list[Expression]:

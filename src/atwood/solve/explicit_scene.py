@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
+from typing import TYPE_CHECKING
 
 from atwood.forms.accelerations import AccelerationProgram, acceleration_program
 from atwood.forms.assembly import Assembly
 from atwood.solve.driver import FloatArray, Values
 from atwood.solve.explicit_problem import CompiledRates, ExplicitProblem
 
-__all__ = ["explicit_problem"]
+if TYPE_CHECKING:
+    from atwood.solve.explicit_native import CompiledAccelerations
+
+__all__ = ["compiled_rates", "explicit_problem"]
 
 
 def explicit_problem(
@@ -35,7 +39,7 @@ def explicit_problem(
     ExplicitProblem or None
         None if the scene has no coordinates, or constraints are left among them.
     """
-    program = found or acceleration_program(assembly)
+    program = found or assembly.shared.get("accelerations", lambda: acceleration_program(assembly))
     n, m = len(assembly.reduced.coordinates), len(assembly.reduced.speeds)
     if program is None or n == 0:
         return None
@@ -55,10 +59,18 @@ def explicit_problem(
     )
 
 
+def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAccelerations:
+    """Return the accelerations of a scene as machine code, for any parameter values."""
+    from atwood.solve.explicit_native import CompiledAccelerations
+
+    _, code = assembly.shared.get(("rates", id(found)), lambda: (found, CompiledAccelerations(found.program)))
+    return code
+
+
 def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], CompiledRates] | None:
     """Return what gives each session compiled rates, made when they are first asked for; None if they cannot be."""
     try:
-        from atwood.solve.explicit_native import CompiledAccelerations
+        import atwood.solve.explicit_native  # noqa: F401
     except ImportError:  # no compiler: steps in Python
         return None
     if any(node.operation == "external" for node in found.program.nodes):
@@ -66,6 +78,6 @@ def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], Co
 
     @cache
     def bound() -> Callable[[], CompiledRates]:
-        return CompiledAccelerations(found.program).bind(assembly.parameter_values)
+        return compiled_rates(assembly, found).bind(assembly.parameter_values)
 
     return lambda: bound()()

@@ -22,7 +22,7 @@ from atwood.solve.scales import Scales, motion_scales
 from atwood.solve.sides import actual_sides
 from atwood.solve.turning import resting_place, turning_of
 
-__all__ = ["EventProbe", "Happening", "enter_mode"]
+__all__ = ["EventProbe", "Happening", "enter_mode", "find_watches"]
 
 FloatArray = NDArray[np.float64]
 
@@ -57,6 +57,19 @@ class Happening:
         return f"at t = {self.time:.9g} s, {self.part}: {self.message}"
 
 
+def find_watches(assembly: Assembly) -> tuple[Watch, ...]:
+    """Return what is watched in the modes of an assembly."""
+    return assembly.shared.get(
+        "watches",
+        lambda: list_watches(assembly.mechanism, assembly.equations, assembly.reactions, assembly.modes),
+    )
+
+
+def _need_reactions(assembly: Assembly, watches: Sequence[Watch]) -> bool:
+    symbols = [one.symbol for one in assembly.reactions]
+    return any(depends_on(one.value, symbols) for one in watches)
+
+
 class EventProbe:
     """The events of one mode as a function of the solver's state.
 
@@ -77,14 +90,11 @@ class EventProbe:
         self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray, scales: Scales, tolerance: float
     ) -> None:
         self.assembly = assembly
-        self.watches: tuple[Watch, ...] = list_watches(
-            assembly.mechanism, assembly.equations, assembly.reactions, assembly.modes
-        )
-        symbols = [one.symbol for one in assembly.reactions]
-        self.needs_reactions = any(depends_on(one.value, symbols) for one in self.watches)
+        self.watches = find_watches(assembly)
+        self.needs_reactions = assembly.shared.get("watched reactions", lambda: _need_reactions(assembly, self.watches))
         self.reactions = ReactionSolver(assembly, t, q, u) if self.needs_reactions else None
         self.kernel = (
-            assembly.kernel(assembly.state_program("events", [one.value for one in self.watches]))
+            assembly.kernel(assembly.known_program("events", "events", lambda: [one.value for one in self.watches]))
             if self.watches
             else None
         )

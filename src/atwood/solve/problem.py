@@ -166,13 +166,19 @@ class Plan:
         from atwood.kernels import compile_ida_callbacks
 
         program = self.program
-        code = compile_ida_callbacks(
-            program.residual,
-            program.jacobian,
-            program.rows,
-            program.columns,
-            program.size,
-            sparse=linear_solver == "sparse",
+        _, code = self.assembly.shared.get(
+            ("ida", id(program), linear_solver),
+            lambda: (
+                program,  # kept, so that its identity stays its own
+                compile_ida_callbacks(
+                    program.residual,
+                    program.jacobian,
+                    program.rows,
+                    program.columns,
+                    program.size,
+                    sparse=linear_solver == "sparse",
+                ),
+            ),
         )
         data = code.bind(self.assembly.parameter_values)
         return NativeCallbacks(

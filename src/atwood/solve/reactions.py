@@ -109,7 +109,10 @@ class ReactionSolver:
         self.finding = find_rank(balance_of(assembly, "dae"), t, big_q[:, 0], sizes)
         self.kept = np.asarray(self.finding.kept, dtype=np.intp)
         self._of_constraint = {one.key: i for i, one in enumerate(assembly.maximal.constraints)}
-        self._release = release_program(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.parameters)
+        self._release = assembly.shared.get(
+            "release",
+            lambda: release_program(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.parameters),
+        )
 
     def at(self, t: FloatArray, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return all reactions, of shape (number, samples), and the power of constraints that move with time."""

@@ -148,7 +148,7 @@ def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
     prescribed = assembly.equations.prescribed
     if not prescribed:
         return
-    program = assembly.state_program("prescribed", [value for _, value in prescribed])
+    program = assembly.known_program("prescribed", "prescribed", lambda: [value for _, value in prescribed])
     n, m = len(assembly.equations.coordinates), len(assembly.equations.speeds)
     idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
     misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])

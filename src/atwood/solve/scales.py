@@ -7,12 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.expr import evaluate
+from atwood.expr import OutputGroup, Program
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.build import extent
 from atwood.mechanics.equations import Equations
 
-__all__ = ["Scales", "coordinate_scales", "find_scales", "motion_names", "motion_scales", "scene_length"]
+__all__ = [
+    "Scales",
+    "coordinate_scales",
+    "find_scales",
+    "motion_names",
+    "motion_scales",
+    "scene_length",
+    "total_mass",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -97,9 +105,16 @@ def find_scales(
     if gravity:
         times.append(float(np.sqrt(length / abs(gravity))))
     time = min(t for t in times if t > 0.0)
-    masses = assembly.equations.masses
-    graph = assembly.mechanism.table.graph
-    total = sum(evaluate([graph.convert(one.mass) for one in masses.bodies.values()], parameters), 0.0) + sum(
-        evaluate([graph.convert(m) for one in masses.coupled for row in one.masses for m in row], parameters), 0.0
-    )
-    return Scales(length, time, (total or 1.0) * length / time**2)
+    return Scales(length, time, (total_mass(assembly) or 1.0) * length / time**2)
+
+
+def total_mass(assembly: Assembly) -> float:
+    """Return the mass of all that moves, kg."""
+
+    def make() -> Program:
+        masses, graph = assembly.equations.masses, assembly.mechanism.table.graph
+        found = [graph.convert(one.mass) for one in masses.bodies.values()]
+        found += [graph.convert(m) for one in masses.coupled for row in one.masses for m in row]
+        return Program("masses", (), assembly.parameters, (OutputGroup("masses", tuple(found)),))
+
+    return float(sum(assembly.kernel(assembly.shared.get("masses", make))()[0]))

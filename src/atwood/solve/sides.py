@@ -30,7 +30,10 @@ def actual_sides(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, for
     equations = assembly.reduced if form == "reduced" else assembly.maximal
     positions = equations.kinematics.placements.positions
     nodes = list(positions)
-    program = assembly.coordinate_program("places", equations, [positions[node][0] for node in nodes])
+    program = assembly.shared.get(
+        ("places", form),
+        lambda: assembly.coordinate_program("places", equations, [positions[node][0] for node in nodes]),
+    )
     places = dict(zip(nodes, assembly.kernel(program)([t], q, u)[0], strict=True))
     found: Sides = {}
     for path, local in assembly.mechanism.locals_.items():

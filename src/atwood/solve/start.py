@@ -9,17 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import StartError, suggestion
+from atwood.errors import StartError
 from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
-from atwood.kernels import compile_program
+from atwood.forms.source import no_start_quantity
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.observables import Observable
 from atwood.solve.balance import independent_rows, least_norm, row_scales
@@ -108,33 +109,66 @@ def find_start(assembly: Assembly) -> Start:
 
 
 def _sort_targets(assembly: Assembly, equations: Equations) -> tuple[_Level, _Level]:
-    observables = assembly.start_observables
-    late = [*equations.accelerations, *(r.symbol for r in assembly.reactions)]
     levels = (_Level([], []), _Level([], []))
     for is_fixed, given in ((True, assembly.flat.start), (False, assembly.flat.guess)):
         for path, value in given.items():
-            if path not in observables:
-                raise StartError(
-                    "there is no such quantity to start with", where=path, advice=suggestion(path, list(observables))
-                )
-            one = observables[path]
-            if depends_on(one.value, late):
-                raise StartError(
-                    "it follows from positions and speeds and cannot be chosen at the start",
-                    where=path,
-                    advice="Give coordinates, positions and velocities.",
-                )
-            level = levels[1] if depends_on(one.value, equations.speeds) else levels[0]
-            if level is levels[1] and any(
-                depends_on(slope, equations.speeds) for slope in jacobian([one.value], list(equations.speeds)).entries
-            ):
-                raise StartError(
-                    "it is not linear in the speeds and cannot be chosen at the start",
-                    where=path,
-                    advice="Give velocities.",
-                )
-            (level.fixed if is_fixed else level.guessed).append(_Target(path, value, one))
+            number = assembly.shared.get(("start level", path), partial(_find_level, assembly, equations, path))
+            level = levels[number]
+            target = _Target(path, value, assembly.start_observables[path])
+            (level.fixed if is_fixed else level.guessed).append(target)
     return levels
+
+
+def _find_level(assembly: Assembly, equations: Equations, path: str) -> int:
+    """Return whether a start value is of positions (0) or of speeds (1)."""
+    observables = assembly.start_observables
+    if path not in observables:
+        raise no_start_quantity(path, observables)
+    one = observables[path]
+    if depends_on(one.value, [*equations.accelerations, *(r.symbol for r in assembly.reactions)]):
+        raise StartError(
+            "it follows from positions and speeds and cannot be chosen at the start",
+            where=path,
+            advice="Give coordinates, positions and velocities.",
+        )
+    if not depends_on(one.value, equations.speeds):
+        return 0
+    slopes = jacobian([one.value], list(equations.speeds)).entries
+    if any(depends_on(slope, equations.speeds) for slope in slopes):
+        raise StartError(
+            "it is not linear in the speeds and cannot be chosen at the start", where=path, advice="Give velocities."
+        )
+    return 1
+
+
+@dataclass(frozen=True)
+class _Conditions:
+    """The conditions of a start as a program, with their derivatives; the same for all values of a structure."""
+
+    program: Program
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    shape: tuple[int, int]
+
+
+def _conditions(
+    assembly: Assembly, equations: Equations, targets: Sequence[_Target], constrained: bool, of_speeds: bool
+) -> _Conditions:
+    constraints: list[Expression] = []
+    if constrained and of_speeds:
+        constraints = [one.rate for one in equations.constraints]
+    elif constrained:
+        constraints = [one.value for one in equations.constraints if one.value is not None]
+    unknowns = equations.speeds if of_speeds else equations.coordinates
+    expressions = [*constraints, *(one.observable.value for one in targets)]
+    entries = jacobian(expressions, list(unknowns)) if expressions else None
+    outputs = (
+        OutputGroup("values", tuple(expressions)),
+        OutputGroup("slopes", tuple(entries.entries) if entries else ()),
+    )
+    program = Program(f"{assembly.flat.name} start", state_groups(equations), assembly.parameters, outputs)
+    places = (tuple(entries.rows), tuple(entries.columns)) if entries else ((), ())
+    return _Conditions(program, *places, (len(expressions), len(unknowns)))
 
 
 class _System:
@@ -145,24 +179,15 @@ class _System:
         assembly: Assembly,
         equations: Equations,
         targets: Sequence[_Target],
-        constraints: Sequence[Expression],
-        of_places: bool,
+        constrained: bool,
+        of_speeds: bool = False,
     ) -> None:
-        expressions = [*constraints, *(one.observable.value for one in targets)]
-        unknowns = list(equations.coordinates if of_places else equations.speeds)
-        entries = jacobian(expressions, unknowns) if expressions else None
-        self.turning = turning_of(assembly, "reduced") if of_places else None
-        groups = state_groups(equations)
-        outputs = (
-            OutputGroup("values", tuple(expressions)),
-            OutputGroup("slopes", tuple(entries.entries) if entries else ()),
-        )
-        program = Program(f"{assembly.flat.name} start", groups, assembly.parameters, outputs)
-        self.kernel = compile_program(program).bind(assembly.parameter_values)
-        self.rows = entries.rows if entries else ()
-        self.columns = entries.columns if entries else ()
-        self.shape = (len(expressions), len(unknowns))
-        self.targets, self.constraints = targets, len(constraints)
+        key = ("start", tuple(one.path for one in targets), constrained, of_speeds)
+        made = assembly.shared.get(key, lambda: _conditions(assembly, equations, targets, constrained, of_speeds))
+        self.turning = None if of_speeds else turning_of(assembly, "reduced")
+        self.kernel = assembly.kernel(made.program)
+        self.rows, self.columns, self.shape = made.rows, made.columns, made.shape
+        self.targets, self.constraints = targets, made.shape[0] - len(targets)
 
     def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what is missing in each equation, and the derivatives."""
@@ -212,17 +237,13 @@ def _newton(
 def _solve_positions(
     assembly: Assembly, equations: Equations, level: _Level, scales: FloatArray, t: float
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
-    constraints = _values(equations)
-    turning, q = turning_of(assembly, "reduced"), resting_place(equations)
-    by_symbol = {symbol: i for i, symbol in enumerate(equations.coordinates)}
     rough = [*level.guessed, *level.fixed]
-    for target in rough:  # what is said of a coordinate itself needs no iteration
-        if target.observable.value in by_symbol:
-            q[by_symbol[target.observable.value]] = target.value
+    turning = turning_of(assembly, "reduced")
+    q, is_direct = _said(equations.coordinates, rough, resting_place(equations))
     q = _turned(equations, turning, q)
-    if any(target.observable.value not in by_symbol for target in rough):
-        q, _, _ = _newton(_System(assembly, equations, rough, [], True), scales, t, q, iterations=20)
-    system = _System(assembly, equations, level.fixed, constraints, True)
+    if not is_direct:
+        q, _, _ = _newton(_System(assembly, equations, rough, False), scales, t, q, iterations=20)
+    system = _System(assembly, equations, level.fixed, True)
     q, missing, matrix = _newton(system, scales, t, q)
     if missing.size and not float(np.max(np.abs(missing))) <= _MET:
         _explain_positions(assembly, equations, level, scales, t, q, missing)
@@ -230,12 +251,18 @@ def _solve_positions(
     for chart in equations.charts:  # what turns at all has no orientation, whichever coordinate shows it here
         tangent[list(chart.coordinates)] = np.max(np.abs(tangent[list(chart.coordinates)]), axis=0)
     names = [one.name for one in equations.names]
-    return q, *_counted(names, tangent, level.fixed, len(constraints), matrix)
+    return q, *_counted(names, tangent, level.fixed, system.constraints, matrix)
 
 
-def _values(equations: Equations) -> list[Expression]:
-    """Return the constraints on positions."""
-    return [one.value for one in equations.constraints if one.value is not None]
+def _said(unknowns: Sequence[Expression], targets: Sequence[_Target], otherwise: FloatArray) -> tuple[FloatArray, bool]:
+    """Return what is said of unknowns themselves, which needs no iteration, and whether that is all that is said."""
+    values, is_direct = otherwise.copy(), True
+    for target in targets:
+        if target.observable.value in unknowns:
+            values[unknowns.index(target.observable.value)] = target.value
+        else:
+            is_direct = False
+    return values, is_direct
 
 
 def _turned(equations: Equations, turning: Turning, q: FloatArray) -> FloatArray:
@@ -256,13 +283,12 @@ def _explain_positions(
     missing: FloatArray,
 ) -> None:
     """Raise the error that says whether a loop cannot close or the start contradicts itself."""
-    constraints = _values(equations)
-    if constraints:
-        system = _System(assembly, equations, [], constraints, True)
+    if any(one.holonomic for one in equations.constraints):
+        system = _System(assembly, equations, [], True)
         nearest, alone, _ = _newton(system, scales, t, q)
         if not float(np.max(np.abs(alone))) <= _MET:
             _raise_open_loop(assembly, equations, t, nearest, alone)
-    _raise_contradiction(level.fixed, missing[len(constraints) :], equations)
+    _raise_contradiction(level.fixed, missing[len(missing) - len(level.fixed) :], equations)
 
 
 def _raise_open_loop(
@@ -321,16 +347,15 @@ def _raise_contradiction(fixed: Sequence[_Target], missing: FloatArray, equation
 def _solve_speeds(
     assembly: Assembly, equations: Equations, level: _Level, scales: FloatArray, t: float, q: FloatArray
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
-    rates = [one.rate for one in equations.constraints]
-    u = np.zeros(len(equations.speeds))
-    if level.guessed:
-        rough = _System(assembly, equations, level.guessed, [], False)
+    u, is_direct = _said(equations.speeds, [*level.guessed, *level.fixed], np.zeros(len(equations.speeds)))
+    if level.guessed and not is_direct:
+        rough = _System(assembly, equations, level.guessed, False, of_speeds=True)
         missing, matrix = rough.at(t, q, u)
         u = u - scales * least_norm(matrix * scales, missing)
-    system = _System(assembly, equations, level.fixed, rates, False)
+    system = _System(assembly, equations, level.fixed, True, of_speeds=True)
     for _ in range(3):  # linear: the second pass takes out rounding
         missing, matrix = system.at(t, q, u)
-        if not missing.size:
+        if not np.any(missing):
             break
         rows = row_scales(matrix, scales)
         u = u - scales * least_norm(matrix * scales / rows[:, None], missing / rows)
@@ -339,13 +364,13 @@ def _solve_speeds(
         rows = row_scales(matrix, scales)
         # Each equation is measured by its own terms, so that what is small beside another speed is not lost.
         own = np.abs(matrix) @ np.abs(u)
-        own[len(rates) :] += [abs(x.value) for x in level.fixed]
+        own[system.constraints :] += [abs(x.value) for x in level.fixed]
         share = np.abs(missing) / np.where(own > 0.0, own, 1.0)
         if not float(np.max(share)) <= 1e-8:
-            _raise_contradiction(level.fixed, share[len(rates) :], equations)
+            _raise_contradiction(level.fixed, share[system.constraints :], equations)
         matrix = matrix * scales / rows[:, None]
     names = motion_names(equations)
-    return u, *_counted(names, np.eye(len(u)), level.fixed, len(rates), matrix)
+    return u, *_counted(names, np.eye(len(u)), level.fixed, system.constraints, matrix)
 
 
 def _counted(

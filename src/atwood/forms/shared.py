@@ -1,0 +1,212 @@
+"""What assemblies of one structure have in common, and whether other values keep the structure.
+
+Parameters are arguments of every program. So another mass, another length or another start needs no new equations,
+programs or kernels, as long as everything that shapes them stays: parts, connections, counts, choices, directions,
+exact zeros, functions of time, signs of lengths on a line, and what was decided by the size of numbers.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from atwood.expr import Expression
+from atwood.mechanics.build import Mechanism, check_closures
+from atwood.mechanics.orientation import body_offsets
+from atwood.model.flatten import FlatScene, Part
+from atwood.topology.sides import find_sides
+
+__all__ = ["Shared", "Slot", "find_slots", "with_values_of"]
+
+T = TypeVar("T")
+
+
+class Shared:
+    """What is made once for all assemblies of one structure, when it is first asked for; any thread may ask.
+
+    Parameters
+    ----------
+    family
+        What the other modes of the scene share with it; its own if not given.
+    """
+
+    def __init__(self, family: Shared | None = None) -> None:
+        self.family = family or self
+        self._made: dict[Any, Any] = {}
+        self._lock = threading.RLock()
+
+    def get(self, key: Any, make: Callable[[], T]) -> T:
+        """Return what was made under a key, making it if it is not there.
+
+        Parameters
+        ----------
+        key
+            What it is, and all that it depends on besides the structure.
+        make
+            Makes it.
+        """
+        try:
+            found: T = self._made[key]
+        except KeyError:
+            with self._lock:
+                if key not in self._made:
+                    self._made[key] = make()
+                found = self._made[key]
+        return found
+
+
+@dataclass(frozen=True)
+class Slot:
+    """Where in a scene a number stands.
+
+    Attributes
+    ----------
+    part
+        Path of the part; empty for the scene's gravity.
+    name
+        Its parameter or input.
+    axis
+        Which component, for a parameter with several; None for a single number.
+    """
+
+    part: str
+    name: str
+    axis: int | None = None
+
+    @property
+    def path(self) -> str:
+        """The path of the number, as a reader writes it."""
+        place = f"{self.part}.{self.name}" if self.part else self.name
+        return place if self.axis is None else f"{place}[{self.axis}]"
+
+    def read(self, flat: FlatScene) -> Any:
+        """Return the value that a scene has there."""
+        if not self.part:
+            return flat.gravity
+        part = flat.parts[self.part]
+        value = part.values[self.name] if self.name in part.values else part.signals[self.name]
+        return value if self.axis is None or value is None else value[self.axis]
+
+
+def find_slots(flat: FlatScene) -> Iterator[tuple[str, Slot]]:
+    """Yield the name of the symbol that each value of a scene would have, and where it stands."""
+    yield "gravity", Slot("", "gravity")
+    for path, part in flat.parts.items():
+        for name, spec in part.component.parameter_specs().items():
+            if spec.size is None or part.values[name] is None:
+                yield f"{path}.{name}", Slot(path, name)
+                continue
+            for axis in range(spec.size):
+                label = "xyz"[axis] if spec.size == 3 else str(axis)
+                yield f"{path}.{name}.{label}", Slot(path, name, axis)
+        for name in part.signals:
+            yield f"{path}.{name}", Slot(path, name)
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Which values of a scene are arguments of its programs, by symbol, and which have shaped them."""
+
+    free: tuple[tuple[Expression, Slot], ...]
+    fixed: tuple[Slot, ...]
+
+
+def _find_shape(flat: FlatScene, mechanism: Mechanism) -> _Shape | None:
+    known = {symbol.name: symbol for symbol in mechanism.table.values}
+    slots = dict(find_slots(flat))
+    if not set(known) <= set(slots):
+        return None
+    fixed = tuple(slot for name, slot in slots.items() if name not in known)
+    return _Shape(tuple((symbol, slots[name]) for name, symbol in known.items()), fixed)
+
+
+def with_values_of(
+    flat: FlatScene, mechanism: Mechanism, shared: Shared, other: FlatScene
+) -> tuple[Mechanism | None, str]:
+    """Return a mechanism with the values of another scene, if these do not change its structure.
+
+    Parameters
+    ----------
+    flat, mechanism
+        A scene, and its mechanism.
+    shared
+        What is shared by all scenes of this structure.
+    other
+        The scene whose values to take.
+
+    Returns
+    -------
+    Mechanism or None
+        None if the structure is another one.
+    str
+        Why, in words.
+
+    Raises
+    ------
+    TopologyError
+        If rigid parts contradict each other with these values.
+    """
+    reason = _changed_parts(flat, other)
+    shape = shared.get("shape", lambda: _find_shape(flat, mechanism))
+    if reason or shape is None:
+        return None, reason or "not every number can be traced to its place"
+    for slot in shape.fixed:
+        before, now = slot.read(flat), slot.read(other)
+        if not _is_same(before, now):
+            return None, f"{slot.path} was {_shown(before)} and is {_shown(now)}"
+    values: dict[Expression, float] = {}
+    for symbol, slot in shape.free:
+        value = slot.read(other)
+        if not isinstance(value, (int, float)) or value == 0.0:
+            return None, f"{slot.path} was a number other than zero and is {_shown(value)}"
+        values[symbol] = float(value)
+    moved = _moved(mechanism, other, values)
+    check_closures(moved)
+    for decide, outcome in mechanism.decisions:
+        if decide(moved) != outcome:
+            return None, "other coordinates are eliminated with these values"
+    if mechanism.sides is not None and _sides(moved, other, shared) != mechanism.sides:
+        return None, "on the line, parts start on other sides of each other"
+    return moved, ""
+
+
+def _changed_parts(flat: FlatScene, other: FlatScene) -> str:
+    """Return what differs in parts and connections, in words; empty if nothing does."""
+    if list(flat.parts) != list(other.parts):
+        return "it has other parts"
+    for path, part in flat.parts.items():
+        if type(part.component) is not type(other.parts[path].component):
+            return f"{path} is another component"
+    if flat.connections != other.connections or flat.links != other.links:
+        return "it has other connections"
+    if (flat.space, flat.line_axis) != (other.space, other.line_axis):
+        return "it lives in another space"
+    return ""
+
+
+def _is_same(before: Any, now: Any) -> bool:
+    return before is now or (type(before) is type(now) and bool(before == now))
+
+
+def _shown(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _moved(mechanism: Mechanism, other: FlatScene, values: Mapping[Expression, float]) -> Mechanism:
+    """Return a mechanism with other numbers in its places."""
+    locals_ = {path: replace(local, part=_kept(local.part, other)) for path, local in mechanism.locals_.items()}
+    return replace(mechanism, table=replace(mechanism.table, values=dict(values)), locals_=locals_)
+
+
+def _kept(part: Part, other: FlatScene) -> Part:
+    """Return a part with the other scene's numbers; its component, whose laws were read, stays."""
+    now = other.parts[part.path]
+    return replace(part, values=now.values, signals=now.signals)
+
+
+def _sides(mechanism: Mechanism, flat: FlatScene, shared: Shared) -> Mapping[tuple[str, str, str], float]:
+    bodies, space = mechanism.bodies, mechanism.space
+    offsets = shared.get("offsets", lambda: {body.index: body_offsets(body, space)[0] for body in bodies.bodies})
+    return find_sides(flat, mechanism.graph, bodies, mechanism.locals_, offsets, mechanism.table.values, space)
