@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 
 from atwood import (
     BodyInertia,
@@ -52,6 +53,19 @@ class RigidBody(Component):
     def center_in_world(self) -> Vector:
         """Return the centre of mass from the frame, in world axes."""
         return self.frame.to_world(as_vector(self.center))
+
+    def restate_start(self, given: Mapping[str, float], space: str) -> dict[str, float]:
+        """Return start values with Euler angles said as the axes that they stand for; those not given are zero."""
+        said = dict(given)
+        if space != "space" or not {"phi", "theta", "psi"} & said.keys():
+            return said
+        phi, theta, psi = (said.pop(name, 0.0) for name in ("phi", "theta", "psi"))
+        (sa, ca), (sb, cb), (sc, cc) = ((math.sin(angle), math.cos(angle)) for angle in (phi, theta, psi))
+        x_axis = (ca * cb * cc - sa * sc, sa * cb * cc + ca * sc, -sb * cc)
+        z_axis = (ca * sb, sa * sb, cb)
+        said.update({f"x_axis.{axis}": value for axis, value in zip("xyz", x_axis, strict=True)})
+        said.update({f"z_axis.{axis}": value for axis, value in zip("xyz", z_axis, strict=True)})
+        return said
 
     @inertia
     def rigid_body(self) -> Iterable[BodyInertia]:
@@ -114,7 +128,13 @@ class RigidBody(Component):
         """Return the axis."""
         return self.frame.axes[2]
 
-    @observable(unit="rad", doc="First Euler angle, about the world's z axis.", periodic=True, spaces=("space",))
+    @observable(
+        unit="rad",
+        doc="First Euler angle, about the world's z axis.",
+        periodic=True,
+        rate="phi_rate",
+        spaces=("space",),
+    )
     def phi(self) -> Scalar:
         """Return the azimuth of the frame's z axis (Goldstein, section 4.4, in the z-y-z convention)."""
         z = self.frame.axes[2]
@@ -126,11 +146,34 @@ class RigidBody(Component):
         z = self.frame.axes[2]
         return atan2(sqrt(z.x * z.x + z.y * z.y), z.z)
 
-    @observable(unit="rad", doc="Third Euler angle, about the frame's z axis.", periodic=True, spaces=("space",))
+    @observable(
+        unit="rad",
+        doc="Third Euler angle, about the frame's z axis.",
+        periodic=True,
+        rate="psi_rate",
+        spaces=("space",),
+    )
     def psi(self) -> Scalar:
         """Return the angle about the frame's own z axis."""
         x, y, _ = self.frame.axes
         return atan2(y.z, -x.z)
+
+    @observable(unit="rad/s", doc="Rate of phi (precession).", spaces=("space",))
+    def phi_rate(self) -> Scalar:
+        """Return the rate of the first Euler angle (Goldstein, section 4.9, in the z-y-z convention)."""
+        (x, y, _), w = self.frame.axes, self.spin()
+        return (w.x * x.z + w.y * y.z) / (x.z * x.z + y.z * y.z)
+
+    @observable(unit="rad/s", doc="Rate of theta (nutation).", spaces=("space",))
+    def theta_rate(self) -> Scalar:
+        """Return the rate of the second Euler angle."""
+        (x, y, _), w = self.frame.axes, self.spin()
+        return (w.x * y.z - w.y * x.z) / sqrt(x.z * x.z + y.z * y.z)
+
+    @observable(unit="rad/s", doc="Rate of psi (spin).", spaces=("space",))
+    def psi_rate(self) -> Scalar:
+        """Return the rate of the third Euler angle."""
+        return self.spin().z - self.phi_rate() * self.frame.axes[2].z
 
     @observable(unit="J", doc="Energy of turning about the centre of mass.", spaces=("space",))
     def turning_energy(self) -> Scalar:

@@ -190,6 +190,21 @@ class Component:
             return dot(separation, self.line) * self.side(a, b, side)
         return norm(separation)
 
+    def restate_start(self, given: Mapping[str, float], space: str) -> dict[str, float]:
+        """Return start values of this component, said in a way that a start can be found from.
+
+        A component overrides this where what people say is no good condition: Euler angles, say, have no derivative
+        where they meet, while the axes they stand for have one everywhere.
+
+        Parameters
+        ----------
+        given
+            Start values of its quantities by name, in SI units.
+        space
+            ``"line"``, ``"plane"`` or ``"space"``.
+        """
+        return dict(given)
+
     def reaction(self, name: str) -> Scalar:
         """Return a reaction of this component; only within an observable or an event."""
         reactions = self._binding().reactions

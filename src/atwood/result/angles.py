@@ -29,11 +29,16 @@ def unwrap(
     """
     if not len(values):
         return values
-    if time is None or rate is None:
-        smooth: NDArray[np.float64] = np.unwrap(values)
-    else:
-        expected = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))])
-        smooth = expected + np.unwrap(values - expected)
+    steps = np.diff(values)
+    steps = np.where(np.isnan(steps), steps, np.remainder(steps + np.pi, 2.0 * np.pi) - np.pi)
+    if time is not None and rate is not None:
+        spans = np.diff(time)
+        with np.errstate(invalid="ignore"):
+            expected = 0.5 * (rate[1:] + rate[:-1]) * spans
+            # Where the rate jumps, as near the pole of Euler angles, it says nothing of what lies between.
+            is_steady = np.isfinite(expected) & (np.abs(np.diff(rate)) * spans < np.pi)
+        steps = steps + 2.0 * np.pi * np.where(is_steady, np.round((expected - steps) / (2.0 * np.pi)), 0.0)
+    smooth: NDArray[np.float64] = values[0] + np.concatenate([[0.0], np.cumsum(steps)])
     if start is not None:
         smooth = smooth + 2.0 * np.pi * np.round((start - smooth[0]) / (2.0 * np.pi))
     return smooth

@@ -7,7 +7,7 @@ balance of forces.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -16,7 +16,7 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import StartError
+from atwood.errors import KernelEvaluationError, StartError
 from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
@@ -25,7 +25,7 @@ from atwood.mechanics.equations import Equations
 from atwood.mechanics.observables import Observable
 from atwood.solve.balance import independent_rows, least_norm, row_scales
 from atwood.solve.scales import motion_names, motion_scales, scene_length
-from atwood.solve.turning import Turning, resting_place, turning_of
+from atwood.solve.turning import Turning, resting_place, roughly_turned, turning_of
 
 __all__ = ["Start", "find_start", "own_state"]
 
@@ -111,12 +111,27 @@ def find_start(assembly: Assembly) -> Start:
 def _sort_targets(assembly: Assembly, equations: Equations) -> tuple[_Level, _Level]:
     levels = (_Level([], []), _Level([], []))
     for is_fixed, given in ((True, assembly.flat.start), (False, assembly.flat.guess)):
-        for path, value in given.items():
+        for path, value in _restated(assembly, given).items():
             number = assembly.shared.get(("start level", path), partial(_find_level, assembly, equations, path))
             level = levels[number]
             target = _Target(path, value, assembly.start_observables[path])
             (level.fixed if is_fixed else level.guessed).append(target)
     return levels
+
+
+def _restated(assembly: Assembly, given: Mapping[str, float]) -> dict[str, float]:
+    """Return start values with those that a part says in another way said so; see `Component.restate_start`."""
+    found = dict(given)
+    for path, part in assembly.flat.parts.items():
+        own = {key[len(path) + 1 :]: value for key, value in given.items() if key.rpartition(".")[0] == path}
+        if not own:
+            continue
+        restated = part.component.restate_start(own, assembly.mechanism.space.name)
+        if restated != own:
+            for name in own:
+                del found[f"{path}.{name}"]
+            found.update({f"{path}.{name}": value for name, value in restated.items()})
+    return found
 
 
 def _find_level(assembly: Assembly, equations: Equations, path: str) -> int:
@@ -188,6 +203,7 @@ class _System:
         self.kernel = assembly.kernel(made.program)
         self.rows, self.columns, self.shape = made.rows, made.columns, made.shape
         self.targets, self.constraints = targets, made.shape[0] - len(targets)
+        self.speeds = len(equations.speeds)
 
     def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what is missing in each equation, and the derivatives."""
@@ -242,7 +258,7 @@ def _solve_positions(
     q, is_direct = _said(equations.coordinates, rough, resting_place(equations))
     q = _turned(equations, turning, q)
     if not is_direct:
-        q, _, _ = _newton(_System(assembly, equations, rough, False), scales, t, q, iterations=20)
+        q = _brought_near(_System(assembly, equations, rough, False), equations, scales, t, q)
     system = _System(assembly, equations, level.fixed, True)
     q, missing, matrix = _newton(system, scales, t, q)
     if missing.size and not float(np.max(np.abs(missing))) <= _MET:
@@ -252,6 +268,29 @@ def _solve_positions(
         tangent[list(chart.coordinates)] = np.max(np.abs(tangent[list(chart.coordinates)]), axis=0)
     names = [one.name for one in equations.names]
     return q, *_counted(names, tangent, level.fixed, system.constraints, matrix)
+
+
+def _brought_near(system: _System, equations: Equations, scales: FloatArray, t: float, q: FloatArray) -> FloatArray:
+    """Return a configuration near what is said of it; orientations begin elsewhere where they do not get there."""
+    try:
+        near, missing, _ = _newton(system, scales, t, q, iterations=20)
+        if not equations.charts or float(np.max(np.abs(missing), initial=0.0)) <= _MET:
+            return near
+    except KernelEvaluationError:
+        if not equations.charts:
+            raise
+    turned = roughly_turned(equations, lambda trial: _far_off(system, t, trial), q)
+    return _newton(system, scales, t, turned, iterations=20)[0]
+
+
+def _far_off(system: _System, t: float, q: FloatArray) -> float:
+    """Return how far a configuration is from what is asked for; infinite where that has no value."""
+    try:
+        missing, matrix = system.at(t, q, np.zeros(system.speeds))
+    except KernelEvaluationError:
+        return np.inf
+    rows = np.max(np.abs(matrix), axis=1, initial=0.0)
+    return float(np.sum((missing / np.where(rows > 0.0, rows, 1.0)) ** 2))
 
 
 def _said(unknowns: Sequence[Expression], targets: Sequence[_Target], otherwise: FloatArray) -> tuple[FloatArray, bool]:

@@ -7,6 +7,9 @@ would do in a unit of time.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +18,7 @@ from atwood.forms.program import RatesProgram
 from atwood.kernels import BoundKernel
 from atwood.mechanics.equations import Equations
 
-__all__ = ["Turning", "resting_place", "turning_of"]
+__all__ = ["Turning", "resting_place", "roughly_turned", "turning_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -89,6 +92,60 @@ def resting_place(equations: Equations) -> FloatArray:
     for chart in equations.charts:
         q[chart.coordinates[0]] = 1.0
     return q
+
+
+def roughly_turned(equations: Equations, far_off: Callable[[FloatArray], float], q: FloatArray) -> FloatArray:
+    """Return coordinates with each orientation the best of some that cover all of them evenly.
+
+    Parameters
+    ----------
+    equations
+        With the charts.
+    far_off
+        How far coordinates are from what is wanted.
+    q
+        Where to begin; what is not an orientation stays.
+    """
+    best, least = q, far_off(q)
+    for chart in equations.charts:
+        if chart.kind != "quaternion" or least == 0.0:
+            continue
+        start = best
+        for candidate in _orientations():
+            trial = start.copy()
+            trial[list(chart.coordinates)] = candidate
+            size = far_off(trial)
+            if size < 0.999 * least:
+                best, least = trial, size
+    return best
+
+
+@cache
+def _orientations() -> tuple[tuple[float, ...], ...]:
+    """Return quaternions that cover all orientations: the 24 turns of a cube, each also turned a little askew."""
+    square = [tuple(1.0 if i == k else 0.0 for i in range(4)) for k in range(4)]
+    halves = [(0.5, a, b, c) for a in (0.5, -0.5) for b in (0.5, -0.5) for c in (0.5, -0.5)]
+    r = 0.5**0.5
+    edges = [
+        tuple(r if i == a else sign * r if i == b else 0.0 for i in range(4))
+        for a in range(4)
+        for b in range(a + 1, 4)
+        for sign in (1.0, -1.0)
+    ]
+    cube = np.array([*square, *halves, *edges])
+    w, x, y, z = cube.T
+    askew = np.array([0.95, 0.21, 0.15, 0.17]) / np.linalg.norm([0.95, 0.21, 0.15, 0.17])
+    a, b, c, d = askew
+    turned = np.stack(
+        [
+            w * a - x * b - y * c - z * d,
+            w * b + x * a + y * d - z * c,
+            w * c + y * a + z * b - x * d,
+            w * d + z * a + x * c - y * b,
+        ],
+        axis=1,
+    )
+    return tuple(tuple(float(value) for value in row) for row in (*cube, *turned))
 
 
 def turning_of(assembly: Assembly, form: FormName) -> Turning:
