@@ -25,6 +25,9 @@ TIGHT = ((1e-12, "reduced"), (1e-11, "reduced"), (1e-11, "dae"), (1e-10, "reduce
 _BEFORE = 0.99
 """Where an event stops the scene, so much of the time before it is compared: less accurate runs meet it earlier."""
 
+_COMPARED = ("m", "rad", "1")
+"""Units of what is compared: positions, angles, axes."""
+
 _HOLDS = 1e-6
 """A closed form that misses a tight solution by more belongs to another start."""
 
@@ -42,9 +45,9 @@ class Reference:
     time
         Output times, s.
     quantities
-        Positions and angles by path.
+        Positions, angles and axes by path.
     scales
-        Size of each: the extent of the scene for a length, one radian for an angle.
+        Size of each: the extent of the scene for a length, one for an angle in radians or an axis.
     error
         Estimate of its own error, scaled like the errors of the rows.
     note
@@ -91,7 +94,7 @@ def find_reference(
     error = scaled_difference(quantities, second.table(paths), scales)
     given = _closed_form(scene, best)
     if given:
-        known = {path: values for path, values in given.items() if path in best and best.unit(path) in ("m", "rad")}
+        known = {path: values for path, values in given.items() if path in best and best.unit(path) in _COMPARED}
         known_scales = {path: best.run.start.length if best.unit(path) == "m" else 1.0 for path in known}
         miss = scaled_difference(known, best.table(known), known_scales)
         if known and miss < max(_HOLDS, 100.0 * error):
@@ -168,7 +171,10 @@ def run_flat(
 
 
 def compared_paths(result: Result) -> list[str]:
-    """Return the positions of all bodies with mass, and the coordinates that are angles.
+    """Return the positions of all bodies with mass, the coordinates that are angles, and, in space, axes of bodies.
+
+    Axes that differ by less than they are long differ by the angle between two orientations, in radians; coordinates
+    of orientations differ where nothing does.
 
     Parameters
     ----------
@@ -179,7 +185,11 @@ def compared_paths(result: Result) -> list[str]:
     owners = [path for path, local in assembly.mechanism.locals_.items() if local.point_inertias or local.body_inertias]
     paths = [f"{owner}.position.{axis}" for owner in owners for axis in "xyz"]
     paths += [one.name for one in assembly.reduced.names]
-    return [path for path in dict.fromkeys(paths) if path in result and result.unit(path) in ("m", "rad")]
+    found = [path for path in dict.fromkeys(paths) if path in result and result.unit(path) in ("m", "rad")]
+    if assembly.mechanism.space.name == "space":
+        axes = [f"{owner}.{axis}_axis.{part}" for owner in owners for axis in "xyz" for part in "xyz"]
+        found += [path for path in axes if path in result]
+    return found
 
 
 def scaled_difference(
