@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
+from dataclasses import dataclass, fields
 from functools import cache
 from itertools import accumulate
 from math import inf
@@ -20,6 +21,7 @@ from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.expr import Program
 from atwood.kernels.llvm_build import Built, build_code, default_options
 from atwood.kernels.llvm_module import CodeOptions, Part
+from atwood.solve.batch import BatchPlaces
 from atwood.solve.driver import FloatArray, SolverOptions
 from atwood.solve.event_watch import State
 from atwood.solve.explicit_code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
@@ -33,7 +35,7 @@ from atwood.solve.explicit_problem import (
 )
 from atwood.solve.explicit_reference import no_interpolation
 
-__all__ = ["CompiledAccelerations", "CompiledStepper"]
+__all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates"]
 
 _RATES = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
 _UNLIMITED = 2**62
@@ -88,6 +90,34 @@ class CompiledAccelerations:
 
         return rates
 
+    def open(self) -> OwnRates:
+        """Return rates of a session whose parameters can be changed between its runs."""
+        # The pointers to derived values and scratch, then the derived values and the scratch themselves.
+        count = len(self.program.prologue)
+        own = np.empty(2 + count + self._built.scratch)
+        data = own.ctypes.data
+        own[:2].view(np.uint64)[:] = derived, scratch = data + 16, data + 16 + 8 * count
+        rates = CompiledRates(self._built.code.addresses["rates"], data, (self._built, own))
+        return OwnRates(rates, self._built.code.addresses["kernel_prologue"], derived, scratch)
+
+
+@dataclass(frozen=True)
+class OwnRates:
+    """Compiled rates with a place for their parameters.
+
+    Attributes
+    ----------
+    rates
+        The rates; they have values once the prologue was called.
+    prologue, derived, scratch
+        Address of the function that computes what depends on parameters alone, and of its two arrays.
+    """
+
+    rates: CompiledRates
+    prologue: int
+    derived: int
+    scratch: int
+
 
 class CompiledStepper:
     """The state of a run; see `~atwood.solve.explicit_problem.Stepper`.
@@ -125,10 +155,19 @@ class CompiledStepper:
         self._places = c_void_p(base + 8 * ends[3]), c_void_p(base + 8 * ends[4])
         self._run, self._interpolate, self._sample, self._begin = functions()
 
+    def batch_places(self) -> BatchPlaces:
+        """Return the addresses with which many runs can be made in one call."""
+        begin, sample = (_code().code.addresses[name] for name in ("begin", "sample"))
+        limit, steps, filled = (self._counts[k:].ctypes.data for k in (_LIMIT, _STEPS, _FILLED))
+        tolerance = self._arrays[ROWS["absolute"]].ctypes.data
+        return BatchPlaces(
+            begin, sample, self._session.value or 0, limit, steps, filled, tolerance, len(fields(Counts)), self
+        )
+
     @property
     def counts(self) -> Counts:
         """What it has done so far, over all starts."""
-        return Counts(*self._counts[_STEPS : _STEPS + 5].tolist())
+        return Counts(*self._counts[_STEPS : _STEPS + len(fields(Counts))].tolist())
 
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""

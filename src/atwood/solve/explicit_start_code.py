@@ -18,6 +18,8 @@ entry:
 {opening()}
   store double %t, ptr %t.at
   store double %t, ptr %t_old.at
+  store i64 0, ptr %edgy.at
+  store i64 0, ptr %calm.at
   %bytes = mul i64 %n, 8
   %y.index = mul i64 %m, {ROWS["y"]}
   %y = getelementptr double, ptr %arrays, i64 %y.index
