@@ -6,46 +6,16 @@ knows of a problem comes in through pointers, so that it is compiled once and ke
 
 from __future__ import annotations
 
+from atwood.solve.explicit_layout import COUNTS, NUMBERS, POINTERS, opening
 from atwood.solve.explicit_loops import ROWS, exact, loop_code
 from atwood.solve.explicit_problem import CALM, EDGE, STIFF
 from atwood.solve.explicit_reference import GROWTH, RETREAT, SAFETY, SHRINKAGE
+from atwood.solve.explicit_start_code import begin_code
 from atwood.solve.explicit_table import NODES
 
 __all__ = ["COUNTS", "FUNCTIONS", "NUMBERS", "POINTERS", "step_code"]
 
-NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest")
-COUNTS = (
-    "size",
-    "padded",
-    "limit",
-    "steps",
-    "failures",
-    "evaluations",
-    "missing",
-    "stiff",
-    "is_dense",
-    "filled",
-    "edgy",
-    "calm",
-)
-POINTERS = ("function", "data", "numbers", "counts", "arrays")
-FUNCTIONS = ("run", "interpolate", "sample", "evaluate")
-
-
-def _fields(names: tuple[str, ...], group: str) -> str:
-    """Return the instructions that find the places of numbers or counts."""
-    return "\n".join(f"  %{name}.at = getelementptr i64, ptr %{group}, i64 {k}" for k, name in enumerate(names))
-
-
-def _opening() -> str:
-    """Return the instructions that unpack the pointers of a session."""
-    lines = []
-    for k, name in enumerate(POINTERS):
-        lines.append(f"  %{name}.from = getelementptr ptr, ptr %session, i64 {k}")
-        lines.append(f"  %{name} = load ptr, ptr %{name}.from")
-    lines += [_fields(NUMBERS, "numbers"), _fields(COUNTS, "counts")]
-    lines += ["  %n = load i64, ptr %size.at", "  %m = load i64, ptr %padded.at"]
-    return "\n".join(lines)
+FUNCTIONS = ("run", "interpolate", "sample", "begin")
 
 
 def _evaluations(stages: tuple[int, ...], failed: str) -> str:
@@ -64,8 +34,8 @@ after{stage}:""")
 
 def _evaluate() -> str:
     """Return the function that takes a slope: from a row, to a row, and counts it."""
-    return f"""define i32 @evaluate(ptr %session, double %t, i64 %from, i64 %to) #0 {{
-{_opening()}
+    return f"""define internal i32 @evaluate(ptr %session, double %t, i64 %from, i64 %to) #0 {{
+{opening()}
   %i = mul i64 %from, %m
   %o = mul i64 %to, %m
   %y = getelementptr double, ptr %arrays, i64 %i
@@ -87,7 +57,7 @@ def _run() -> str:
     """Return the function that takes steps: 0 at the stop time, 1 at the limit of steps, 2 if steps get too small."""
     return f"""define i32 @run(ptr %session) #0 {{
 entry:
-{_opening()}
+{opening()}
   %stop = load double, ptr %stop.at
   %relative = load double, ptr %relative.at
   %longest = load double, ptr %longest.at
@@ -235,7 +205,7 @@ def _interpolate() -> str:
     """Return the function that writes values and rates at a time within the last step; 3 where there are none."""
     return f"""define i32 @interpolate(ptr %session, double %time, ptr %y_out, ptr %yp_out) #0 {{
 entry:
-{_opening()}
+{opening()}
   %bytes = mul i64 %n, 8
   %t_new = load double, ptr %t.at
   %t = load double, ptr %t_old.at
@@ -284,7 +254,7 @@ def _sample() -> str:
     """Return the function that goes through output times and fills a table; it ends as `run` does."""
     return f"""define i32 @sample(ptr %session, ptr %times, i64 %wanted, ptr %ys, ptr %yps) #0 {{
 entry:
-{_opening()}
+{opening()}
   br label %next
 next:
   %i = phi i64 [ 0, %entry ], [ %following, %filled ]
@@ -322,5 +292,5 @@ def step_code() -> str:
     They take a pointer to the pointers of a session, in the order of `POINTERS`; numbers and counts are in the order of
     `NUMBERS` and `COUNTS`.
     """
-    parts = [loop_code(), _evaluate(), _run(), _interpolate(), _sample()]
+    parts = [loop_code(), _evaluate(), begin_code(), _run(), _interpolate(), _sample()]
     return "\n".join([*parts, "declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"])

@@ -130,6 +130,25 @@ def _sum(loop: _Loop, name: str, square: str, arguments: str = "") -> str:
     return loop.function(name, arguments, carried=carried, end=end)
 
 
+def _size(name: str, row: int, less: int | None = None) -> str:
+    """Return the function of the sum of the squares of a row, or of a difference, in units of what is allowed at y."""
+    loop = _Loop()
+    magnitude = loop.put(f"call {_VECTOR} @llvm.fabs.v{WIDTH}f64({_VECTOR} {loop.load(ROWS['y'])})")
+    allowed = loop.binary("fmul", magnitude, loop.spread("%relative"))
+    scale = loop.binary("fadd", allowed, loop.load(ROWS["absolute"]))
+    value = loop.load(row) if less is None else loop.binary("fsub", loop.load(row), loop.load(less))
+    scaled = loop.binary("fdiv", value, scale)
+    return _sum(loop, name, loop.binary("fmul", scaled, scaled), ", double %relative")
+
+
+def _euler() -> str:
+    """Return the function that writes where a step of Euler's method leads."""
+    loop = _Loop()
+    moved = loop.binary("fmul", loop.load(12), loop.spread("%h"))
+    loop.store(loop.binary("fadd", loop.load(ROWS["y"]), moved), ROWS["trial"])
+    return loop.function("euler", ", double %h")
+
+
 def _distance(name: str, a: int, b: int) -> str:
     """Return the function of the square of the distance between two rows."""
     loop = _Loop()
@@ -178,6 +197,7 @@ def loop_code() -> str:
     parts = [_stage(stage) for stage in range(1, 16)]
     parts += [_squares("squares5", ERROR_5), _squares("squares3", ERROR_3)]
     parts += [_distance("slopes", 12, 11), _distance("values", ROWS["trial"], ROWS["last"])]
+    parts += [_size("size0", ROWS["y"]), _size("size1", 12), _size("size2", 1, 12), _euler()]
     parts += [_copy("shift", {12: 0}), _copy("unshift", {0: 12})]
     parts += [_copy("accept", {ROWS["y"]: ROWS["y_old"], ROWS["trial"]: ROWS["y"]})]
     parts += [_dense(), _polynomial()]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
+from dataclasses import dataclass, fields
 from functools import cache
 from itertools import accumulate
 from math import inf
@@ -20,6 +21,7 @@ from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.expr import Program
 from atwood.kernels.llvm_build import Built, build_code, default_options
 from atwood.kernels.llvm_module import CodeOptions, Part
+from atwood.solve.batch import BatchPlaces
 from atwood.solve.driver import FloatArray, SolverOptions
 from atwood.solve.event_watch import State
 from atwood.solve.explicit_code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
@@ -30,11 +32,10 @@ from atwood.solve.explicit_problem import (
     ExplicitProblem,
     Outcome,
     absolute_tolerances,
-    first_step,
 )
-from atwood.solve.explicit_reference import ORDER, no_interpolation
+from atwood.solve.explicit_reference import no_interpolation
 
-__all__ = ["CompiledAccelerations", "CompiledStepper"]
+__all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates"]
 
 _RATES = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
 _UNLIMITED = 2**62
@@ -91,6 +92,34 @@ class CompiledAccelerations:
 
         return rates
 
+    def open(self) -> OwnRates:
+        """Return rates of a session whose parameters can be changed between its runs."""
+        # The pointers to derived values and scratch, then the derived values and the scratch themselves.
+        count = len(self.program.prologue)
+        own = np.empty(2 + count + self._built.scratch)
+        data = own.ctypes.data
+        own[:2].view(np.uint64)[:] = derived, scratch = data + 16, data + 16 + 8 * count
+        rates = CompiledRates(self._built.code.addresses["rates"], data, (self._built, own))
+        return OwnRates(rates, self._built.code.addresses["kernel_prologue"], derived, scratch)
+
+
+@dataclass(frozen=True)
+class OwnRates:
+    """Compiled rates with a place for their parameters.
+
+    Attributes
+    ----------
+    rates
+        The rates; they have values once the prologue was called.
+    prologue, derived, scratch
+        Address of the function that computes what depends on parameters alone, and of its two arrays.
+    """
+
+    rates: CompiledRates
+    prologue: int
+    derived: int
+    scratch: int
+
 
 class CompiledStepper:
     """The state of a run; see `~atwood.solve.explicit_problem.Stepper`.
@@ -122,27 +151,30 @@ class CompiledStepper:
         self._counts[:2] = n, padded
         self._numbers[_R] = options.relative_tolerance
         self._numbers[_LONGEST] = options.max_step or inf
+        self._numbers[_HORIZON], self._numbers[_FIRST] = options.horizon, options.first_step or 0.0
         self._pointers[:] = rates.function, rates.data, base + 8 * ends[0], base + 8 * ends[1], base
         self._session = c_void_p(base + 8 * ends[2])
         self._places = c_void_p(base + 8 * ends[3]), c_void_p(base + 8 * ends[4])
-        self._evaluate, self._run, self._interpolate, self._sample = _functions()
+        self._run, self._interpolate, self._sample, self._begin = functions()
+
+    def batch_places(self) -> BatchPlaces:
+        """Return the addresses with which many runs can be made in one call."""
+        begin, sample = (_code().code.addresses[name] for name in ("begin", "sample"))
+        limit, steps, filled = (self._counts[k:].ctypes.data for k in (_LIMIT, _STEPS, _FILLED))
+        tolerance = self._arrays[ROWS["absolute"]].ctypes.data
+        return BatchPlaces(
+            begin, sample, self._session.value or 0, limit, steps, filled, tolerance, len(fields(Counts)), self
+        )
 
     @property
     def counts(self) -> Counts:
         """What it has done so far, over all starts."""
-        return Counts(*self._counts[_STEPS : _STEPS + 5].tolist())
+        return Counts(*self._counts[_STEPS : _STEPS + len(fields(Counts))].tolist())
 
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
-        self._numbers[_T] = self._numbers[_T_OLD] = t
-        self._arrays[ROWS["y"], : self._size] = y
-        self._arrays[ROWS["y_old"], : self._size] = y
-        if not self._take(t, "y", 12):
-            return False
-        slope = self._arrays[12, : self._size].copy()
-        step = first_step(self._slope, self._options, self._absolute, t, np.array(y, dtype=np.float64), slope, ORDER)
-        self._numbers[_NEXT] = step
-        return True
+        self._y[:] = y
+        return self._finish(self._begin(self._session, t, self._places[0])) == 0
 
     def state(self) -> State:
         """Return time, values and rates at the end of the last step."""
@@ -173,15 +205,6 @@ class CompiledStepper:
             raise no_interpolation(float(times[filled]))
         return y[:filled], yp[:filled], Outcome(outcome)
 
-    def _take(self, t: float, source: str, target: int) -> bool:
-        return bool(self._finish(self._evaluate(self._session, t, ROWS[source], target)) == 0)
-
-    def _slope(self, t: float, y: FloatArray) -> FloatArray:
-        self._arrays[ROWS["trial"], : self._size] = y
-        if not self._take(t, "trial", 1):
-            return np.full(self._size, np.nan)
-        return self._arrays[1, : self._size].copy()
-
     def _finish(self, code: int) -> int:
         """Return the code of a call, after raising what was raised in it."""
         if self._failure is not None:
@@ -210,7 +233,7 @@ class CompiledStepper:
         return CompiledRates(ctypes.cast(function, c_void_p).value or 0, 0, function)
 
 
-_T, _T_OLD, _NEXT, _STOP, _R, _LONGEST = map(NUMBERS.index, ("t", "t_old", "next", "stop", "relative", "longest"))
+_T, _STOP, _R, _LONGEST, _HORIZON, _FIRST = map(NUMBERS.index, ("t", "stop", "relative", "longest", "horizon", "first"))
 _LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
 
 
@@ -221,14 +244,14 @@ def _code() -> Built:
 
 
 @cache
-def _functions() -> tuple[Callable[..., int], ...]:
-    """Return the functions `evaluate`, `run`, `interpolate` and `sample`."""
+def functions() -> tuple[Callable[..., int], ...]:
+    """Return the functions `run`, `interpolate`, `sample` and `begin`."""
     addresses = _code().code.addresses
     shapes = {
-        "evaluate": (c_void_p, c_double, c_int64, c_int64),
         "run": (c_void_p,),
         "interpolate": (c_void_p, c_double, c_void_p, c_void_p),
         "sample": (c_void_p, c_void_p, c_int64, c_void_p, c_void_p),
+        "begin": (c_void_p, c_double, c_void_p),
     }
     return tuple(ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items())
 
