@@ -111,9 +111,7 @@ def turn_directed(assembly: Assembly) -> Assembly:
     for place, one in zip(positions, maximal.names, strict=True):
         turned += [cos(place), sin(place)] if one.unit == "rad" else [place]
     outputs = (OutputGroup("q", tuple(turned)), OutputGroup("u", tuple(speeds)))
-    assembly.__dict__.update(
-        reduced=reduced,
-        maximal=directions_of(maximal)[0],
-        to_maximal=Program(to_maximal.name, state_groups(reduced), to_maximal.parameters, outputs),
-    )
+    program = Program(to_maximal.name, state_groups(reduced), to_maximal.parameters, outputs)
+    made = {"reduced": reduced, "maximal": directions_of(maximal)[0], "to maximal": program}
+    assembly.shared._made.update(made)
     return assembly
