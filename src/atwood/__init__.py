@@ -78,8 +78,9 @@ if TYPE_CHECKING:
     from atwood.reporting import MechanismReport, report
     from atwood.result.files import SavedResult, load_result, save_result
     from atwood.result.result import Result
-    from atwood.study import Comparison, ComparisonRow, compare
-    from atwood.view import animate, plot, plot_comparison, plot_mechanism
+    from atwood.study.compare import Comparison, ComparisonRow, compare
+    from atwood.view import animate, plot_comparison, plot_mechanism
+    from atwood.view.plot import plot
 
     __version__: str
 

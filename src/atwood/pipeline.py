@@ -18,6 +18,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.dae import LEVELS
 from atwood.forms.source import Source
 from atwood.mechanics.build import Mechanism, check_closures, make_gravity
+from atwood.mechanics.inertia import check_tensors
 from atwood.mechanics.orientation import body_offsets
 from atwood.model.composite import Model
 from atwood.model.flatten import FlatScene, flatten
@@ -148,6 +149,7 @@ def read_mechanism(
     told = None if known_sides else sides
     mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links, told)
     check_closures(mechanism)
+    check_tensors(mechanism.locals_, table.values)
     return mechanism
 
 

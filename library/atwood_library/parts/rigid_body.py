@@ -2,33 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
+from typing import Self
 
-from atwood import (
-    BodyInertia,
-    Component,
-    Frame,
-    Scalar,
-    Vector,
-    as_vector,
-    atan2,
-    connector,
-    cross,
-    dot,
-    inertia,
-    observable,
-    parameter,
-    sqrt,
-)
+from atwood import Scalar, Vector, as_vector, parameter
+from atwood.solids import MassProperties
+from atwood_library.interfaces.solid import Solid, Tensor
 
 
-class RigidBody(Component):
+class RigidBody(Solid):
     """A rigid body: its mass, where its centre of mass is, and its inertia tensor there, in the axes of its frame.
 
     In space it moves by Newton's and Euler's equations (Goldstein, section 5.5); in a plane only the moment about the
-    plane's normal, y, counts. Its orientation is reported as the three axes of its frame and as Euler angles in the
-    z-y-z convention: phi about z, theta about the new y, psi about the new z.
+    plane's normal, y, counts. `RigidBody.of` takes what `atwood.solids` works out of shapes and meshes.
     """
 
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
@@ -48,134 +33,33 @@ class RigidBody(Component):
         size=3,
         doc="Entries Jxy, Jxz, Jyz of the inertia tensor; the products of inertia with a minus sign.",
     )
-    frame: Frame = connector(Frame, "The frame that everything about the body is given in.")
 
-    def center_in_world(self) -> Vector:
-        """Return the centre of mass from the frame, in world axes."""
-        return self.frame.to_world(as_vector(self.center))
+    @classmethod
+    def of(cls, solid: MassProperties) -> Self:
+        """Return a body with the mass properties of a solid.
 
-    def restate_start(self, given: Mapping[str, float], space: str) -> dict[str, float]:
-        """Return start values with Euler angles said as the axes that they stand for; those not given are zero."""
-        said = dict(given)
-        if space != "space" or not {"phi", "theta", "psi"} & said.keys():
-            return said
-        phi, theta, psi = (said.pop(name, 0.0) for name in ("phi", "theta", "psi"))
-        (sa, ca), (sb, cb), (sc, cc) = ((math.sin(angle), math.cos(angle)) for angle in (phi, theta, psi))
-        x_axis = (ca * cb * cc - sa * sc, sa * cb * cc + ca * sc, -sb * cc)
-        z_axis = (ca * sb, sa * sb, cb)
-        said.update({f"x_axis.{axis}": value for axis, value in zip("xyz", x_axis, strict=True)})
-        said.update({f"z_axis.{axis}": value for axis, value in zip("xyz", z_axis, strict=True)})
-        return said
-
-    @inertia
-    def rigid_body(self) -> Iterable[BodyInertia]:
-        """Return the inertia."""
-        j, p = as_vector(self.moments), as_vector(self.products)
-        tensor = ((j.x, p.x, p.y), (p.x, j.y, p.z), (p.y, p.z, j.z))
-        yield BodyInertia(self.frame, self.mass, as_vector(self.center), j.y, tensor)
-
-    @observable(unit="m", doc="Position of the centre of mass in world axes.")
-    def position(self) -> Vector:
-        """Return the position of the centre of mass."""
-        return self.frame.position + self.center_in_world()
-
-    @observable(unit="m/s", doc="Velocity of the centre of mass in world axes.")
-    def velocity(self) -> Vector:
-        """Return the velocity of the centre of mass."""
-        swing: Vector = self.frame.velocity + cross(self.frame.angular_velocity, self.center_in_world())
-        return swing
-
-    @observable(unit="rad", doc="Angle in the plane, counter-clockwise.", spaces=("plane",))
-    def angle(self) -> Scalar:
-        """Return the angle."""
-        return self.frame.angle
-
-    @observable(unit="rad/s", doc="Angular velocity in world axes.", spaces=("plane", "space"))
-    def angular_velocity(self) -> Vector:
-        """Return the angular velocity."""
-        return self.frame.angular_velocity
-
-    @observable(unit="rad/s", doc="Angular velocity in the axes of the frame.", spaces=("space",))
-    def spin(self) -> Vector:
-        """Return the angular velocity along the frame's own axes."""
-        return self.frame.to_frame(self.frame.angular_velocity)
-
-    @observable(unit="kg*m^2/s", doc="Angular momentum about the centre of mass, in world axes.", spaces=("space",))
-    def angular_momentum(self) -> Vector:
-        """Return the angular momentum."""
-        j, p = as_vector(self.moments), as_vector(self.products)
-        w = self.spin()
-        return self.frame.to_world(
-            Vector(
-                j.x * w.x + p.x * w.y + p.y * w.z,
-                p.x * w.x + j.y * w.y + p.z * w.z,
-                p.y * w.x + p.z * w.y + j.z * w.z,
-            )
+        Parameters
+        ----------
+        solid
+            From a shape, a mesh, or several of them composed; see `atwood.solids`.
+        """
+        j = [[float(entry) for entry in row] for row in solid.inertia]
+        return cls(
+            mass=solid.mass,
+            center=(float(solid.centre[0]), float(solid.centre[1]), float(solid.centre[2])),
+            moments=(j[0][0], j[1][1], j[2][2]),
+            products=(j[0][1], j[0][2], j[1][2]),
         )
 
-    @observable(unit="1", doc="The frame's x axis in world axes.", spaces=("space",))
-    def x_axis(self) -> Vector:
-        """Return the axis."""
-        return self.frame.axes[0]
+    def total_mass(self) -> Scalar:
+        """Return the mass."""
+        return self.mass
 
-    @observable(unit="1", doc="The frame's y axis in world axes.", spaces=("space",))
-    def y_axis(self) -> Vector:
-        """Return the axis."""
-        return self.frame.axes[1]
+    def center_of_mass(self) -> Vector:
+        """Return the centre of mass in the axes of the frame."""
+        return as_vector(self.center)
 
-    @observable(unit="1", doc="The frame's z axis in world axes.", spaces=("space",))
-    def z_axis(self) -> Vector:
-        """Return the axis."""
-        return self.frame.axes[2]
-
-    @observable(
-        unit="rad",
-        doc="First Euler angle, about the world's z axis.",
-        periodic=True,
-        rate="phi_rate",
-        spaces=("space",),
-    )
-    def phi(self) -> Scalar:
-        """Return the azimuth of the frame's z axis (Goldstein, section 4.4, in the z-y-z convention)."""
-        z = self.frame.axes[2]
-        return atan2(z.y, z.x)
-
-    @observable(unit="rad", doc="Second Euler angle, of the frame's z axis from the world's.", spaces=("space",))
-    def theta(self) -> Scalar:
-        """Return the angle between the two z axes."""
-        z = self.frame.axes[2]
-        return atan2(sqrt(z.x * z.x + z.y * z.y), z.z)
-
-    @observable(
-        unit="rad",
-        doc="Third Euler angle, about the frame's z axis.",
-        periodic=True,
-        rate="psi_rate",
-        spaces=("space",),
-    )
-    def psi(self) -> Scalar:
-        """Return the angle about the frame's own z axis."""
-        x, y, _ = self.frame.axes
-        return atan2(y.z, -x.z)
-
-    @observable(unit="rad/s", doc="Rate of phi (precession).", spaces=("space",))
-    def phi_rate(self) -> Scalar:
-        """Return the rate of the first Euler angle (Goldstein, section 4.9, in the z-y-z convention)."""
-        (x, y, _), w = self.frame.axes, self.spin()
-        return (w.x * x.z + w.y * y.z) / (x.z * x.z + y.z * y.z)
-
-    @observable(unit="rad/s", doc="Rate of theta (nutation).", spaces=("space",))
-    def theta_rate(self) -> Scalar:
-        """Return the rate of the second Euler angle."""
-        (x, y, _), w = self.frame.axes, self.spin()
-        return (w.x * y.z - w.y * x.z) / sqrt(x.z * x.z + y.z * y.z)
-
-    @observable(unit="rad/s", doc="Rate of psi (spin).", spaces=("space",))
-    def psi_rate(self) -> Scalar:
-        """Return the rate of the third Euler angle."""
-        return self.spin().z - self.phi_rate() * self.frame.axes[2].z
-
-    @observable(unit="J", doc="Energy of turning about the centre of mass.", spaces=("space",))
-    def turning_energy(self) -> Scalar:
-        """Return half the scalar product of angular velocity and angular momentum."""
-        return 0.5 * dot(self.frame.angular_velocity, self.angular_momentum())
+    def tensor(self) -> Tensor:
+        """Return the inertia tensor."""
+        j, p = as_vector(self.moments), as_vector(self.products)
+        return (j.x, p.x, p.y), (p.x, j.y, p.z), (p.y, p.z, j.z)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from atwood.errors import DeclarationError
-from atwood.expr import Expression, Scalar, is_zero
+import numpy as np
+
+from atwood.errors import DeclarationError, ParameterError
+from atwood.expr import Expression, Scalar, evaluate, is_zero
 from atwood.mechanics.orientation import NodeTurn, rotate
 from atwood.model.laws import BodyInertia
 from atwood.model.local import LocalPart
@@ -14,10 +16,11 @@ from atwood.model.rotation import Axes, from_axes, transposed
 from atwood.model.space import Space
 from atwood.model.vector import ZERO as _ZERO
 from atwood.model.vector import Vector, dot
+from atwood.solids.checks import symmetric_part, verify_moments
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
-__all__ = ["CoupledMass", "Masses", "RigidMass", "add_masses", "tensor_of", "turned_tensor"]
+__all__ = ["CoupledMass", "Masses", "RigidMass", "add_masses", "check_tensors", "tensor_of", "turned_tensor"]
 
 
 @dataclass(frozen=True)
@@ -136,6 +139,28 @@ def tensor_of(path: str, body: BodyInertia) -> Axes:
         )
     rows = [list(row) for row in body.tensor]
     return Vector(*rows[0]), Vector(*rows[1]), Vector(*rows[2])
+
+
+def check_tensors(locals_: Mapping[str, LocalPart], values: Mapping[Expression, float]) -> None:
+    """Refuse inertia that no body can have: not symmetric, a negative principal moment, one beyond the others' sum.
+
+    Raises
+    ------
+    ParameterError
+        With the path of the part.
+    """
+    for path, local in locals_.items():
+        for body in local.body_inertias:
+            entries = [entry for row in body.tensor or () for entry in row]
+            if not entries or all(is_zero(entry) for entry in entries):
+                continue
+            graph = next(iter(values)).graph if values else None
+            numbers = evaluate([graph.convert(entry) for entry in entries], values) if graph else entries
+            tensor = np.array(numbers, dtype=float).reshape(3, 3)
+            try:
+                verify_moments(symmetric_part(tensor))
+            except ParameterError as error:
+                raise ParameterError(error.message, where=path, advice=error.advice) from error
 
 
 def _is_nothing(moment: Scalar | Axes) -> bool:
