@@ -31,6 +31,7 @@ from atwood_library.ropes.pulley import Pulley
 from atwood_library.ropes.rope import Rope
 from atwood_library.sensors.energy_sensor import EnergySensor
 from atwood_library.sensors.force_sensor import ForceSensor
+from atwood_library.sensors.frame_sensor import FrameSensor
 from atwood_library.sensors.position_sensor import PositionSensor
 from atwood_library.sensors.relative_position_sensor import RelativePositionSensor
 from atwood_library.sources.ramp import Ramp
@@ -44,6 +45,7 @@ __all__ = [
     "EnergySensor",
     "Force",
     "ForceSensor",
+    "FrameSensor",
     "FreeJoint",
     "Ground",
     "Link",

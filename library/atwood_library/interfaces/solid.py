@@ -94,7 +94,7 @@ class Solid(Component):
     @observable(unit="rad/s", doc="Angular velocity in the axes of the frame.", spaces=("space",))
     def spin(self) -> Vector:
         """Return the angular velocity along the frame's own axes."""
-        return self.frame.to_frame(self.frame.angular_velocity)
+        return self.frame.spin
 
     @observable(unit="kg*m^2/s", doc="Angular momentum about the centre of mass, in world axes.", spaces=("space",))
     def angular_momentum(self) -> Vector:

@@ -16,6 +16,7 @@ from atwood import (
     parameter,
     signal,
 )
+from atwood_library.interfaces.bearings import frames_parallel
 
 
 class Drive(Component):
@@ -36,13 +37,28 @@ class Drive(Component):
         """Return the distance of frame b from where it should be."""
         return self.b.position - self.a.position - self.a.to_world(as_vector(self.axis) * self.motion)
 
-    @constraint(reaction="torque", unit="N*m", doc="Torque exerted on frame b, counter-clockwise.")
+    @constraint(reaction="torque", unit="N*m", doc="Torque on frame b, counter-clockwise.", spaces=("line", "plane"))
     def lock(self) -> Scalar:
         """Return the angle between the frames."""
         return self.b.angle - self.a.angle
 
+    @constraint(
+        reaction=("lock_1", "lock_2", "lock_3"),
+        unit="N*m",
+        doc="Multiplier of the guide: torque on frame b about an axis of frame a.",
+        spaces=("space",),
+    )
+    def lock_in_space(self) -> tuple[Scalar, Scalar, Scalar]:
+        """Return by how much the frames are turned against each other."""
+        return frames_parallel(self.a, self.b)
+
     @joint("a", "b", solves=("track", "lock"), spaces=("line", "plane"))
     def move(self) -> Placement:
+        """Place b as prescribed."""
+        return Placement(as_vector(self.axis) * self.motion, 0.0, axes="a")
+
+    @joint("a", "b", solves=("track", "lock_in_space"), spaces=("space",))
+    def move_in_space(self) -> Placement:
         """Place b as prescribed."""
         return Placement(as_vector(self.axis) * self.motion, 0.0, axes="a")
 

@@ -1,4 +1,4 @@
-"""Link: a rigid body in the plane with a frame at each end."""
+"""Link: a straight rigid body with a frame at each end."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from atwood import (
     Scalar,
     Vector,
     connector,
+    cross,
     inertia,
     joint,
     observable,
@@ -34,6 +35,9 @@ class Link(Component):
     moment: float | None = parameter(
         None, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the centre of mass; m l^2/12 if not given."
     )
+    axial_moment: float = parameter(
+        0.0, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about its own axis, which only space knows."
+    )
     a: Frame = connector(Frame, "The frame at the origin of the link.")
     b: Frame = connector(Frame, "The frame at the other end.")
 
@@ -45,7 +49,8 @@ class Link(Component):
     def rigid_body(self) -> Iterable[BodyInertia]:
         """Return the inertia."""
         moment = self.mass * self.length * self.length / 12.0 if self.moment is None else self.moment
-        yield BodyInertia(self.a, self.mass, self.center_in_link(), moment)
+        tensor = ((self.axial_moment, 0.0, 0.0), (0.0, moment, 0.0), (0.0, 0.0, moment))
+        yield BodyInertia(self.a, self.mass, self.center_in_link(), moment, tensor)
 
     @joint("a", "b", rigid=True, spaces=("line", "plane", "space"))
     def shape(self) -> Placement:
@@ -71,5 +76,5 @@ class Link(Component):
     def velocity(self) -> Vector:
         """Return the velocity of the centre of mass."""
         arm = self.a.to_world(self.center_in_link())
-        omega = self.a.angular_velocity
-        return self.a.velocity + Vector(omega.y * arm.z, 0.0, -omega.y * arm.x)
+        velocity: Vector = self.a.velocity + cross(self.a.angular_velocity, arm)
+        return velocity

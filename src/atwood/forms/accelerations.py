@@ -183,14 +183,12 @@ def _is_tree(assembly: Assembly) -> bool:
         not reduced.eliminated
         and not reduced.forest.cuts
         and len(maximal.constraints) > 0
-        and rates_are_speeds(reduced)
-        and rates_are_speeds(maximal)
         and len(reduced.speeds) == len(maximal.speeds) - len(maximal.constraints)
     )
 
 
 class _Tree:
-    """The balance of forces of a tree in the coordinates of its bodies, at a state of the generalized coordinates."""
+    """The balance of forces of a tree in the speeds of its bodies, at a state of the generalized coordinates."""
 
     def __init__(self, assembly: Assembly) -> None:
         self.reduced, self.maximal = assembly.reduced, assembly.maximal
@@ -198,35 +196,36 @@ class _Tree:
         self.parameters = assembly.parameters
         self.u = self.reduced.speeds
         self.differences = True
+        self.rewrites = rates_are_speeds(self.maximal)
         self.angles = [q for q, c in zip(self.reduced.coordinates, self.reduced.names, strict=True) if c.unit == "rad"]
         outputs = assembly.to_maximal.outputs
         symbols = (*self.maximal.coordinates, *self.maximal.speeds)
         self.places = dict(zip(symbols, (*outputs[0].expressions, *outputs[1].expressions), strict=True))
-        self.bodies = self._bodies_of_coordinates()
+        self.bodies = self._bodies_of_speeds()
         self.depth = {one.body: i for i, one in enumerate(self.reduced.forest.attachments, 1)}
         self.system = self._system()
         self.works = all(not self.system.entries.get((i, i), self.graph.zero).is_zero for i in range(self.masses))
 
     @property
     def masses(self) -> int:
-        """Number of the bodies' coordinates."""
-        return len(self.maximal.coordinates)
+        """Number of the bodies' speeds."""
+        return len(self.maximal.speeds)
 
     def tidy(self, values: list[Expression]) -> list[Expression]:
-        """Rewrite expressions of few neighbours as by hand."""
-        nodes = live(values)
-        if len(nodes) > _SMALL:
+        """Rewrite expressions of few neighbours as by hand; with quaternions there is nothing to be found."""
+        nodes = live(values) if self.rewrites else []
+        if not self.rewrites or len(nodes) > _SMALL:
             return values
         used = {node.index for node in nodes}
         angles = [a for a in self.angles if a.index in used] if self.differences else []
         parameters = [node for node in nodes if node.is_symbol and node.is_parametric]
         return collect(values, angles, parameters)
 
-    def _bodies_of_coordinates(self) -> list[int]:
+    def _bodies_of_speeds(self) -> list[int]:
         forest = self.maximal.forest
-        bodies = [0] * len(forest.coordinates)
+        bodies = [0] * len(forest.speeds)
         for one in forest.attachments:
-            for number in one.coordinates:
+            for number in (*one.speeds, *one.spin):
                 bodies[number] = one.body
         for turn in forest.orientations:
             if turn.coordinate is not None:
@@ -315,15 +314,22 @@ class _Tree:
                 if number is None:
                     return None
                 known[a[turn.coordinate]] = found[number]
-        joints = [one for one in reduced.forest.attachments if one.coordinates]
+        spins = {one.body: [found[i] for i in one.spin] for one in maximal.forest.attachments if one.spin}
+        for one in reduced.forest.attachments:
+            known.update(zip((a[i] for i in one.spin), spins[one.body] if one.spin else (), strict=True))
+        joints = [one for one in reduced.forest.attachments if one.speeds]
         here = [_relative(reduced, one.node, one.parent) for one in joints]
         there = [value for one in joints for value in _relative(maximal, one.node, one.parent)]
         places = {**self.places, **{maximal.accelerations[i]: value for i, value in found.items()}}
         there = place_differences(there, places)
         for k, one in enumerate(joints):
-            wanted = [a[i] for i in one.coordinates]
+            wanted = [a[i] for i in one.speeds]
             d = len(here[k])
-            solution = self._solve_joint(substitute(here[k], known), there[k * d : k * d + d], wanted)
+            mine, theirs = here[k], there[k * d : k * d + d]
+            if one.turns_with_joint:
+                mine = [*mine, *reduced.kinematics.angular_accelerations[one.body]]
+                theirs = [*theirs, *spins[one.body]]
+            solution = self._solve_joint(substitute(mine, known), theirs, wanted)
             if solution is None:
                 return None
             known.update(zip(wanted, solution, strict=True))

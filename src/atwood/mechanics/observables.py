@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from atwood.errors import DeclarationError
+from atwood.errors import AtwoodError
 from atwood.expr import Expression, Scalar, substitute
 from atwood.mechanics.arms import arm_of
 from atwood.mechanics.build import Mechanism, resolve_signals
@@ -17,7 +17,7 @@ from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, Motion
 from atwood.model.laws import BodyInertia
 from atwood.model.local import LocalPart
-from atwood.model.rotation import from_axes
+from atwood.model.rotation import from_axes, to_axes
 from atwood.model.space import FIXED_AXES
 from atwood.model.vector import Vector, dot
 
@@ -142,8 +142,8 @@ def observe(mechanism: Mechanism, equations: Equations, reactions: Sequence[Reac
                 continue
             try:
                 value = getattr(bound, law.name)()
-            except DeclarationError:
-                continue  # it asks for an orientation that nothing determines
+            except (AtwoodError, ArithmeticError):
+                continue  # it asks for an orientation that nothing determines, or that never leaves a pole
             options = law.options
             rate = f"{path}.{options.rate}" if options.rate else ""
             _take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic, rate)
@@ -256,6 +256,7 @@ def _turned(mechanism: Mechanism, equations: Equations, motion: Motion, node: in
         None if angle is None else angle + turn,
         spin_in_world(kinematics.angular_velocities[body], body_axes),
         spin_in_world(kinematics.angular_accelerations[body], body_axes),
+        to_axes(turn, Vector(*kinematics.angular_velocities[body])) if isinstance(turn, tuple) else None,
     )
 
 

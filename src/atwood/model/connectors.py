@@ -34,6 +34,8 @@ class Motion:
         Rotation of the frame in the plane, counter-clockwise as seen on the page, rad.
     angular_velocity, angular_acceleration
         Of the frame, in world axes.
+    spin
+        Angular velocity along the frame's own axes, in space; None where it follows from the two above.
     """
 
     position: Vector
@@ -43,6 +45,7 @@ class Motion:
     angle: Scalar = None
     angular_velocity: Vector | None = None
     angular_acceleration: Vector | None = None
+    spin: Vector | None = None
 
 
 class Connector:
@@ -147,6 +150,13 @@ class Frame(Point):
         """Angular acceleration in world axes, rad/s^2; only observables may read it."""
         value: Vector = self._read("angular_acceleration")
         return value
+
+    @property
+    def spin(self) -> Vector:
+        """Angular velocity along the frame's own axes, rad/s."""
+        if self.motion is not None and self.motion.spin is not None:
+            return self.motion.spin
+        return self.to_frame(self.angular_velocity)
 
     @property
     def axes(self) -> tuple[Vector, Vector, Vector]:

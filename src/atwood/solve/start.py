@@ -403,6 +403,10 @@ def _solve_speeds(
         rows = row_scales(matrix, scales)
         # Each equation is measured by its own terms, so that what is small beside another speed is not lost.
         own = np.abs(matrix) @ np.abs(u)
+        # What is summed up within an equation rounds, even if all that comes out of it is zero.
+        own += (
+            1e-6 * np.max(np.abs(matrix * scales), axis=1, initial=0.0) * float(np.max(np.abs(u / scales), initial=0.0))
+        )
         own[system.constraints :] += [abs(x.value) for x in level.fixed]
         share = np.abs(missing) / np.where(own > 0.0, own, 1.0)
         if not float(np.max(share)) <= 1e-8:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from atwood.expr import Expression, Scalar, depends_on, is_zero
+from atwood.model.laws import Kind
 from atwood.model.local import LocalConstraint, LocalPart
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
 
@@ -142,7 +143,7 @@ def _orientations(
             plain += [*load.force, *load.torque]
             if any(not is_zero(c) for c in load.torque):
                 needed.add(body(load.at.name))
-        for name in _angles_read(local, plain):
+        for name in [*_angles_read(local, plain), *_measured(local)]:
             needed.add(body(name))
         for law in dict.fromkeys(constraint.law.name for constraint in local.constraints):
             rows = [constraint for constraint in local.constraints if constraint.law.name == law]
@@ -174,6 +175,15 @@ def _peel(needed: set[int], locks: list[tuple[list[Key], set[int]]]) -> tuple[fr
     for _, turned in left:
         needed |= turned
     return frozenset(needed - {0}), frozenset(idle)
+
+
+def _measured(local: LocalPart) -> list[str]:
+    """Return, in space, the frames of a part that only measures: what it is to measure must be known."""
+    kinds: tuple[Kind, ...] = ("potential", "dissipation", "force", "inertia", "constraint", "joint", "event")
+    component = local.part.component
+    if any(component.laws(kind) for kind in kinds):
+        return []
+    return [name for name, symbols in local.connectors.items() if symbols.axes is not None]
 
 
 def _angles_read(local: LocalPart, values: list[Scalar]) -> list[str]:

@@ -1,0 +1,49 @@
+"""foucault-pendulum: a pendulum whose support turns with the Earth."""
+
+from __future__ import annotations
+
+from atwood import Scene, connect, parameter
+from atwood_library.joints.rotary_drive import RotaryDrive
+from atwood_library.parts.ground import Ground
+from atwood_library.parts.point_mass import PointMass
+from atwood_library.parts.rod import Rod
+from atwood_library.sensors.frame_sensor import FrameSensor
+
+
+class FoucaultPendulum(Scene):
+    """A long pendulum on a platform that turns about the vertical, as the ground does by the sine of the latitude.
+
+    In the platform's axes, in which it is released at rest, its plane of swing turns against the platform at minus that
+    rate (Landau and Lifshitz, Mechanics, section 39). The rest of the Earth's motion, its horizontal turning and its
+    centrifugal force, is left out.
+    """
+
+    length: float = parameter(67.0, unit="m", above=0.0, doc="Length of the wire; as in the Pantheon unless given.")
+    mass: float = parameter(28.0, unit="kg", above=0.0, doc="Mass of the bob.")
+    amplitude: float = parameter(3.0, unit="m", above=0.0, doc="Horizontal distance at which it is released.")
+    rate: float = parameter(
+        5.490550562345950e-5, unit="rad/s", doc="Rate of the platform: of the Earth, times the sine of the latitude."
+    )
+    space = "space"
+    t_end = 100.0
+
+    ground: Ground = Ground()
+    turning: RotaryDrive = RotaryDrive(axis=(0.0, 0.0, 1.0))
+    rod: Rod = Rod(length=length)
+    bob: PointMass = PointMass(mass=mass)
+    view: FrameSensor = FrameSensor()
+    connections = [
+        connect(ground.frame, turning.a),
+        connect(turning.b, rod.a),
+        connect(rod.b, bob.point),
+        connect(view.frame, turning.b),
+        connect(view.point, bob.point),
+    ]
+
+    def build(self) -> None:
+        """Turn the platform and let the bob go at rest as seen from it."""
+        rate = self.rate
+        self.set("turning.rotation", lambda t: rate * t)
+        self.start["bob.position.x"], self.start["bob.position.y"] = self.amplitude, 0.0
+        self.guess["bob.position.z"] = -((self.length**2 - self.amplitude**2) ** 0.5)
+        self.start["bob.velocity.x"], self.start["bob.velocity.y"] = 0.0, self.rate * self.amplitude

@@ -1,0 +1,63 @@
+"""lagrange-top: a symmetric top with a fixed point."""
+
+from __future__ import annotations
+
+import math
+
+from atwood import Scene, connect, parameter
+from atwood_library.joints.spherical import Spherical
+from atwood_library.parts.ground import Ground
+from atwood_library.parts.rigid_body import RigidBody
+
+
+class LagrangeTop(Scene):
+    """A symmetric top on a fixed tip (Goldstein, section 5.7), in one of its four motions.
+
+    ``cusps``: released at rest but for its spin. ``loops``: thrown against its precession. ``waves``: thrown along with
+    it, but slower than it would go steadily. ``steady``: thrown just as fast as it goes on. A spin that is too slow
+    for a steady precession is refused there.
+    """
+
+    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
+    height: float = parameter(0.1, unit="m", above=0.0, doc="Distance of the centre of mass from the tip.")
+    transverse: float = parameter(
+        0.015, unit="kg*m^2", above=0.0, doc="Moment of inertia across its axis, about the centre of mass."
+    )
+    axial: float = parameter(0.01, unit="kg*m^2", above=0.0, doc="Moment of inertia about its axis.")
+    inclination: float = parameter(math.pi / 6.0, unit="rad", doc="Angle of the axis from the vertical at the start.")
+    spin: float = parameter(50.0, unit="rad/s", doc="Angular velocity about its own axis.")
+    motion: str = parameter(
+        "cusps", choices=("cusps", "loops", "waves", "steady"), doc="Which of the four motions it begins."
+    )
+    space = "space"
+    t_end = 2.0
+
+    ground: Ground = Ground()
+    tip: Spherical = Spherical()
+    top: RigidBody = RigidBody(mass=mass)
+    connections = [connect(ground.frame, tip.a), connect(tip.b, top.frame)]
+
+    def steady_precession(self) -> float:
+        """Return the slower rate of steady precession, rad/s: ``A cos(theta) w^2 - C s w + m g h = 0``.
+
+        Goldstein, equation 5.76.
+        """
+        about_tip = self.transverse + self.mass * self.height**2
+        a, b, c = about_tip * math.cos(self.inclination), self.axial * self.spin, self.mass * self.gravity * self.height
+        if a == 0.0:
+            return c / b
+        root = b * b - 4.0 * a * c
+        if root < 0.0:
+            raise ValueError("the spin is too slow for a steady precession at this angle")
+        return 2.0 * c / (b + math.copysign(math.sqrt(root), b))
+
+    def build(self) -> None:
+        """Shape the top and set it off."""
+        self.top.center = (0.0, 0.0, self.height)
+        self.top.moments = (self.transverse, self.transverse, self.axial)
+        share = {"cusps": 0.0, "loops": -1.0, "waves": 0.5, "steady": 1.0}[self.motion]
+        precession = share * self.steady_precession() if share else 0.0
+        self.start["top.phi"], self.start["top.theta"], self.start["top.psi"] = 0.0, self.inclination, 0.0
+        self.start["top.spin.x"] = -precession * math.sin(self.inclination)
+        self.start["top.spin.y"] = 0.0
+        self.start["top.spin.z"] = self.spin

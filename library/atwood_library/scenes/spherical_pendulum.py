@@ -1,0 +1,42 @@
+"""spherical-pendulum: a bob on a massless rod that swings in every direction."""
+
+from __future__ import annotations
+
+import math
+
+from atwood import Scene, connect, parameter
+from atwood_library.parts.ground import Ground
+from atwood_library.parts.point_mass import PointMass
+from atwood_library.parts.rod import Rod
+
+
+class SphericalPendulum(Scene):
+    """A bob on a massless rod, free to swing in every direction (Landau and Lifshitz, Mechanics, section 14).
+
+    Its state is the bob's place and velocity in space, with the rod as a constraint: nothing is singular anywhere, not
+    straight below the pivot either.
+    """
+
+    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
+    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bob.")
+    inclination: float = parameter(math.pi / 3.0, unit="rad", doc="Angle from the downward vertical at the start.")
+    azimuth_rate: float = parameter(2.0, unit="rad/s", doc="Rate at which it goes round at the start.")
+    space = "space"
+    t_end = 10.0
+
+    ground: Ground = Ground()
+    rod: Rod = Rod(length=length)
+    bob: PointMass = PointMass(mass=mass)
+    connections = [connect(ground.frame, rod.a), connect(rod.b, bob.point)]
+
+    def build(self) -> None:
+        """Put the bob aside and throw it across."""
+        sine, cosine = math.sin(self.inclination), math.cos(self.inclination)
+        place = (self.length * sine, 0.0, -self.length * cosine)
+        self.start["bob.position.x"], self.start["bob.position.y"] = place[0], 0.0
+        self.guess["bob.position.z"] = place[2]
+        self.start["bob.velocity.y"] = self.azimuth_rate * place[0]
+        if abs(cosine) > 0.5:  # what the rod leaves free there
+            self.start["bob.velocity.x"] = 0.0
+        else:
+            self.start["bob.velocity.z"] = 0.0
