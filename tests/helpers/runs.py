@@ -84,7 +84,8 @@ def nearby_states(prepared: Prepared, count: int, size: float = 0.3) -> list[tup
     random = np.random.default_rng(4711)
     plan, found = prepared.plan, []
     for _ in range(count):
-        q = prepared.q + size * plan.sizes * random.uniform(-1.0, 1.0, len(prepared.q))
+        step = size * plan.sizes * random.uniform(-1.0, 1.0, len(prepared.u))
+        q = plan.balance.turning.moved(prepared.time, prepared.q, step)
         u = prepared.u + plan.sizes * random.uniform(-1.0, 1.0, len(prepared.u))
         found.append(plan.balance.project(prepared.time, q, u, plan.sizes))
     return found

@@ -55,6 +55,9 @@ _LARGEST_FILL = 20_000
 _FEW = 6
 """Up to so many coordinates all ways are tried; beyond, a mass matrix that is full costs more than it can save."""
 
+_FEW_IN_SPACE = 16
+"""The same for rigid bodies in space, each of which is six unknowns beside the forces of its joint."""
+
 _PAIR = 8
 """What is saved where a sine and a cosine are of the same angle, in additions."""
 
@@ -142,12 +145,12 @@ def _candidates(assembly: Assembly, method: Method | None) -> Iterator[tuple[Met
                     return
                 yield name, found
                 if _waves(found) <= 2 * len(tree.angles):
-                    if name == "joint forces" and len(tree.u) > _FEW:
+                    if name == "joint forces" and len(tree.u) > _FEW and tree.rewrites:
                         return  # nothing can be much shorter
                     break
     if method == "numeric":
         yield _by_mass_matrix(equations, assembly.rows, True)
-    elif method == "mass matrix" or (method is None and (tree is None or not tree.works or len(tree.u) <= _FEW)):
+    elif method == "mass matrix" or (method is None and (tree is None or not tree.works or len(tree.u) <= tree.few)):
         yield _by_mass_matrix(equations, assembly.rows, False)
 
 
@@ -182,7 +185,7 @@ def _is_tree(assembly: Assembly) -> bool:
     return (
         not reduced.eliminated
         and not reduced.forest.cuts
-        and len(maximal.constraints) > 0
+        and (len(maximal.constraints) > 0 or not rates_are_speeds(maximal))
         and len(reduced.speeds) == len(maximal.speeds) - len(maximal.constraints)
     )
 
@@ -205,6 +208,11 @@ class _Tree:
         self.depth = {one.body: i for i, one in enumerate(self.reduced.forest.attachments, 1)}
         self.system = self._system()
         self.works = all(not self.system.entries.get((i, i), self.graph.zero).is_zero for i in range(self.masses))
+
+    @property
+    def few(self) -> int:
+        """Up to so many speeds the mass matrix is tried too."""
+        return _FEW if self.rewrites else _FEW_IN_SPACE
 
     @property
     def masses(self) -> int:
