@@ -80,3 +80,11 @@ def _third_kind(n, rest, mc, u, sn, cn, dn):
     other = _third_kind(1 - other_rest, other_rest, mc, u, sn, cn, dn)
     bend = sn * cn * elliprc(dn**2, (cn**2 + rest * sn**2) * (cn**2 + other_rest * sn**2))
     return ((1 - mc) * u + mc * (-n / rest) * other - n * (1 - other_rest) * bend) / (rest - mc)
+
+
+def amplitude(u, mc):
+    """am u, the angle whose sine is sn u, counted on through the turns."""
+    u = np.asarray(u, dtype=float)
+    sn, cn, _ = jacobi(u, mc)
+    turns = 0.0 if mc == 0 else np.round(u / (4 * quarter_period(mc)))
+    return np.arctan2(sn, cn) + 2 * np.pi * turns

@@ -303,3 +303,16 @@ STIFF_GOVERNOR = {
     0.1: (0.5238364755695757, 0.4961738690759003, 0.4592718104361339, -0.5226739297539802, 6.103717808830862),
 }
 """IFToMM library, A05: (s, beta, s', beta', shaft speed) at each time; see `governor.StiffGovernor`."""
+
+FOUR_BAR_ROW = {
+    "kappa": 11.445,
+    "turn": 1.9425149226070837,
+    "values": {
+        1.0: (3.3378708031050977, 6.807385240869445),
+        2.0: (6.3410333613123315, 1.0189645914385368),
+        5.0: (16.654353486653484, 6.105067553519621),
+        10.0: (31.750597186986102, 1.5066421808418295),
+    },
+}
+"""IFToMM library, A02 with two windows (rods of 1 m, 1 kg): time of a turn; at each time the cranks' angle from upright
+and their rate."""
