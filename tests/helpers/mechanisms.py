@@ -58,3 +58,49 @@ def parallel_four_bar(cranks: int = 2, angle: float = 1.0, rate: float = 2.0) ->
 
 
 QUARTER = math.pi / 2.0
+
+
+def double_four_bar(rate: float = 1.0, windows: int = 2) -> Scene:
+    """Return parallelograms side by side, all bars of length 1 and mass 1, cranks upright at first.
+
+    When all bars are in line the cranks could go on in more than one way (IFToMM benchmark A02).
+    """
+    scene = Scene(t_end=10.0)
+    before = None
+    for i in range(windows + 1):
+        ground, pivot = scene.add(f"ground{i}", Ground(position=(float(i), 0.0, 0.0))), scene.add(f"pivot{i}", Pivot())
+        crank = scene.add(f"crank{i}", Link(length=1.0, mass=1.0))
+        scene.connect(ground.frame, pivot.a)
+        scene.connect(pivot.b, crank.a)
+        scene.guess[f"crank{i}.angle"] = QUARTER
+        if before is not None:
+            coupler = scene.add(f"coupler{i}", Link(length=1.0, mass=1.0))
+            left, right = scene.add(f"left{i}", Pivot()), scene.add(f"right{i}", Pivot())
+            scene.connect(before.b, left.a)
+            scene.connect(left.b, coupler.a)
+            scene.connect(coupler.b, right.a)
+            scene.connect(right.b, crank.b)
+            scene.guess[f"coupler{i}.angle"] = 0.0
+        before = crank
+    del scene.guess["crank0.angle"]
+    scene.start.update({"crank0.angle": QUARTER, "crank0.angular_velocity": -rate})
+    return scene
+
+
+def two_four_bars() -> Scene:
+    """Return two four-bar linkages that have nothing to do with each other."""
+    scene = Scene(t_end=1.0)
+    for number, angle in ((1, 1.0), (2, 0.7)):
+        links = {"crank": (1.0, 0.1), "coupler": (2.5, 0.25), "rocker": (2.0, 0.2)}
+        crank, coupler, rocker = (
+            scene.add(f"{name}{number}", Link(length=length, mass=mass)) for name, (length, mass) in links.items()
+        )
+        ends = [scene.add(f"ground{number}{side}", Ground(position=(x, 0.0, 0.0))) for side, x in ((1, 0.0), (2, 2.5))]
+        joined = [(ends[0].frame, crank.a), (crank.b, coupler.a), (coupler.b, rocker.b), (rocker.a, ends[1].frame)]
+        for k, (one, other) in enumerate(joined):
+            pivot = scene.add(f"pivot{number}{k}", Pivot())
+            scene.connect(one, pivot.a)
+            scene.connect(pivot.b, other)
+        scene.start.update({f"crank{number}.angle": angle, f"crank{number}.angular_velocity": 1.0})
+        scene.guess.update({f"coupler{number}.angle": 0.3, f"rocker{number}.angle": 1.9})
+    return scene

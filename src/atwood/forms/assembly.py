@@ -157,6 +157,18 @@ class Assembly:
         scene = self.source.changed(values or {}, start or {}, guess or {})
         return self.with_flat(flatten(scene, self.flat.name), replace(self.source, scene=scene))
 
+    def with_rows(self, rows: FloatArray) -> Assembly:
+        """Return the same for vectorized kernels alone, with parameters that differ from sample to sample.
+
+        Parameters
+        ----------
+        rows
+            Values of the parameters, shape (parameters, samples).
+        """
+        found = replace(self, _kernels={})
+        found.__dict__["parameter_values"] = rows
+        return found
+
     def with_flat(self, flat: FlatScene, source: Source | None = None) -> Assembly:
         """Return the assembly of a scene with other values: with the same programs if it has the same structure.
 
@@ -168,12 +180,25 @@ class Assembly:
             Where it comes from.
         """
         source = source or self.source
-        mechanism, reason = self._moved(flat)
-        if mechanism is not None:
-            return Assembly(flat, mechanism, self.form, self.level, self.modes, source, "", self.shared)
+        found, reason = self.follow(flat, source)
+        if found is not None:
+            return found
         if source is None:
             raise UsageError(f"its structure changes: {reason}", where=flat.name, advice="Assemble it anew.")
         return replace(source.assemble(flat, self), source=source, why_new=reason)
+
+    def follow(self, flat: FlatScene, source: Source | None = None) -> tuple[Assembly | None, str]:
+        """Return the assembly of a scene with other values, with the same programs; None, and why, if it needs others.
+
+        Parameters
+        ----------
+        flat, source
+            See `with_flat`.
+        """
+        mechanism, reason = self._moved(flat)
+        if mechanism is None:
+            return None, reason
+        return Assembly(flat, mechanism, self.form, self.level, self.modes, source, "", self.shared), ""
 
     def other_mode(self, modes: Mapping[str, str], sides: Mapping[tuple[str, str, str], float]) -> Assembly:
         """Return the scene in other modes, with lengths on a line signed as given; what was made before is used again.
@@ -201,8 +226,9 @@ class Assembly:
 
     def _moved(self, flat: FlatScene) -> tuple[Mechanism | None, str]:
         """Return the mechanism with the values of another scene; None, and why, if its structure is another."""
-        _ = self.reduced  # what was decided by the size of numbers is known only then
-        return with_values_of(self.flat, self.mechanism, self.shared, flat)
+        with self.shared.lock:
+            _ = self.reduced  # what was decided by the size of numbers is known only then
+            return with_values_of(self.flat, self.mechanism, self.shared, flat)
 
     # -- programs -------------------------------------------------------------------------------------------------
 

@@ -30,12 +30,17 @@ class Shared:
     ----------
     family
         What the other modes of the scene share with it; its own if not given.
+
+    Attributes
+    ----------
+    lock
+        Held while something is made: the expressions of one structure live in one graph.
     """
 
     def __init__(self, family: Shared | None = None) -> None:
         self.family = family or self
         self._made: dict[Any, Any] = {}
-        self._lock = threading.RLock()
+        self.lock = threading.RLock()
 
     def get(self, key: Any, make: Callable[[], T]) -> T:
         """Return what was made under a key, making it if it is not there.
@@ -50,7 +55,7 @@ class Shared:
         try:
             found: T = self._made[key]
         except KeyError:
-            with self._lock:
+            with self.lock:
                 if key not in self._made:
                     self._made[key] = make()
                 found = self._made[key]

@@ -182,7 +182,7 @@ class Batch:
         """Go on for a moment; return whether all runs are done."""
         began = time.perf_counter()
         self._job[_BUDGET] = self._budget
-        is_done = self._call(self._job.ctypes.data) == 0
+        is_done: bool = self._call(self._job.ctypes.data) == 0
         taken = time.perf_counter() - began
         self.seconds += taken
         if taken > 2.0 * _MOMENT:

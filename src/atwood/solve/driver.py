@@ -72,6 +72,11 @@ class NativeCallbacks:
         in which steps something happens; what and when is then found out with the problem's own functions.
     missing_values
         How often residual and Jacobian had no finite value so far, if somebody counts it.
+    attend
+        ``attend(t, y)``, called where `weights` have made IDA stop between two steps: None if that was not on
+        purpose, else whether the equations are written in another way from now on, at the same solution.
+    last_rate
+        The factor cj of the last Jacobian, with which it is worked out anew when the equations have changed.
     keep
         Whatever must live as long as the addresses are used.
     """
@@ -83,6 +88,8 @@ class NativeCallbacks:
     set_weights: Callable[[FloatArray, FloatArray], None] | None = None
     events: int = 0
     missing_values: Callable[[], int] | None = None
+    attend: Callable[[float, FloatArray], bool | None] | None = None
+    last_rate: Callable[[], float] | None = None
     keep: object = None
 
 
@@ -222,7 +229,7 @@ class Budget:
 
 
 class Status(Enum):
-    """Why an advance ended."""
+    """Why an advance ended; `STIFF` where another method was asked to take over."""
 
     REACHED = "reached"
     EVENT = "event"
@@ -230,6 +237,7 @@ class Status(Enum):
     STEP_LIMIT = "step_limit"
     TIME_LIMIT = "time_limit"
     INTERRUPTED = "interrupted"
+    STIFF = "stiff"
 
 
 @dataclass(frozen=True, eq=False)

@@ -102,6 +102,11 @@ class CompiledAccelerations:
         rates = CompiledRates(self._built.code.addresses["rates"], data, (self._built, own))
         return OwnRates(rates, self._built.code.addresses["kernel_prologue"], derived, scratch)
 
+    def fill(self, own: OwnRates, parameter_values: ArrayLike) -> None:
+        """Give rates of a session their parameters."""
+        values = np.array(parameter_values, dtype=np.float64)
+        self._prologue(values.ctypes.data, own.derived, own.scratch)
+
 
 @dataclass(frozen=True)
 class OwnRates:

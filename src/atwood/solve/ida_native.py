@@ -44,6 +44,9 @@ ROOT_RETURN = 2
 
 EVENT_REASONS = {-10: "an event function has no value"}
 
+STOPPED_BY_WEIGHTS = -22
+"""IDA's flag when the error weights are not what they must be, or made it stop between two steps."""
+
 TOO_MUCH_WORK = -1
 """IDA's flag when it has taken as many steps as it was allowed to."""
 
@@ -347,8 +350,20 @@ class NativeSession:
     def _solve(self, t_out: float, task: int) -> tuple[int, float]:
         with self._guard:
             flag, t = self._memory.solve(t_out, task)
+            while flag == STOPPED_BY_WEIGHTS and self._attend(t):
+                flag, t = self._memory.solve(t_out, task)
         self._is_first = False
         return flag, t
+
+    def _attend(self, t: float) -> bool:
+        """Let compiled functions that asked for it be looked at; return whether IDA can go on."""
+        native = self._native
+        if native is None or native.attend is None or native.last_rate is None:
+            return False
+        changed = native.attend(t, self._memory.y)
+        if changed:
+            self._memory.renew_factors(t, native.last_rate(), native.user_data)
+        return changed is not None
 
     def _judge(self, flag: int, t: float) -> Advance | None:
         """Return an answer if IDA has failed, or does not get on, after it went to a time."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,17 @@ from numpy.typing import NDArray
 from atwood.errors import SolveError
 from atwood.expr import OutputGroup, Program, depends_on, jacobian
 from atwood.forms.assembly import Assembly
+from atwood.forms.event_program import event_program
 from atwood.mechanics.watches import Watch, list_watches
 from atwood.solve.balance import Balance, balance_of, least_norm
+from atwood.solve.problem import Plan
 from atwood.solve.reactions import ReactionSolver, maximal_state
-from atwood.solve.scales import Scales, motion_scales
+from atwood.solve.scales import motion_scales
 from atwood.solve.sides import actual_sides
 from atwood.solve.turning import resting_place, turning_of
+
+if TYPE_CHECKING:
+    from atwood.kernels.llvm_events import EventCode, EventData
 
 __all__ = ["EventProbe", "Happening", "enter_mode", "find_watches"]
 
@@ -65,9 +70,20 @@ def find_watches(assembly: Assembly) -> tuple[Watch, ...]:
     )
 
 
-def _need_reactions(assembly: Assembly, watches: Sequence[Watch]) -> bool:
-    symbols = [one.symbol for one in assembly.reactions]
-    return any(depends_on(one.value, symbols) for one in watches)
+@dataclass(frozen=True)
+class _Needs:
+    """Whether events read reactions, or accelerations."""
+
+    reactions: bool
+    accelerations: bool
+
+
+def _find_needs(assembly: Assembly, watches: Sequence[Watch]) -> _Needs:
+    symbols, accelerations = [one.symbol for one in assembly.reactions], assembly.equations.accelerations
+    return _Needs(
+        any(depends_on(one.value, symbols) for one in watches),
+        any(depends_on(one.value, accelerations) for one in watches),
+    )
 
 
 class EventProbe:
@@ -75,29 +91,27 @@ class EventProbe:
 
     Parameters
     ----------
-    assembly
+    plan
         The scene in its mode.
     t, q, u
         The state at the start of the mode.
-    scales
-        Sizes of the scene.
     tolerance
         Relative tolerance of the run. A one-sided event that starts within ten times this of zero, as a rope does that
         has just gone slack, happens only when it has passed zero by as much; else errors of a step would set it off.
     """
 
-    def __init__(
-        self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray, scales: Scales, tolerance: float
-    ) -> None:
-        self.assembly = assembly
+    def __init__(self, plan: Plan, t: float, q: FloatArray, u: FloatArray, tolerance: float) -> None:
+        self.plan = plan
+        self.assembly = assembly = plan.assembly
         self.watches = find_watches(assembly)
-        self.needs_reactions = assembly.shared.get("watched reactions", lambda: _need_reactions(assembly, self.watches))
-        self.reactions = ReactionSolver(assembly, t, q, u) if self.needs_reactions else None
+        self.needs = assembly.shared.get("watched needs", lambda: _find_needs(assembly, self.watches))
+        self.reactions = ReactionSolver(assembly, t, q, u) if self.needs.reactions else None
         self.kernel = (
             assembly.kernel(assembly.known_program("events", "events", lambda: [one.value for one in self.watches]))
             if self.watches
             else None
         )
+        scales = plan.scales
         sizes = {"m": scales.length, "N": scales.force, "m/s": scales.length / scales.time}
         small = [10.0 * tolerance * sizes.get(one.unit, 1.0) for one in self.watches]
         self._shift = np.zeros(len(small))
@@ -118,11 +132,39 @@ class EventProbe:
         """Return the value of each event at a state, shifted where it starts at zero."""
         assert self.kernel is not None
         reactions: Any = [0.0] * len(self.assembly.reactions)
+        accelerations = np.zeros_like(u)
         if self.reactions is not None:
             found, _ = self.reactions.at(np.array([t]), q[:, None], u[:, None])
             reactions = found[:, 0]
-        values: FloatArray = np.asarray(self.kernel([t], q, u, np.zeros_like(u), reactions)[0]) + self._shift
+        if self.needs.accelerations and len(u):
+            accelerations, _ = self.plan.balance.accelerate(t, q, u, self.plan.kept)
+        values: FloatArray = np.asarray(self.kernel([t], q, u, accelerations, reactions)[0]) + self._shift
         return values
+
+    def compiled(self, for_ida: bool) -> EventData | None:
+        """Return the same as machine code, for one session; None if nothing is watched, or it cannot be compiled.
+
+        Parameters
+        ----------
+        for_ida
+            Whether SUNDIALS is to call it.
+        """
+        if not self.watches or not len(self.assembly.equations.coordinates):
+            return None
+        kept, maximal = self.plan.finding.kept, () if self.reactions is None else self.reactions.finding.kept
+
+        def make() -> EventCode | None:
+            program = event_program(self.assembly, [one.value for one in self.watches], kept, maximal)
+            if program is None or any(node.operation == "external" for node in program.nodes):
+                return None
+            try:
+                from atwood.kernels.llvm_events import compile_events
+            except ImportError:  # no compiler
+                return None
+            return compile_events(program, for_ida)
+
+        code = self.assembly.shared.get(("event code", kept, maximal, for_ida), make)
+        return None if code is None else code.bind(self.assembly.parameter_values, self._shift)
 
     def function(self) -> Callable[[float, FloatArray, FloatArray], FloatArray] | None:
         """Return the events as a function of the solver's vector; None if nothing is watched."""
@@ -255,12 +297,10 @@ def _to_reduced(
     happening: Happening,
 ) -> tuple[FloatArray, FloatArray]:
     """Find the generalized coordinates of a mode that give the same maximal coordinates and speeds."""
-    equations, to_maximal = after.reduced, after.to_maximal
+    equations = after.reduced
     own_turning, turning = turning_of(after, "reduced"), turning_of(after, "dae")
-    # Speeds of bodies change with generalized speeds as their places do with displacements along these.
-    slope = jacobian(list(to_maximal.outputs[1].expressions), list(equations.speeds))
-    outputs = (*to_maximal.outputs, OutputGroup("slopes", tuple(slope.entries)))
-    kernel = after.kernel(Program("change of mode", to_maximal.inputs, after.parameters, outputs))
+    program, rows, columns = after.shared.get("change of mode", lambda: _maximal_places(after))
+    kernel = after.kernel(program)
     names = tuple(c.name for c in equations.names)
     known = [name for name in names if name in before.observables]
     q, still = resting_place(equations), np.zeros(len(equations.speeds))
@@ -279,7 +319,7 @@ def _to_reduced(
     matrix = np.zeros((len(scales), len(still)))
     for _ in range(30):
         now, _, entries = kernel([t], q, still)
-        matrix[slope.rows, slope.columns] = entries
+        matrix[rows, columns] = entries
         miss = turning.difference(t, turning.normalized(np.asarray(now)), maximal[0]) / scales
         step = least_norm(matrix / scales[:, None], miss)
         q = own_turning.moved(t, q, step)
@@ -287,6 +327,18 @@ def _to_reduced(
             break
     _check_in_place(happening, miss)
     _, drift, entries = kernel([t], q, still)
-    matrix[slope.rows, slope.columns] = entries
+    matrix[rows, columns] = entries
     u = least_norm(matrix / scales[:, None], (maximal[1] - np.asarray(drift)) / scales)
     return q, u
+
+
+def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
+    """Return the program that gives maximal coordinates, their speeds and the slopes of these, and where slopes go.
+
+    Speeds of bodies change with generalized speeds as their places do with displacements along these.
+    """
+    to_maximal, equations = after.to_maximal, after.reduced
+    slope = jacobian(list(to_maximal.outputs[1].expressions), list(equations.speeds))
+    outputs = (*to_maximal.outputs, OutputGroup("slopes", tuple(slope.entries)))
+    program = Program(f"{after.flat.name} change of mode", to_maximal.inputs, after.parameters, outputs)
+    return program, slope.rows, slope.columns

@@ -10,7 +10,7 @@ import ctypes
 import signal
 import threading
 from collections.abc import Callable, Iterable
-from ctypes import CFUNCTYPE, c_double, c_int, c_int32, c_int64, c_void_p
+from ctypes import c_double, c_int32, c_int64, c_void_p
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from atwood.errors import KernelEvaluationError
 from atwood.solve.driver import FloatArray, ImplicitProblem, LinearSolver
 from atwood.solve.event_watch import State
+from atwood.solve.native_signatures import JACOBIAN, RESIDUAL, WEIGHTS
 from atwood.solve.sundials_library import SundialsLibrary
 
 __all__ = [
@@ -38,12 +39,6 @@ NO_VALUE = (KernelEvaluationError, ArithmeticError)
 
 GOOD, RECOVERABLE, BROKEN = 0, 1, -1
 """What a function answers: it has a value; a smaller step may help; nothing helps."""
-
-RESIDUAL = CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p, c_void_p)
-JACOBIAN = CFUNCTYPE(
-    c_int, c_double, c_double, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p
-)
-WEIGHTS = CFUNCTYPE(c_int, c_void_p, c_void_p, c_void_p)
 
 Places = NDArray[np.intp] | slice
 

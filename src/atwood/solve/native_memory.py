@@ -12,6 +12,7 @@ import numpy as np
 
 from atwood.errors import UsageError
 from atwood.solve.driver import FloatArray, LinearSolver
+from atwood.solve.native_signatures import JACOBIAN
 from atwood.solve.sundials_library import SundialsLibrary
 from atwood.solve.sundials_sparse import SparseSolver
 
@@ -167,6 +168,25 @@ class IdaMemory:
     def _use_solver(self, solver: int, matrix: int) -> None:
         self.call("IDASetLinearSolver", solver, matrix)
         self.call("IDASetJacFn", self._jacobian)
+
+    def renew_factors(self, t: float, rate: float, user_data: int) -> bool:
+        """Work out the Jacobian anew and factorise it, as IDA did last; return whether that worked.
+
+        Parameters
+        ----------
+        t
+            The time that belongs to `y` and `yp`.
+        rate
+            The factor cj of the last Jacobian, to which IDA relates the factors.
+        user_data
+            What the Jacobian is given.
+        """
+        parts, library = self._parts, self.library
+        solver, matrix = (parts.sparse.solver, parts.sparse.matrix) if parts.sparse else (parts.solver, parts.matrix)
+        library.SUNMatZero(matrix)
+        jacobian = JACOBIAN(self._jacobian)
+        flag = jacobian(t, rate, self._y, self._yp, self._y, matrix, user_data, None, None, None)
+        return flag == 0 and bool(library.SUNLinSolSetup(solver, matrix) == 0)
 
     def call(self, name: str, *arguments: Any) -> None:
         """Call a function of IDA that must not fail."""

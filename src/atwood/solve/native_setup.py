@@ -128,8 +128,8 @@ def _set_weights(
     if not all(0 <= index < n for index in fixed):
         raise UsageError(f"the angle-like unknowns must lie in 0..{n - 1}")
     absolute[fixed] += share * np.asarray(tuning.angle_size)
-    if len(set(fixed)) in (0, n):
-        # Then the weights are of the kind that IDA computes itself.
+    if len(set(fixed)) in (0, n) and native.attend is None:
+        # Then the weights are of the kind that IDA computes itself, and nothing else depends on being asked for them.
         memory.call("IDASVtolerances", 0.0 if fixed else share, memory.vector(absolute)[1])
         return
     relative = np.full(n, share)

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import KernelEvaluationError, SolveError, StartError
 from atwood.forms.assembly import Assembly
+from atwood.forms.dae import keep_constraints
+from atwood.forms.loops import LoopProgram, loop_program
 from atwood.forms.program import FormProgram
 from atwood.kernels import BoundKernel
 from atwood.solve.balance import Balance, balance_of, least_norm, row_scales, solve_balance
+from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
-from atwood.solve.rank import RankFinding, choose_dependent, dependence, find_rank
+from atwood.solve.rank import RankFinding, find_rank
 from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_names, motion_scales
+
+if TYPE_CHECKING:
+    from atwood.solve.native_loops import CompiledLoops
 
 __all__ = ["Plan", "make_plan", "pack_state"]
 
@@ -23,9 +30,6 @@ FloatArray = NDArray[np.float64]
 
 _HELD = 1e-7
 """Relative to the scene's sizes: a projected state that misses a constraint by more has not met it."""
-
-_POOR = 0.3
-"""Below this share of the best, dependent coordinates are chosen anew."""
 
 
 @dataclass
@@ -45,7 +49,7 @@ class Plan:
     sizes, coordinate_sizes
         Size of a displacement along each speed, and of each coordinate.
     program
-        The form's programs at present; with loops in the reduced form they change with the dependent coordinates.
+        The form's programs; with loops in the reduced form, those for the dependent coordinates of the start.
     dependent, dependent_speeds
         The dependent coordinates and speeds at present.
     switches
@@ -64,6 +68,7 @@ class Plan:
     switches: int = 0
     _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
     _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
+    _loops: CompiledLoops | None = field(default=None, repr=False)
 
     @property
     def kept(self) -> NDArray[np.intp] | None:
@@ -80,24 +85,40 @@ class Plan:
     def kernels(self) -> tuple[BoundKernel, BoundKernel]:
         """Return residual and Jacobian at present."""
         if self._kernels is None:
-            assembly, program = self.assembly, self.program
+            assembly, program = self.assembly, self._present
             self._kernels = (assembly.kernel(program.residual), assembly.kernel(program.jacobian))
         return self._kernels
+
+    @property
+    def _present(self) -> FormProgram:
+        """The form's programs for the present dependent coordinates."""
+        if not self.dependent_speeds:
+            return self.program
+        return self.assembly.form_program(_kept_or_none(self.finding), self.dependent, self.dependent_speeds)
+
+    @property
+    def is_paired(self) -> bool:
+        """Whether every coordinate has a speed of its own, and every constraint holds positions."""
+        return self.balance.turning.is_plain and len(self.balance.program.holonomic) == self.balance.constraints
 
     def review_dependent(self, t: float, q: FloatArray) -> bool:
         """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
         if not self.dependent_speeds:
             return False
-        finding = self.finding
-        coordinates, speeds = _choices(self.balance, finding, t, q, self.sizes, self.coordinate_sizes)
+        coordinates, speeds = _choices(self.balance, self.finding, t, q, self.sizes, self.coordinate_sizes)
         better = coordinates.better(self.dependent), speeds.better(self.dependent_speeds)
         if better == (self.dependent, self.dependent_speeds):
             return False
         self.dependent, self.dependent_speeds = better
-        self.program = self.assembly.form_program(_kept_or_none(finding), *better)
         self._kernels = None
+        if self._loops is not None:
+            self._loops.choose(self.dependent)
         self.switches += 1
         return True
+
+    def review_output(self, t: float, q: FloatArray) -> bool:
+        """Do the same at an output, unless compiled functions tell by themselves when it is time to."""
+        return self._loops is None and self.review_dependent(t, q)
 
     def check_held(self, t: float, q: FloatArray, u: FloatArray) -> None:
         """Refuse a state that misses constraints even after it has been projected onto them: they contradict.
@@ -120,10 +141,15 @@ class Plan:
             )
 
     def between_steps(self, t: float) -> None:
-        """Review the dependent coordinates where the solver last asked for a Jacobian; for the driver's poll."""
+        """Review the dependent coordinates where the solver last asked for a Jacobian; for a driver's poll."""
         if self._seen is not None:
             seen, self._seen = self._seen, None
             self.review_dependent(*seen)
+
+    def poll(self, solver: str) -> Callable[[float], None] | None:
+        """Return what a driver calls between two steps; compiled functions tell by themselves when it is time to."""
+        native = solver == "ida" and self.is_paired
+        return self.between_steps if self.dependent_speeds and not native else None
 
     def problem(
         self,
@@ -144,7 +170,8 @@ class Plan:
         def full_jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> FloatArray:
             self._seen = (t, self.program.split(y)[0].copy())
             full = np.zeros(size * size)
-            full[self.program.columns * size + self.program.rows] = self.kernels()[1]([t], y, yp, [cj])[0]
+            present = self._present
+            full[present.columns * size + present.rows] = self.kernels()[1]([t], y, yp, [cj])[0]
             return full
 
         everywhere = (np.tile(np.arange(size), size), np.repeat(np.arange(size), size))
@@ -157,9 +184,26 @@ class Plan:
             events=events,
             event_count=len(directions),
             event_directions=directions,
-            # Compiled functions cannot follow a change of the dependent coordinates.
-            native=None if self.dependent_speeds else self.compiled,
+            # Compiled functions follow a change of the dependent coordinates only where each has its own speed.
+            native=self.compiled if not self.dependent_speeds else self.compiled_loops if self.is_paired else None,
         )
+
+    def compiled_loops(self, linear_solver: LinearSolver) -> NativeCallbacks:
+        """Return residual and Jacobian of the reduced form with loops as machine code, for one session."""
+        from atwood.solve.native_loops import CompiledLoops, compile_loops
+
+        shared, kept = self.assembly.shared, self.finding.kept
+        if self._loops is None:
+            program = shared.get(("loops", kept), lambda: _loop_program(self.assembly, kept))
+            self._loops = CompiledLoops(program, self.assembly.parameter_values, self.sizes)
+        made = self._loops.program
+        code = shared.get(("loops", kept, linear_solver), lambda: compile_loops(made, linear_solver))
+        coordinates = self.program.coordinates
+
+        def review(t: float, y: FloatArray) -> bool:
+            return self.review_dependent(t, y[:coordinates])
+
+        return self._loops.callbacks(code, self.dependent, review)
 
     def compiled(self, linear_solver: LinearSolver) -> NativeCallbacks:
         """Return residual and Jacobian as machine code, for one session."""
@@ -215,9 +259,7 @@ class _Choice:
 
     def better(self, present: tuple[int, ...]) -> tuple[int, ...]:
         """Return what to go on with: what is there already, unless it has become a poor choice."""
-        best = self.best()
-        now = dependence(self.slope, self.sizes, present)
-        return present if best == present or now >= _POOR * dependence(self.slope, self.sizes, best) else best
+        return review_choice(self.slope, self.sizes, present)
 
 
 def _choices(
@@ -232,6 +274,11 @@ def _choices(
     # The size of an orientation's coordinates changes no constraint, so that slopes lie in the reach of the speeds.
     by_coordinates = slope[holding] @ np.linalg.pinv(balance.turning.tangent(t, q))
     return _Choice(by_coordinates, coordinate_sizes), by_speeds
+
+
+def _loop_program(assembly: Assembly, kept: tuple[int, ...]) -> LoopProgram:
+    equations = keep_constraints(assembly.equations, kept)
+    return loop_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)
 
 
 def _kept_or_none(finding: RankFinding) -> tuple[int, ...] | None:

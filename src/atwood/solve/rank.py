@@ -103,33 +103,3 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     redundant = tuple(i for i in range(count) if i not in set(best))
     lost = tuple(i for i in best if i not in set(at_start)) if len(at_start) < len(best) else ()
     return RankFinding(tuple(best), redundant, len(best), len(at_start), lost)
-
-
-def choose_dependent(slope: FloatArray, scales: FloatArray) -> tuple[int, ...]:
-    """Return the coordinates, or speeds, that constraints determine best: pivoted elimination, largest entry first.
-
-    Parameters
-    ----------
-    slope
-        Derivatives of independent constraints.
-    scales
-        Size of each coordinate, or of a displacement along each speed.
-    """
-    from scipy.linalg import qr
-
-    if slope.shape[0] == 0:
-        return ()
-    rows = row_scales(slope, scales)
-    _, _, pivots = qr(slope * scales / rows[:, None], pivoting=True, mode="economic")
-    return tuple(sorted(int(p) for p in pivots[: slope.shape[0]]))
-
-
-def dependence(slope: FloatArray, scales: FloatArray, dependent: tuple[int, ...]) -> float:
-    """Return how well constraints can be solved for given coordinates: 1 at best, 0 when they cannot."""
-    if not dependent:
-        return 1.0
-    rows = row_scales(slope, scales)
-    scaled = slope * scales / rows[:, None]
-    smallest = np.linalg.svd(scaled[:, list(dependent)], compute_uv=False)[-1]
-    largest = np.linalg.svd(scaled, compute_uv=False)[-1]
-    return float(smallest / largest) if largest > 0.0 else 0.0

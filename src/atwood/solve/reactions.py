@@ -6,6 +6,8 @@ and velocities of either form.
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -113,6 +115,18 @@ class ReactionSolver:
             "release",
             lambda: release_program(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.parameters),
         )
+
+    def for_rows(self, rows: FloatArray) -> ReactionSolver:
+        """Return the same for states that have parameters of their own, where no constraint is redundant.
+
+        Parameters
+        ----------
+        rows
+            Values of the parameters, shape (parameters, samples).
+        """
+        twin = copy.copy(self)
+        twin.assembly = self.assembly.with_rows(rows)
+        return twin
 
     def at(self, t: FloatArray, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return all reactions, of shape (number, samples), and the power of constraints that move with time."""

@@ -104,7 +104,7 @@ def run(
     while True:
         if plan is None:
             plan = make_plan(assembly, t, q, u, start.length, options.t_end - start.time)
-            probe = EventProbe(assembly, t, q, u, plan.scales, options.relative_tolerance)
+            probe = EventProbe(plan, t, q, u, options.relative_tolerance)
         recorder = Recorder(plan)
         limit = float(np.min(breaks[breaks[:, 0] > t, 0], initial=options.t_end))
         ahead = _until(times, shown, t, limit)
@@ -253,7 +253,7 @@ def _integrate(
             advance = session.advance(float(moment))
         if advance.status is Status.REACHED:
             q, u = recorder.take(advance.t, advance.y, show)
-            plan.review_dependent(advance.t, q)
+            plan.review_output(advance.t, q)
             _repair(plan, recorder, session, advance, q, u, options)
         elif advance.status is Status.EVENT:
             q, u = recorder.take(advance.t, advance.y, True)
@@ -289,7 +289,7 @@ def _open(
     budget = Budget(
         max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
         wall_seconds=None if options.max_seconds is None else max(0.0, options.max_seconds - spent.seconds),
-        poll=plan.between_steps if plan.dependent_speeds else None,
+        poll=plan.poll(solver),
     )
     if solver == "explicit":
         return _open_explicit(plan, probe, settings, budget, t, y)

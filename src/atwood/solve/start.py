@@ -27,7 +27,16 @@ from atwood.solve.balance import independent_rows, least_norm, row_scales
 from atwood.solve.scales import motion_names, motion_scales, scene_length
 from atwood.solve.turning import Turning, resting_place, roughly_turned, turning_of
 
-__all__ = ["Start", "find_start", "own_state"]
+__all__ = [
+    "Conditions",
+    "Level",
+    "Start",
+    "Target",
+    "find_start",
+    "own_state",
+    "sort_targets",
+    "start_conditions",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -72,18 +81,20 @@ def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
-class _Target:
+class Target:
+    """A quantity with the value that it is to have at the start."""
+
     path: str
     value: float
     observable: Observable
 
 
 @dataclass(frozen=True)
-class _Level:
+class Level:
     """Targets of one level, position or velocity, split into what is fixed and what is guessed."""
 
-    fixed: list[_Target]
-    guessed: list[_Target]
+    fixed: list[Target]
+    guessed: list[Target]
 
 
 def find_start(assembly: Assembly) -> Start:
@@ -100,7 +111,7 @@ def find_start(assembly: Assembly) -> Start:
         If a start value names no quantity, or they contradict each other or the constraints.
     """
     equations, length = assembly.reduced, scene_length(assembly)
-    positions, speeds = _sort_targets(assembly, equations)
+    positions, speeds = sort_targets(assembly, equations)
     scales = motion_scales(equations, length)
     t = assembly.flat.t_start
     q, free_q, repeated_q = _solve_positions(assembly, equations, positions, scales, t)
@@ -108,13 +119,14 @@ def find_start(assembly: Assembly) -> Start:
     return Start(t, q, u, length, free_q, free_u, (*repeated_q, *repeated_u))
 
 
-def _sort_targets(assembly: Assembly, equations: Equations) -> tuple[_Level, _Level]:
-    levels = (_Level([], []), _Level([], []))
+def sort_targets(assembly: Assembly, equations: Equations) -> tuple[Level, Level]:
+    """Return what is said of positions and of speeds at the start."""
+    levels = (Level([], []), Level([], []))
     for is_fixed, given in ((True, assembly.flat.start), (False, assembly.flat.guess)):
         for path, value in _restated(assembly, given).items():
             number = assembly.shared.get(("start level", path), partial(_find_level, assembly, equations, path))
             level = levels[number]
-            target = _Target(path, value, assembly.start_observables[path])
+            target = Target(path, value, assembly.start_observables[path])
             (level.fixed if is_fixed else level.guessed).append(target)
     return levels
 
@@ -157,7 +169,7 @@ def _find_level(assembly: Assembly, equations: Equations, path: str) -> int:
 
 
 @dataclass(frozen=True)
-class _Conditions:
+class Conditions:
     """The conditions of a start as a program, with their derivatives; the same for all values of a structure."""
 
     program: Program
@@ -166,24 +178,41 @@ class _Conditions:
     shape: tuple[int, int]
 
 
-def _conditions(
-    assembly: Assembly, equations: Equations, targets: Sequence[_Target], constrained: bool, of_speeds: bool
-) -> _Conditions:
-    constraints: list[Expression] = []
-    if constrained and of_speeds:
-        constraints = [one.rate for one in equations.constraints]
-    elif constrained:
-        constraints = [one.value for one in equations.constraints if one.value is not None]
-    unknowns = equations.speeds if of_speeds else equations.coordinates
-    expressions = [*constraints, *(one.observable.value for one in targets)]
-    entries = jacobian(expressions, list(unknowns)) if expressions else None
-    outputs = (
-        OutputGroup("values", tuple(expressions)),
-        OutputGroup("slopes", tuple(entries.entries) if entries else ()),
-    )
-    program = Program(f"{assembly.flat.name} start", state_groups(equations), assembly.parameters, outputs)
-    places = (tuple(entries.rows), tuple(entries.columns)) if entries else ((), ())
-    return _Conditions(program, *places, (len(expressions), len(unknowns)))
+def start_conditions(
+    assembly: Assembly, equations: Equations, targets: Sequence[Target], constrained: bool, of_speeds: bool
+) -> Conditions:
+    """Return the conditions of a start.
+
+    Parameters
+    ----------
+    assembly, equations
+        The scene.
+    targets
+        What is to be met.
+    constrained
+        Whether the constraints are among the conditions, before the targets.
+    of_speeds
+        Whether they are on speeds, or on coordinates.
+    """
+
+    def make() -> Conditions:
+        constraints: list[Expression] = []
+        if constrained and of_speeds:
+            constraints = [one.rate for one in equations.constraints]
+        elif constrained:
+            constraints = [one.value for one in equations.constraints if one.value is not None]
+        unknowns = equations.speeds if of_speeds else equations.coordinates
+        expressions = [*constraints, *(one.observable.value for one in targets)]
+        entries = jacobian(expressions, list(unknowns)) if expressions else None
+        outputs = (
+            OutputGroup("values", tuple(expressions)),
+            OutputGroup("slopes", tuple(entries.entries) if entries else ()),
+        )
+        program = Program(f"{assembly.flat.name} start", state_groups(equations), assembly.parameters, outputs)
+        places = (tuple(entries.rows), tuple(entries.columns)) if entries else ((), ())
+        return Conditions(program, *places, (len(expressions), len(unknowns)))
+
+    return assembly.shared.get(("start", tuple(one.path for one in targets), constrained, of_speeds), make)
 
 
 class _System:
@@ -193,12 +222,11 @@ class _System:
         self,
         assembly: Assembly,
         equations: Equations,
-        targets: Sequence[_Target],
+        targets: Sequence[Target],
         constrained: bool,
         of_speeds: bool = False,
     ) -> None:
-        key = ("start", tuple(one.path for one in targets), constrained, of_speeds)
-        made = assembly.shared.get(key, lambda: _conditions(assembly, equations, targets, constrained, of_speeds))
+        made = start_conditions(assembly, equations, targets, constrained, of_speeds)
         self.turning = None if of_speeds else turning_of(assembly, "reduced")
         self.kernel = assembly.kernel(made.program)
         self.rows, self.columns, self.shape = made.rows, made.columns, made.shape
@@ -251,7 +279,7 @@ def _newton(
 
 
 def _solve_positions(
-    assembly: Assembly, equations: Equations, level: _Level, scales: FloatArray, t: float
+    assembly: Assembly, equations: Equations, level: Level, scales: FloatArray, t: float
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
     rough = [*level.guessed, *level.fixed]
     turning = turning_of(assembly, "reduced")
@@ -293,7 +321,7 @@ def _far_off(system: _System, t: float, q: FloatArray) -> float:
     return float(np.sum((missing / np.where(rows > 0.0, rows, 1.0)) ** 2))
 
 
-def _said(unknowns: Sequence[Expression], targets: Sequence[_Target], otherwise: FloatArray) -> tuple[FloatArray, bool]:
+def _said(unknowns: Sequence[Expression], targets: Sequence[Target], otherwise: FloatArray) -> tuple[FloatArray, bool]:
     """Return what is said of unknowns themselves, which needs no iteration, and whether that is all that is said."""
     values, is_direct = otherwise.copy(), True
     for target in targets:
@@ -315,7 +343,7 @@ def _turned(equations: Equations, turning: Turning, q: FloatArray) -> FloatArray
 def _explain_positions(
     assembly: Assembly,
     equations: Equations,
-    level: _Level,
+    level: Level,
     scales: FloatArray,
     t: float,
     q: FloatArray,
@@ -368,7 +396,7 @@ def _loop_through(assembly: Assembly, part: str) -> list[str]:
     return [*found, *([bodies.bodies[way[-1]].name] if way[-1] else [])]
 
 
-def _raise_contradiction(fixed: Sequence[_Target], missing: FloatArray, equations: Equations) -> None:
+def _raise_contradiction(fixed: Sequence[Target], missing: FloatArray, equations: Equations) -> None:
     failing = [
         f"{target.path} = {target.value:g}" for target, miss in zip(fixed, missing, strict=True) if abs(miss) > _MET
     ]
@@ -384,7 +412,7 @@ def _raise_contradiction(fixed: Sequence[_Target], missing: FloatArray, equation
 
 
 def _solve_speeds(
-    assembly: Assembly, equations: Equations, level: _Level, scales: FloatArray, t: float, q: FloatArray
+    assembly: Assembly, equations: Equations, level: Level, scales: FloatArray, t: float, q: FloatArray
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
     u, is_direct = _said(equations.speeds, [*level.guessed, *level.fixed], np.zeros(len(equations.speeds)))
     if level.guessed and not is_direct:
@@ -417,7 +445,7 @@ def _solve_speeds(
 
 
 def _counted(
-    names: Sequence[str], tangent: FloatArray, fixed: Sequence[_Target], constraints: int, matrix: FloatArray
+    names: Sequence[str], tangent: FloatArray, fixed: Sequence[Target], constraints: int, matrix: FloatArray
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return which coordinates or speeds nothing determines, and which fixed values repeat others.
 

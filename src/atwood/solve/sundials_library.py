@@ -54,6 +54,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
     "SUNSparseMatrix_IndexValues": (_P, _P),
     "SUNSparseMatrix_IndexPointers": (_P, _P),
     "SUNMatDestroy": (None, _P),
+    "SUNMatZero": (c_int, _P),
     "SUNLinSol_Dense": (_P, _P, _P, _P),
     "SUNLinSolInitialize": (c_int, _P),
     "SUNLinSolSetup": (c_int, _P, _P),

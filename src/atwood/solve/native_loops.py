@@ -1,0 +1,86 @@
+"""Compiled functions of a mechanism with loops, which follow changes of its dependent coordinates."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from atwood.forms.loops import LoopProgram
+from atwood.kernels.llvm_ida_loops import LoopCallbacks, LoopData, compile_loop_callbacks
+from atwood.solve.dependent import POOR, choice_lists, loop_shape
+from atwood.solve.driver import FloatArray, LinearSolver, NativeCallbacks
+
+__all__ = ["CompiledLoops", "compile_loops"]
+
+
+def compile_loops(program: LoopProgram, linear_solver: LinearSolver) -> LoopCallbacks:
+    """Return the compiled functions for a matrix of one kind."""
+    return compile_loop_callbacks(
+        program.stack,
+        program.derivatives,
+        (program.slope_rows, program.slope_columns),
+        (program.rows, program.columns),
+        loop_shape(program),
+        sparse=linear_solver == "sparse",
+    )
+
+
+@dataclass
+class CompiledLoops:
+    """The compiled functions of a scene with its parameters, for as many sessions as ask for them.
+
+    Attributes
+    ----------
+    program
+        What they compute.
+    parameter_values
+        The values of the parameters.
+    sizes
+        The size of each speed.
+    """
+
+    program: LoopProgram
+    parameter_values: FloatArray
+    sizes: FloatArray
+    _sessions: weakref.WeakSet[LoopData] = field(default_factory=weakref.WeakSet)
+
+    def callbacks(
+        self,
+        code: LoopCallbacks,
+        dependent: tuple[int, ...],
+        review: Callable[[float, FloatArray], bool],
+    ) -> NativeCallbacks:
+        """Return the functions for one session.
+
+        Parameters
+        ----------
+        code
+            What `compile_loops` gave.
+        dependent
+            The dependent coordinates at first.
+        review
+            Looks at them anew at a time and a state, and returns whether others were chosen.
+        """
+        data = code.bind(self.parameter_values, choice_lists(self.program, dependent), self.sizes, POOR)
+        self._sessions.add(data)
+
+        def attend(t: float, y: FloatArray) -> bool | None:
+            return review(t, y) if data.take_attention() else None
+
+        return NativeCallbacks(
+            code.residual_address,
+            code.jacobian_address,
+            data.address,
+            code.weights_address,
+            data.set_weights,
+            attend=attend,
+            last_rate=lambda: data.rate,
+            keep=(code, data),
+        )
+
+    def choose(self, dependent: tuple[int, ...]) -> None:
+        """Make other coordinates the dependent ones, in all sessions."""
+        lists = choice_lists(self.program, dependent)
+        for data in self._sessions:
+            data.choice[:] = lists

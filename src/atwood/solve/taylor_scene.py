@@ -1,0 +1,130 @@
+"""From an assembled scene to a run with the Taylor-series method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from math import inf
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from atwood.expr.taylor import TaylorPrograms, taylor_programs
+from atwood.forms.accelerations import AccelerationProgram, acceleration_program
+from atwood.forms.assembly import Assembly
+from atwood.solve.driver import Budget, FloatArray, SolverOptions
+from atwood.solve.explicit_problem import ExplicitProblem, Stepper
+from atwood.solve.explicit_session import ExplicitSession
+from atwood.solve.taylor_problem import REACH, TaylorProblem
+
+if TYPE_CHECKING:
+    from atwood.solve.taylor_native import CompiledRecurrences
+
+__all__ = ["open_taylor", "recurrences", "taylor_problem"]
+
+_LANES = 8
+
+
+def recurrences(assembly: Assembly) -> TaylorPrograms | None:
+    """Return the recurrences of a scene in the reduced form, with the state (q, u).
+
+    Returns
+    -------
+    TaylorPrograms or None
+        None if the scene has no coordinates, or constraints are left among them.
+
+    Raises
+    ------
+    UnsupportedError
+        If a law switches with the motion, or calls a function that the graph does not look into.
+    """
+    found = assembly.shared.get("accelerations", lambda: acceleration_program(assembly))
+    if found is None or not len(assembly.reduced.coordinates):
+        return None
+    return assembly.shared.get(("recurrences", id(found)), lambda: (found, _make(found)))[1]
+
+
+def _make(found: AccelerationProgram) -> TaylorPrograms:
+    program = found.program
+    (time,), q, u = (group.symbols for group in program.inputs)
+    return taylor_programs(program.name, time, [*q, *u], [*u, *program.results], program.parameters, _LANES)
+
+
+def taylor_problem(assembly: Assembly, stop_time: float = inf, has_events: bool = False) -> TaylorProblem | None:
+    """Return what the Taylor-series method is given of a scene; None and errors as for `recurrences`.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    stop_time
+        The end of the stretch in which the same laws act.
+    has_events
+        Whether events are looked for.
+    """
+    programs = recurrences(assembly)
+    if programs is None:
+        return None
+    return TaylorProblem(
+        programs=programs,
+        parameters=np.asarray(assembly.parameter_values, dtype=np.float64),
+        stop_time=stop_time,
+        reach=REACH if has_events else inf,
+        compiled=_compiled(assembly, programs),
+    )
+
+
+def _compiled(
+    assembly: Assembly, programs: TaylorPrograms
+) -> Callable[[], tuple[CompiledRecurrences, FloatArray]] | None:
+    """Return what gives the machine code, made when it is first asked for; None if there is no compiler."""
+    try:
+        from atwood.solve.taylor_native import CompiledRecurrences
+    except ImportError:
+        return None
+
+    @cache
+    def bound() -> tuple[CompiledRecurrences, FloatArray]:
+        key = ("compiled recurrences", id(programs))
+        _, code = assembly.shared.get(key, lambda: (programs, CompiledRecurrences(programs)))
+        return code, code.bind(assembly.parameter_values)
+
+    return bound
+
+
+def open_taylor(
+    problem: ExplicitProblem,
+    series: TaylorProblem,
+    options: SolverOptions,
+    t: float,
+    y: FloatArray,
+    budget: Budget | None = None,
+    stepper: Literal["auto", "compiled", "reference"] = "auto",
+) -> ExplicitSession:
+    """Start a run with the Taylor-series method.
+
+    Parameters
+    ----------
+    problem
+        The equations, of which the number of unknowns and the events are read.
+    series
+        Their recurrences.
+    options
+        Accuracy; `max_order` and `linear_solver` mean nothing here.
+    t, y
+        Start values.
+    budget
+        Limits of the session.
+    stepper
+        What takes the steps; ``"auto"`` takes compiled steps where they can be had.
+    """
+    takes: Stepper
+    if stepper == "compiled" or (stepper == "auto" and series.compiled is not None):
+        from atwood.solve.taylor_native import CompiledStepper
+
+        takes = CompiledStepper(series, options)
+    else:
+        from atwood.solve.taylor_reference import ReferenceStepper
+
+        takes = ReferenceStepper(series, options)
+    return ExplicitSession(problem, options, takes, t, y, budget)
