@@ -245,9 +245,9 @@ class Assembly:
         kept
             Numbers of the constraints that are independent; all when None.
         dependent
-            Reduced form with loops: the coordinates that follow from the others.
+            Reduced form with loops: the speeds along which displacements follow from the others.
         dependent_speeds
-            The same for the speeds; those of the dependent coordinates when None.
+            The speeds that follow from the others; the same ones when None.
         """
         speeds = None if dependent_speeds is None else tuple(dependent_speeds)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian
-from atwood.forms.program import either_sign, rate_symbols
+from atwood.forms.program import either_sign, rate_symbols, rows_along_speeds
 from atwood.mechanics.equations import Equations
 
 __all__ = ["LoopProgram", "loop_program"]
@@ -69,7 +69,7 @@ def loop_program(
         The equations' rows, perhaps rewritten.
     """
     rates = rate_symbols(equations)
-    kinematic = [rate - speed for rate, speed in zip(rates, equations.speeds, strict=True)]
+    kinematic = rows_along_speeds(equations)
     values = [either_sign(one.value) for one in equations.constraints if one.value is not None]
     speeds = [either_sign(one.rate) for one in equations.constraints]
     slope = jacobian([one.rate for one in equations.constraints], list(equations.speeds))

@@ -24,6 +24,7 @@ __all__ = [
     "make_form_program",
     "rates_are_speeds",
     "rates_program",
+    "rows_along_speeds",
     "state_groups",
 ]
 
@@ -54,7 +55,8 @@ class FormProgram:
     algebraic
         Unknowns whose derivative does not appear.
     independent
-        With loops in the reduced form: the coordinates that are integrated; the others follow from them.
+        With loops in the reduced form: the kinematic rows that are kept (see `rows_along_speeds`): the coordinates, or
+        what moves with the speeds, that are integrated; the others follow from them.
     """
 
     form: Literal["reduced", "dae"]
@@ -159,32 +161,67 @@ def rates_are_speeds(equations: Equations) -> bool:
     return equations.rates == equations.speeds
 
 
-def kinematic_rows(
-    equations: Equations, chosen: Sequence[int] | None = None, shift: Sequence[Expression] | None = None
-) -> list[Expression]:
-    """Return the rows that say how coordinates move with the speeds.
+def rows_along_speeds(equations: Equations) -> list[Expression]:
+    """Return kinematic rows of which each says what one speed does to the coordinates; those without a speed last.
+
+    With loops, the row of a speed that follows from the constraints is left out, and a constraint takes its place. That
+    is as good a choice for the coordinates as for the speeds: for a chart the rows are ``B^T q' = B^T B u``, where
+    B^T B is a multiple of one, and one more keeps the size of its coordinates.
 
     Parameters
     ----------
     equations
         The equations.
-    chosen
-        Numbers of the coordinates; all when None.
+    """
+    symbols = rate_symbols(equations)
+    number = {speed: i for i, speed in enumerate(equations.speeds)}
+    rows: dict[int, Expression] = {}
+    more: list[Expression] = []
+    for chart in equations.charts:
+        own = [equations.coordinates[i] for i in chart.coordinates]
+        rates = [symbols[i] for i in chart.coordinates]
+        speeds = [equations.speeds[i] for i in chart.speeds]
+        found = jacobian([equations.rates[i] for i in chart.coordinates], speeds)
+        entries = list(zip(found.rows, found.columns, found.entries, strict=True))
+        square = _sum([e * e for _, column, e in entries if column == 0])
+        for k, i in enumerate(chart.speeds):
+            rows[i] = _sum([e * rates[r] for r, column, e in entries if column == k]) - square * speeds[k]
+        more.append(_sum([q * rate for q, rate in zip(own, rates, strict=True)]))
+    in_charts = {i for chart in equations.charts for i in chart.coordinates}
+    for i, (symbol, rate) in enumerate(zip(symbols, equations.rates, strict=True)):
+        if i not in in_charts:
+            rows[number[rate]] = symbol - rate
+    return [*(rows[i] for i in range(len(equations.speeds))), *more]
+
+
+def _sum(terms: Sequence[Expression]) -> Expression:
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def kinematic_rows(equations: Equations, shift: Sequence[Expression] | None = None) -> list[Expression]:
+    """Return, for each coordinate, the row that says how it moves with the speeds.
+
+    Parameters
+    ----------
+    equations
+        The equations.
     shift
         For each speed, what is taken from it first.
     """
     symbols = rate_symbols(equations)
     number = {speed: i for i, speed in enumerate(equations.speeds)}
     rows = []
-    for i in range(len(symbols)) if chosen is None else chosen:
-        rate = equations.rates[i]
+    for symbol, rate in zip(symbols, equations.rates, strict=True):
         if shift is None:
-            rows.append(symbols[i] - rate)
+            rows.append(symbol - rate)
         elif rate in number:
-            rows.append(symbols[i] - rate + shift[number[rate]])
+            rows.append(symbol - rate + shift[number[rate]])
         else:
             less = {speed: speed - by for speed, by in zip(equations.speeds, shift, strict=True)}
-            rows.append(symbols[i] - substitute([rate], less)[0])
+            rows.append(symbol - substitute([rate], less)[0])
     return rows
 
 

@@ -12,7 +12,7 @@ from collections.abc import Collection, Sequence
 import networkx as nx
 
 from atwood.expr import Expression, jacobian, solve
-from atwood.forms.program import FormProgram, either_sign, kinematic_rows, make_form_program
+from atwood.forms.program import FormProgram, either_sign, kinematic_rows, make_form_program, rows_along_speeds
 from atwood.mechanics.equations import Equations
 
 __all__ = ["reduced_form"]
@@ -39,18 +39,20 @@ def reduced_form(
     rows
         The equations' rows, perhaps rewritten.
     dependent
-        With loops: one coordinate for each constraint on positions, chosen so that these can be solved for them.
+        With loops: one speed for each constraint on positions, chosen so that these can be solved for what moves with
+        them.
     dependent_speeds
-        One speed for each constraint; those of the dependent coordinates when None.
+        One speed for each constraint; the same ones when None.
     """
     if not equations.constraints:
         residual = [*kinematic_rows(equations), *rows]
         return make_form_program(name, "reduced", "", equations, parameters, residual)
-    independent = _others(equations.coordinates, dependent)
+    kinematic = rows_along_speeds(equations)
+    independent = _others(kinematic, dependent)
     given = sorted(dependent if dependent_speeds is None else dependent_speeds)
     projected = _project(equations, rows, given, _others(equations.speeds, given))
     residual = [
-        *kinematic_rows(equations, independent),
+        *(kinematic[i] for i in independent),
         *(either_sign(one.value) for one in equations.constraints if one.value is not None),
         *projected,
         *(either_sign(one.rate) for one in equations.constraints),
@@ -59,7 +61,7 @@ def reduced_form(
 
 
 def _others(symbols: Sequence[Expression], chosen: Sequence[int]) -> list[int]:
-    """Return the numbers of the symbols that were not chosen."""
+    """Return the numbers of what was not chosen."""
     return [i for i in range(len(symbols)) if i not in set(chosen)]
 
 

@@ -25,6 +25,7 @@ from atwood.reporting.parts import (
     list_ties,
 )
 from atwood.solve.problem import Plan, make_plan
+from atwood.solve.scales import motion_names
 from atwood.solve.start import Start, find_start, own_state
 
 __all__ = [
@@ -55,7 +56,7 @@ class MechanismReport:
     eliminated
         Coordinates that linear constraints gave as functions of the others.
     dependent
-        With loops: the coordinates that follow from the others at the start.
+        With loops: the coordinates that follow from the others at the start; of orientations, the speeds that do.
     bodies, massless
         What has mass and can move, and the names of what moves without mass.
     joints, ties
@@ -202,7 +203,7 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
         degrees_of_freedom=len(reduced.reduced.speeds) - plans["reduced"].finding.rank,
         coordinates=tuple(names),
         eliminated=reduced.reduced.eliminated,
-        dependent=tuple(names[i] for i in plans["reduced"].dependent),
+        dependent=tuple(motion_names(reduced.reduced)[i] for i in plans["reduced"].dependent),
         bodies=bodies,
         massless=massless,
         joints=list_joints(reduced),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,6 +131,10 @@ class Balance:
         if self._all:
             return now.slope, now.value
         return now.slope[self.holonomic], now.value[self.holonomic]
+
+    def holding(self, chosen: Sequence[int]) -> list[int]:
+        """Return which of some constraints hold positions."""
+        return [i for i in chosen if self._all or i in self.program.holonomic]
 
     def misses(self, t: float, q: FloatArray, u: FloatArray, scales: FloatArray) -> tuple[float, float]:
         """Return by how much a state misses the constraints on position and on velocity, relative to the scales."""

@@ -101,7 +101,9 @@ def loop_shape(program: LoopProgram) -> LoopShape:
     return LoopShape(program.coordinates, program.speeds, program.values, program.rates)
 
 
-def choice_lists(program: LoopProgram, dependent: tuple[int, ...]) -> NDArray[np.int64]:
+def choice_lists(
+    program: LoopProgram, dependent: tuple[int, ...], places: tuple[int, ...] | None = None
+) -> NDArray[np.int64]:
     """Return a choice as the lists of numbers that compiled code reads.
 
     The rows come in the order kinematic rows of independent coordinates, constraints, balances of independent speeds,
@@ -112,11 +114,13 @@ def choice_lists(program: LoopProgram, dependent: tuple[int, ...]) -> NDArray[np
     program
         The mechanism.
     dependent
-        The choice: as many coordinates as there are constraints, and the speeds of the same numbers.
+        The choice: as many speeds as there are constraints.
+    places
+        As many speeds as there are constraints on positions, along which displacements follow; the same when None.
     """
     shape, given = loop_shape(program), set(dependent)
     free = [i for i in range(shape.speeds) if i not in given]
-    kinematic = [i for i in range(shape.coordinates) if i not in given]
+    kinematic = [i for i in range(shape.coordinates) if i not in set(dependent if places is None else places)]
     balances = [shape.coordinates + i for i in free]
     values = [shape.size + j for j in range(shape.values)]
     rates = [shape.size + shape.values + j for j in range(shape.rates)]

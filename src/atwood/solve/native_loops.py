@@ -48,7 +48,7 @@ class CompiledLoops:
     def callbacks(
         self,
         code: LoopCallbacks,
-        dependent: tuple[int, ...],
+        dependent: tuple[tuple[int, ...], tuple[int, ...]],
         review: Callable[[float, FloatArray], bool],
     ) -> NativeCallbacks:
         """Return the functions for one session.
@@ -58,11 +58,12 @@ class CompiledLoops:
         code
             What `compile_loops` gave.
         dependent
-            The dependent coordinates at first.
+            The choice at first: dependent displacements, and dependent speeds.
         review
             Looks at them anew at a time and a state, and returns whether others were chosen.
         """
-        data = code.bind(self.parameter_values, choice_lists(self.program, dependent), self.sizes, POOR)
+        places, speeds = dependent
+        data = code.bind(self.parameter_values, choice_lists(self.program, speeds, places), self.sizes, POOR)
         self._sessions.add(data)
 
         def attend(t: float, y: FloatArray) -> bool | None:
@@ -79,8 +80,8 @@ class CompiledLoops:
             keep=(code, data),
         )
 
-    def choose(self, dependent: tuple[int, ...]) -> None:
-        """Make other coordinates the dependent ones, in all sessions."""
-        lists = choice_lists(self.program, dependent)
+    def choose(self, places: tuple[int, ...], speeds: tuple[int, ...]) -> None:
+        """Make other displacements and speeds the dependent ones, in all sessions."""
+        lists = choice_lists(self.program, speeds, places)
         for data in self._sessions:
             data.choice[:] = lists

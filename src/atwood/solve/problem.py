@@ -51,7 +51,8 @@ class Plan:
     program
         The form's programs; with loops in the reduced form, those for the dependent coordinates of the start.
     dependent, dependent_speeds
-        The dependent coordinates and speeds at present.
+        With loops: the speeds along which displacements follow from constraints on positions, and the speeds that
+        follow from all constraints, at present. They differ only if there are constraints on velocities alone.
     switches
         How often they changed.
     """
@@ -96,29 +97,30 @@ class Plan:
             return self.program
         return self.assembly.form_program(_kept_or_none(self.finding), self.dependent, self.dependent_speeds)
 
-    @property
-    def is_paired(self) -> bool:
-        """Whether every coordinate has a speed of its own, and every constraint holds positions."""
-        return self.balance.turning.is_plain and len(self.balance.program.holonomic) == self.balance.constraints
-
     def review_dependent(self, t: float, q: FloatArray) -> bool:
         """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
         if not self.dependent_speeds:
             return False
-        coordinates, speeds = _choices(self.balance, self.finding, t, q, self.sizes, self.coordinate_sizes)
-        better = coordinates.better(self.dependent), speeds.better(self.dependent_speeds)
-        if better == (self.dependent, self.dependent_speeds):
+        slope = self.balance.at(t, q, np.zeros_like(self.sizes)).slope
+        speeds = review_choice(slope[list(self.finding.kept)], self.sizes, self.dependent_speeds)
+        holding = self.balance.holding(self.finding.kept)
+        is_same = len(holding) == len(speeds)
+        places = speeds if is_same else review_choice(slope[holding], self.sizes, self.dependent)
+        if (places, speeds) == (self.dependent, self.dependent_speeds):
             return False
-        self.dependent, self.dependent_speeds = better
+        self.dependent, self.dependent_speeds = places, speeds
         self._kernels = None
         if self._loops is not None:
-            self._loops.choose(self.dependent)
+            self._loops.choose(places, speeds)
         self.switches += 1
         return True
 
     def review_output(self, t: float, q: FloatArray) -> bool:
-        """Do the same at an output, unless compiled functions tell by themselves when it is time to."""
-        return self._loops is None and self.review_dependent(t, q)
+        """Do the same at an output, unless compiled functions tell by themselves when it is time to.
+
+        These look at the speeds alone.
+        """
+        return (self._loops is None or self.dependent != self.dependent_speeds) and self.review_dependent(t, q)
 
     def check_held(self, t: float, q: FloatArray, u: FloatArray) -> None:
         """Refuse a state that misses constraints even after it has been projected onto them: they contradict.
@@ -148,8 +150,7 @@ class Plan:
 
     def poll(self, solver: str) -> Callable[[float], None] | None:
         """Return what a driver calls between two steps; compiled functions tell by themselves when it is time to."""
-        native = solver == "ida" and self.is_paired
-        return self.between_steps if self.dependent_speeds and not native else None
+        return self.between_steps if self.dependent_speeds and solver != "ida" else None
 
     def problem(
         self,
@@ -184,8 +185,7 @@ class Plan:
             events=events,
             event_count=len(directions),
             event_directions=directions,
-            # Compiled functions follow a change of the dependent coordinates only where each has its own speed.
-            native=self.compiled if not self.dependent_speeds else self.compiled_loops if self.is_paired else None,
+            native=self.compiled_loops if self.dependent_speeds else self.compiled,
         )
 
     def compiled_loops(self, linear_solver: LinearSolver) -> NativeCallbacks:
@@ -203,7 +203,7 @@ class Plan:
         def review(t: float, y: FloatArray) -> bool:
             return self.review_dependent(t, y[:coordinates])
 
-        return self._loops.callbacks(code, self.dependent, review)
+        return self._loops.callbacks(code, (self.dependent, self.dependent_speeds), review)
 
     def compiled(self, linear_solver: LinearSolver) -> NativeCallbacks:
         """Return residual and Jacobian as machine code, for one session."""
@@ -244,36 +244,6 @@ class Plan:
         program = self.program
         loose = np.full(program.multipliers + program.extra, 1e3 * max(self.scales.force, 1.0))
         return np.concatenate([relative * self.coordinate_sizes, relative * (self.sizes / self.scales.time), loose])
-
-
-@dataclass(frozen=True)
-class _Choice:
-    """Derivatives of constraints, and the sizes of what they are derivatives by."""
-
-    slope: FloatArray
-    sizes: FloatArray
-
-    def best(self) -> tuple[int, ...]:
-        """Return what the constraints determine best."""
-        return choose_dependent(self.slope, self.sizes)
-
-    def better(self, present: tuple[int, ...]) -> tuple[int, ...]:
-        """Return what to go on with: what is there already, unless it has become a poor choice."""
-        return review_choice(self.slope, self.sizes, present)
-
-
-def _choices(
-    balance: Balance, finding: RankFinding, t: float, q: FloatArray, sizes: FloatArray, coordinate_sizes: FloatArray
-) -> tuple[_Choice, _Choice]:
-    """Return what dependent coordinates and dependent speeds are chosen by; the same if there is no difference."""
-    slope = balance.at(t, q, np.zeros_like(sizes)).slope
-    by_speeds = _Choice(slope[list(finding.kept)], sizes)
-    holding = [i for i in finding.kept if i in balance.program.holonomic]
-    if balance.turning.is_plain and len(holding) == len(finding.kept):
-        return by_speeds, by_speeds
-    # The size of an orientation's coordinates changes no constraint, so that slopes lie in the reach of the speeds.
-    by_coordinates = slope[holding] @ np.linalg.pinv(balance.turning.tangent(t, q))
-    return _Choice(by_coordinates, coordinate_sizes), by_speeds
 
 
 def _loop_program(assembly: Assembly, kept: tuple[int, ...]) -> LoopProgram:
@@ -322,8 +292,7 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
         raise _singular_start(assembly, finding)
     dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
     if assembly.form == "reduced" and finding.kept:
-        coordinates, speeds = _choices(balance, finding, t, q, sizes, coordinate_sizes)
-        dependent = coordinates.best(), speeds.best()
+        dependent = choose_dependent(now.slope[balance.holding(finding.kept)], sizes), choose_dependent(slope, sizes)
     program = assembly.form_program(_kept_or_none(finding), *dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = solve_balance(now, kept, t)

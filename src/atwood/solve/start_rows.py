@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Equations
-from atwood.solve.scales import coordinate_scales
+from atwood.solve.scales import coordinate_scales, motion_scales
 from atwood.solve.start import Conditions
 
 __all__ = ["meet_speeds", "size_rows"]
@@ -18,10 +18,12 @@ _RANK = 1e-9
 """Relative size below which a direction counts as lost, as for one run."""
 
 
-def size_rows(equations: Equations, lengths: FloatArray) -> FloatArray:
-    """Return the size of each coordinate, as `coordinate_scales` has it, one row for each extent."""
-    unit = coordinate_scales(equations, 0.0)  # zero for lengths, one for angles
-    return np.where(unit[None, :] == 0.0, lengths[:, None], unit[None, :])
+def size_rows(equations: Equations, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the size of each coordinate, and of a displacement along each speed, one row for each extent."""
+    found = []
+    for unit in (coordinate_scales(equations, 0.0), motion_scales(equations, 0.0)):  # zero for lengths, else one
+        found.append(np.where(unit[None, :] == 0.0, lengths[:, None], unit[None, :]))
+    return found[0], found[1]
 
 
 def meet_speeds(
@@ -49,7 +51,7 @@ def meet_speeds(
     q, u
         States, shape (runs, number); the speeds are changed in place.
     sizes
-        Size of each coordinate, shape (runs, number).
+        Size of a displacement along each speed, shape (runs, number).
     wanted
         What each condition is to be, shape (conditions, runs).
 

@@ -47,7 +47,8 @@ def recurrences(assembly: Assembly) -> TaylorPrograms | None:
 def _make(found: AccelerationProgram) -> TaylorPrograms:
     program = found.program
     (time,), q, u = (group.symbols for group in program.inputs)
-    return taylor_programs(program.name, time, [*q, *u], [*u, *program.results], program.parameters, _LANES)
+    rates = u if len(program.outputs) == 1 else ()  # else the program gives them
+    return taylor_programs(program.name, time, [*q, *u], [*rates, *program.results], program.parameters, _LANES)
 
 
 def taylor_problem(assembly: Assembly, stop_time: float = inf, has_events: bool = False) -> TaylorProblem | None:

@@ -184,8 +184,9 @@ class StartRows:
         is_simple = len(self._positions) == len(positions.fixed) + len(positions.guessed) and len(set(fixed)) == len(
             fixed
         )
-        # Guesses of other speeds than the coordinates' own are for one run at a time.
-        self.is_direct = is_simple and not speeds.guessed and not self._start_is_bound()
+        # Guesses of other speeds than the coordinates' own, and orientations in space, are for one run at a time.
+        is_simple = is_simple and not speeds.guessed and not equations.charts
+        self.is_direct = is_simple and not self._start_is_bound()
         self._wanted = [columns.get(one.path, one.value) for one in speeds.fixed]
         self._conditions = start_conditions(assembly, equations, speeds.fixed, True, True) if self.is_direct else None
         flat = assembly.flat
@@ -233,8 +234,7 @@ class StartRows:
             Their parameters, one row each, where they change.
         """
         assembly = self._order.assembly
-        n = len(assembly.reduced.coordinates)
-        q, u = np.zeros((len(runs), n)), np.zeros((len(runs), n))
+        q, u = (np.zeros((len(runs), len(s))) for s in (assembly.reduced.coordinates, assembly.reduced.speeds))
         lengths = self._extents(runs, parameters)
         if self._conditions is not None:
             for rows, said in ((q, self._positions), (u, self._speeds)):
@@ -242,7 +242,7 @@ class StartRows:
                     rows[:, place] = _of(given, runs)
             wanted = np.array([np.broadcast_to(_of(one, runs), len(runs)) for one in self._wanted])
             values = assembly.parameter_values if parameters is None else parameters.T
-            sizes = size_rows(assembly.reduced, lengths)
+            _, sizes = size_rows(assembly.reduced, lengths)
             found = meet_speeds(assembly, self._conditions, values, assembly.flat.t_start, q, u, sizes, wanted)
             return q, u, lengths, found
         found = np.ones(len(runs), dtype=bool)

@@ -28,6 +28,7 @@ from atwood.solve.reactions import ReactionSolver
 from atwood.solve.start import find_start
 from atwood.solve.start_rows import size_rows
 from atwood.solve.stiffness import can_be_stiff
+from atwood.solve.turning import turning_of
 from atwood.study.batch_values import ParameterRows, StartRows
 from atwood.study.sweep_runs import Order, Records, shared_work
 
@@ -96,7 +97,8 @@ def run_batches(order: Order, records: Records, threads: int, watch: Callable[[i
     array
         Numbers of the runs that are left, to be made one by one.
     """
-    count, shown = order.cases.count, len(order.times) * 2 * len(order.assembly.reduced.coordinates)
+    equations = order.assembly.reduced
+    count, shown = order.cases.count, len(order.times) * (len(equations.coordinates) + len(equations.speeds))
     length = max(1, min(_PIECE, -(-count // (4 * threads)), _NUMBERS // max(1, shown)))
     pieces = [np.arange(first, min(first + length, count)) for first in range(0, count, length)]
     batches = _Batches(order, records)
@@ -177,18 +179,17 @@ class _Batches:
         parameters, usable = self.rows.read(runs)
         q, u, lengths, found = self.starts.read(runs, parameters)
         usable &= found
-        n = q.shape[1]
         state = np.concatenate([q, u], axis=1)
         usable &= np.all(np.isfinite(state), axis=1)
         t = np.array([[self.order.assembly.flat.t_start]])
         values = self.order.assembly.parameter_values if parameters is None else parameters.T
         with np.errstate(all="ignore"):
-            a = self.watched.bind(values)(t, q.T, u.T)[0].T
+            a = self.watched.bind(values)(t, q.T, u.T)[-1].T
             usable &= np.all(np.isfinite(a), axis=1) & self._has_inertia(t, q, u, values, lengths)
             tolerances = self._tolerances(u, a, lengths, values)
         usable &= np.all(np.isfinite(tolerances), axis=1)
         kept = None if parameters is None else parameters[usable]
-        return _Prepared(runs[usable], state[usable], kept, tolerances[usable].reshape(-1, 2 * n))
+        return _Prepared(runs[usable], state[usable], kept, tolerances[usable].reshape(-1, state.shape[1]))
 
     def _has_inertia(
         self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray, lengths: FloatArray
@@ -199,7 +200,7 @@ class _Batches:
         n = program.speeds
         mass = np.zeros((len(q), n, n))
         mass[:, program.mass_rows, program.mass_columns] = entries.T
-        sizes = size_rows(self.order.assembly.reduced, lengths)
+        _, sizes = size_rows(self.order.assembly.reduced, lengths)
         mass *= sizes[:, :, None] * sizes[:, None, :]
         usable = np.all(np.isfinite(mass), axis=(1, 2))
         mass[~usable] = np.eye(n)
@@ -210,7 +211,7 @@ class _Batches:
     def _tolerances(self, u: FloatArray, a: FloatArray, lengths: FloatArray, values: FloatArray) -> FloatArray:
         """Return the absolute tolerances of each run, as `Plan.tolerances` has them."""
         order, assembly = self.order, self.order.assembly
-        sizes = size_rows(assembly.reduced, lengths)
+        coordinate_sizes, sizes = size_rows(assembly.reduced, lengths)
         span = order.options.t_end - assembly.flat.t_start
         times = [np.full_like(u, span), sizes / np.abs(u), np.sqrt(sizes / np.abs(a))]
         symbols = [one.name for one in assembly.parameters]
@@ -220,7 +221,7 @@ class _Batches:
         every = np.concatenate(times, axis=1)
         time = np.min(np.where(every > 0.0, every, np.inf), axis=1)
         relative = order.options.relative_tolerance
-        return np.concatenate([relative * sizes, relative * (sizes / time[:, None])], axis=1)
+        return np.concatenate([relative * coordinate_sizes, relative * (sizes / time[:, None])], axis=1)
 
     # -- after the last step --------------------------------------------------------------------------------------
 
@@ -247,9 +248,9 @@ class _Batches:
         """Return the quantities of the runs that came to their end, shape (quantities, runs, times)."""
         order, assembly = self.order, self.order.assembly
         count, moments = int(np.sum(good)), len(order.times)
-        n = states.shape[2] // 2
-        flat = states[good].reshape(count * moments, 2 * n).T
-        q, u = flat[:n], flat[n:]
+        n = len(assembly.reduced.coordinates)
+        flat = states[good].reshape(count * moments, states.shape[2]).T
+        q, u = turning_of(assembly, "reduced").normalized(flat[:n]), flat[n:]
         t = np.tile(order.times, count)
         values = assembly.parameter_values
         if ready.parameters is not None:
@@ -259,7 +260,7 @@ class _Batches:
         if not count:
             return np.zeros((len(order.paths), 0, moments))
         if _reads(order, list(assembly.reduced.accelerations)):
-            a = self.watched.bind(values)(t[None, :], q, u)[0]
+            a = self.watched.bind(values)(t[None, :], q, u)[-1]
         if self.needs_reactions:
             reactions = self._reactions(ready.runs[good], t, q, u, moments, values, ready.parameters is not None)
         observer = assembly.compiled(assembly.observer(order.paths), vectorized=True).bind(values)
