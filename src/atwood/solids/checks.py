@@ -47,8 +47,8 @@ def verify_moments(inertia: FloatArray) -> FloatArray:
         )
     if moments[0] >= -1e-14 * moments[2]:
         return inertia
-    mended = (axes * np.maximum(moments, 0.0)) @ axes.T
-    return (mended + mended.T) / 2
+    mended: FloatArray = (axes * np.maximum(moments, 0.0)) @ axes.T
+    return symmetric_part(mended)
 
 
 def _advice(inertia: FloatArray, rule: str) -> str:
