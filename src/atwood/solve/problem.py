@@ -20,6 +20,7 @@ from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.solve.rank import RankFinding, find_rank
 from atwood.solve.scales import Scales, coordinate_scales, find_scales
+from atwood.solve.uncompiled import announce, find_uncompiled
 
 if TYPE_CHECKING:
     from atwood.solve.native_loops import CompiledLoops
@@ -52,6 +53,8 @@ class Plan:
         The dependent coordinates at present.
     switches
         How often they changed.
+    uncompiled
+        What keeps the scene from being compiled, in words; empty if nothing does.
     """
 
     assembly: Assembly
@@ -62,6 +65,7 @@ class Plan:
     program: FormProgram
     dependent: tuple[int, ...]
     switches: int = 0
+    uncompiled: str = ""
     _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
     _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
     _loops: CompiledLoops | None = field(default=None, repr=False)
@@ -139,7 +143,7 @@ class Plan:
 
     def poll(self, solver: str) -> Callable[[float], None] | None:
         """Return what a driver calls between two steps; compiled functions tell by themselves when it is time to."""
-        return self.between_steps if self.dependent and solver != "ida" else None
+        return self.between_steps if self.dependent and (solver != "ida" or self.uncompiled) else None
 
     def problem(
         self,
@@ -174,7 +178,7 @@ class Plan:
             events=events,
             event_count=len(directions),
             event_directions=directions,
-            native=self.compiled_loops if self.dependent else self.compiled,
+            native=None if self.uncompiled else self.compiled_loops if self.dependent else self.compiled,
         )
 
     def compiled_loops(self, linear_solver: LinearSolver) -> NativeCallbacks:
@@ -292,7 +296,10 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = solve_balance(now, kept, t)
     scales = find_scales(assembly, length, u, accelerations, sizes, span)
-    return Plan(assembly, balance, finding, scales, sizes, program, dependent)
+    uncompiled = find_uncompiled(assembly, program.residual)
+    if uncompiled:
+        announce(assembly, uncompiled)
+    return Plan(assembly, balance, finding, scales, sizes, program, dependent, uncompiled=uncompiled)
 
 
 def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
