@@ -77,8 +77,12 @@ if TYPE_CHECKING:
     from atwood.reporting import MechanismReport, report
     from atwood.result.files import SavedResult, load_result, save_result
     from atwood.result.result import Result
-    from atwood.study import Comparison, ComparisonRow, compare
-    from atwood.view import animate, plot, plot_comparison, plot_mechanism
+    from atwood.study.compare import Comparison, ComparisonRow, compare
+    from atwood.study.sweep import Sweep, sweep
+    from atwood.view.drawing import animate, plot_mechanism
+    from atwood.view.plot import plot
+    from atwood.view.precision import plot_comparison
+    from atwood.view.sweep import plot_sweep
 
     __version__: str
 
@@ -112,6 +116,7 @@ __all__ = [
     "Scene",
     "SolveError",
     "StartError",
+    "Sweep",
     "TopologyError",
     "UnsupportedError",
     "UsageError",
@@ -155,6 +160,7 @@ __all__ = [
     "plot",
     "plot_comparison",
     "plot_mechanism",
+    "plot_sweep",
     "potential",
     "report",
     "save_result",
@@ -167,6 +173,7 @@ __all__ = [
     "sinh",
     "solve_linear",
     "sqrt",
+    "sweep",
     "tan",
     "tanh",
     "to_data",
@@ -180,6 +187,7 @@ _LATER = {
     "MechanismReport": "atwood.reporting",
     "Result": "atwood.result.result",
     "SavedResult": "atwood.result.files",
+    "Sweep": "atwood.study",
     "animate": "atwood.view",
     "assemble": "atwood.pipeline",
     "compare": "atwood.study",
@@ -190,10 +198,12 @@ _LATER = {
     "plot": "atwood.view",
     "plot_comparison": "atwood.view",
     "plot_mechanism": "atwood.view",
+    "plot_sweep": "atwood.view",
     "report": "atwood.reporting",
     "save_result": "atwood.result.files",
     "save_scene": "atwood.model.store",
     "simulate": "atwood.pipeline",
+    "sweep": "atwood.study",
     "to_data": "atwood.model.store",
 }
 """Names whose modules are imported when they are first used; each also stands in `__all__` and above."""
