@@ -79,8 +79,11 @@ if TYPE_CHECKING:
     from atwood.result.files import SavedResult, load_result, save_result
     from atwood.result.result import Result
     from atwood.study.compare import Comparison, ComparisonRow, compare
-    from atwood.view import animate, plot_comparison, plot_mechanism
+    from atwood.study.sweep import Sweep, sweep
+    from atwood.view.drawing import animate, plot_mechanism
     from atwood.view.plot import plot
+    from atwood.view.precision import plot_comparison
+    from atwood.view.sweep import plot_sweep
 
     __version__: str
 
@@ -116,6 +119,7 @@ __all__ = [
     "Scene",
     "SolveError",
     "StartError",
+    "Sweep",
     "TopologyError",
     "UnsupportedError",
     "UsageError",
@@ -160,6 +164,7 @@ __all__ = [
     "plot",
     "plot_comparison",
     "plot_mechanism",
+    "plot_sweep",
     "potential",
     "report",
     "save_result",
@@ -172,6 +177,7 @@ __all__ = [
     "sinh",
     "solve_linear",
     "sqrt",
+    "sweep",
     "tan",
     "tanh",
     "to_data",
@@ -186,6 +192,7 @@ _LATER = {
     "MechanismReport": "atwood.reporting",
     "Result": "atwood.result.result",
     "SavedResult": "atwood.result.files",
+    "Sweep": "atwood.study",
     "animate": "atwood.view",
     "assemble": "atwood.pipeline",
     "compare": "atwood.study",
@@ -196,10 +203,12 @@ _LATER = {
     "plot": "atwood.view",
     "plot_comparison": "atwood.view",
     "plot_mechanism": "atwood.view",
+    "plot_sweep": "atwood.view",
     "report": "atwood.reporting",
     "save_result": "atwood.result.files",
     "save_scene": "atwood.model.store",
     "simulate": "atwood.pipeline",
+    "sweep": "atwood.study",
     "to_data": "atwood.model.store",
 }
 """Names whose modules are imported when they are first used; each also stands in `__all__` and above."""

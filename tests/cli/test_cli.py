@@ -53,8 +53,13 @@ def test_run_as_json(form: str, level: str, states: int, multipliers: list[str])
     assert data["states"] == states
     assert data["multipliers"] == multipliers
     assert len(data["coordinates"]) == len(data["speeds"])
-    assert set(data["solver"]) == {"name", "steps", "residual_evaluations", "jacobian_evaluations", "wall_s"}
-    assert data["solver"]["steps"] > 10
+    assert set(data["solver"]) == {
+        "name", "why", "choices", "steps", "residual_evaluations", "jacobian_evaluations", "wall_s"
+    }  # fmt: skip
+    (used,) = data["solver"]["choices"]
+    assert used["solver"] == ("explicit" if form == "reduced" else "ida")
+    assert data["solver"]["why"] == f"{used['name']}: {used['reason']}"
+    assert data["solver"]["steps"] > (4 if form == "reduced" else 10)
     assert set(data["energy"]) >= {"start", "end", "max_drift"}
     assert data["energy"]["max_drift"] < 1e-5
     assert data["constraint_max"] < (1e-12 if level != "index1" else 1e-5)
@@ -107,10 +112,10 @@ def test_a_run_is_plotted(tmp_path: Path) -> None:
 
 
 def test_a_limit_ends_a_run_early_and_says_so() -> None:
-    data = run_json("run", f"{FILE}:Swing", "--max-steps", "10")
+    data = run_json("run", f"{FILE}:Swing", "--max-steps", "3")
     assert data["status"] == "step_limit"
     assert data["t_end"] < 1.0
-    assert "out of steps" in run("run", f"{FILE}:Swing", "--max-steps", "10").stdout
+    assert "out of steps" in run("run", f"{FILE}:Swing", "--max-steps", "3").stdout
 
 
 # -- where scenes come from --------------------------------------------------------------------------------------------

@@ -55,7 +55,14 @@ def _flip(data):
     return data[:-9] + bytes([data[-9] ^ 1]) + data[-8:]
 
 
-@pytest.mark.parametrize("damage", [lambda d: b"", _truncate, _flip, lambda d: b"something else", lambda d: d + b"\0"])
+def _of_another_version(data):
+    return b"atwood cache 0\n" + data[len(b"atwood cache 1\n") :]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [lambda d: b"", _truncate, _flip, _of_another_version, lambda d: b"something else", lambda d: d + b"\0"],
+)
 def test_a_damaged_entry_is_ignored_and_rebuilt(directory, damage):
     compile_native(small())
     [path] = entries(directory)

@@ -36,6 +36,7 @@ def main() -> None:
     atwood info four-bar                 bodies, joints, freedom, equations
     atwood run double-pendulum           its motion and its forces
     atwood compare double-pendulum       what each form costs for which error
+    atwood sweep double-pendulum --vary mass2=0.5:2:16
     """  # noqa: D301 - click reads the backspace, not the two letters
 
 
@@ -79,6 +80,7 @@ def info_command(scene: str, settings: tuple[str, ...], starts: tuple[str, ...],
 
 _FORM = click.Choice(["reduced", "dae"])
 _LEVEL = click.Choice(["ggl", "index1", "index1-projected"])
+_SOLVER = click.Choice(["auto", "ida", "ida-sundae", "explicit", "taylor"])
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
 
@@ -92,10 +94,11 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative tolerance of the solver.")
 @click.option(
     "--solver",
-    type=click.Choice(["auto", "ida", "ida-sundae", "explicit"]),
+    type=_SOLVER,
     default="auto",
     show_default=True,
-    help="IDA with compiled equations, or through scikit-sundae with equations in Python; or an explicit method.",
+    help="IDA with compiled equations, or through scikit-sundae with equations in Python; or an explicit method: "
+    "Runge-Kutta, or Taylor series.",
 )
 @click.option("--outputs", type=click.IntRange(min=2), default=201, show_default=True, help="Number of output times.")
 @click.option("--max-steps", type=click.IntRange(min=1), help="Stop after so many steps.")
@@ -128,3 +131,55 @@ def compare_command(scene: str, as_json: bool, **options: Any) -> None:
     from atwood.cli.comparing import CompareRequest, compare_scene
 
     compare_scene(CompareRequest(scene=scene, as_json=as_json, **options))
+
+
+@main.command("sweep", short_help="Simulate a scene with many parameters and starts.", epilog=_SCENE_HELP)
+@_scene_options
+@click.option(
+    "--vary",
+    multiple=True,
+    metavar="PATH=VALUES",
+    help="Values of a parameter: rod1.length=0.5:2:16 (from, to, how many), or mass2='1,2,5 kg'. Can be repeated.",
+)
+@click.option(
+    "--vary-start",
+    multiple=True,
+    metavar="PATH=VALUES",
+    help="Values of a start value, such as rod1.angle=0:90:10deg. Can be repeated.",
+)
+@click.option(
+    "--combine",
+    type=click.Choice(["grid", "list"]),
+    default="grid",
+    show_default=True,
+    help="Every value with every other, or the first of each, the second of each, and so on.",
+)
+@click.option(
+    "--quantity",
+    "quantities",
+    multiple=True,
+    metavar="PATH",
+    help="What to keep, such as bob2.position.x; the coordinates if not given. Can be repeated.",
+)
+@click.option("--form", type=_FORM, default="reduced", show_default=True, help="Constraints eliminated, or kept.")
+@click.option(
+    "--level", type=_LEVEL, default="ggl", show_default=True, help="Level of the constraints of the dae form."
+)
+@click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
+@click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative tolerance of the solver.")
+@click.option("--solver", type=_SOLVER, default="auto", show_default=True, help="As for `atwood run`.")
+@click.option("--outputs", type=click.IntRange(min=2), help="Number of output times; the end alone if not given.")
+@click.option("--max-steps", type=click.IntRange(min=1), help="Stop a run after so many steps.")
+@click.option("--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop a run after so many seconds.")
+@click.option(
+    "--threads", type=click.IntRange(min=1), help="How many threads share the runs.  [default: all processors]"
+)
+@click.option("--plot", type=_FILE, help="Save a picture of the ends; the suffix says how (.png, .svg, .pdf).")
+@click.option("--save", type=_FILE, help="Save all quantities of all runs (.csv, .nc or .json).")
+@click.option("--progress/--no-progress", default=True, help="Show progress where there is a terminal.")
+@reporting_errors
+def sweep_command(scene: str, as_json: bool, **options: Any) -> None:
+    """Simulate SCENE with many parameters and starts, and show where the runs end."""
+    from atwood.cli.sweeping import SweepRequest, sweep_scene
+
+    sweep_scene(SweepRequest(scene=scene, as_json=as_json, **options))

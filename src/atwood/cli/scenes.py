@@ -18,7 +18,7 @@ from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
 if TYPE_CHECKING:
     from atwood.model.composite import Model
 
-__all__ = ["bundled_scenes", "find_scene", "prepare"]
+__all__ = ["bundled_scenes", "find_scene", "pairs", "prepare"]
 
 GROUP = "atwood.libraries"
 """The entry point group in which component libraries make themselves known."""
@@ -90,9 +90,9 @@ def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[
     from atwood.model.scene import Scene
 
     scene, name = find_scene(text)
-    for path, value in _pairs(settings, "--set"):
+    for path, value in pairs(settings, "--set"):
         scene.set(path, value)
-    for path, value in _pairs(starts, "--start"):
+    for path, value in pairs(starts, "--start"):
         if not isinstance(scene, Scene):
             raise UsageError("this is a model and no scene, and has no start of its own", where=name)
         if value.strip() != "free":
@@ -104,7 +104,8 @@ def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[
     return scene, name
 
 
-def _pairs(texts: Sequence[str], option: str) -> Iterator[tuple[str, str]]:
+def pairs(texts: Sequence[str], option: str) -> Iterator[tuple[str, str]]:
+    """Yield path and value of options like ``--set path=value``."""
     for text in texts:
         path, equals, value = text.partition("=")
         if not (equals and path.strip() and value.strip()):

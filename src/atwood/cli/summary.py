@@ -106,6 +106,8 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         f"{solver_name(result)}, {count_of(statistics.steps, 'step')}, {statistics.residual_evaluations} residuals, "
         f"{statistics.jacobian_evaluations} Jacobians, {duration(statistics.seconds)}",
     )
+    if result.run.options.solver == "auto":
+        yield "chosen", result.run.why
     yield "energy", _energy(result)
     if plan.balance.constraints:
         missed = result.constraint_max

@@ -22,6 +22,7 @@ from atwood.errors import UnsupportedError
 
 __all__ = [
     "SundialsLayout",
+    "array_of",
     "dense_text",
     "layout_for",
     "residual_text",
@@ -116,7 +117,7 @@ def layout_for(index_bytes: int) -> SundialsLayout:
     )
 
 
-def _array_of(name: str, structure: str, offset: int) -> str:
+def array_of(name: str, structure: str, offset: int) -> str:
     """Write how to find an array of a structure: through its content, which is its first member."""
     return f"""  %{name}.content = load ptr, ptr %{structure}
   %{name}.place = getelementptr i8, ptr %{name}.content, i64 {offset}
@@ -149,7 +150,7 @@ _JACOBIAN = (
 def residual_text(layout: SundialsLayout) -> str:
     """Write the residual with IDA's signature."""
     vectors = "".join(
-        _array_of(name, structure, layout.vector_data)
+        array_of(name, structure, layout.vector_data)
         for name, structure in (("y", "yy"), ("yp", "yyp"), ("residual.values", "rr"))
     )
     head = "define i32 @ida_residual(double %t, ptr %yy, ptr %yyp, ptr %rr, ptr %data) #0 {\n"
@@ -157,16 +158,14 @@ def residual_text(layout: SundialsLayout) -> str:
 
 
 def _jacobian_start(layout: SundialsLayout) -> str:
-    vectors = "".join(
-        _array_of(name, structure, layout.vector_data) for name, structure in (("y", "yy"), ("yp", "yyp"))
-    )
+    vectors = "".join(array_of(name, structure, layout.vector_data) for name, structure in (("y", "yy"), ("yp", "yyp")))
     return _JACOBIAN + _STATE + _RATE + vectors
 
 
 def dense_text(layout: SundialsLayout) -> str:
     """Write the Jacobian with IDA's signature for a dense matrix, which lies column after column."""
     call = _call_text("jacobian", ("t.place", "y", "yp", "cj.place"), "entries", 1)
-    return _jacobian_start(layout) + _array_of("entries", "matrix", layout.dense_data) + call
+    return _jacobian_start(layout) + array_of("entries", "matrix", layout.dense_data) + call
 
 
 def sparse_text(layout: SundialsLayout, rows: NDArray[np.int64], starts: NDArray[np.intp]) -> str:
@@ -175,9 +174,9 @@ def sparse_text(layout: SundialsLayout, rows: NDArray[np.int64], starts: NDArray
     parts = [_constants("pattern.rows", integer, rows), _constants("pattern.starts", integer, starts)]
     parts.append("declare ptr @memcpy(ptr, ptr, i64) #0")
     parts.append(_jacobian_start(layout))
-    parts.append(_array_of("entries", "matrix", layout.sparse_data))
-    parts.append(_array_of("values", "matrix", layout.sparse_values))
-    parts.append(_array_of("starts", "matrix", layout.sparse_pointers))
+    parts.append(array_of("entries", "matrix", layout.sparse_data))
+    parts.append(array_of("values", "matrix", layout.sparse_values))
+    parts.append(array_of("starts", "matrix", layout.sparse_pointers))
     parts.append(f"""  %room.place = getelementptr i8, ptr %entries.content, i64 {layout.sparse_room}
   %room = load {integer}, ptr %room.place
   %small = icmp slt {integer} %room, {len(rows)}
@@ -199,7 +198,7 @@ def _constants(name: str, integer: str, values: NDArray[Any]) -> str:
 
 def weights_text(layout: SundialsLayout, size: int) -> str:
     """Write the error weights with IDA's signature: 1 / (relative |y| + absolute), which must all be positive."""
-    arrays = _array_of("y", "yy", layout.vector_data) + _array_of("w", "weights", layout.vector_data)
+    arrays = array_of("y", "yy", layout.vector_data) + array_of("w", "weights", layout.vector_data)
     return f"""define i32 @ida_weights(ptr %yy, ptr %weights, ptr %data) #0 {{
 entry:
 {arrays}  %relative.place = getelementptr ptr, ptr %data, i64 3

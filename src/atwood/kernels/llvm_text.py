@@ -15,7 +15,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr.graph import Expression
 from atwood.expr.operations import ExternalFunction
 
-__all__ = ["LIBRARY_FUNCTIONS", "Needs", "Writer", "literal"]
+__all__ = ["LIBRARY_FUNCTIONS", "Needs", "Writer", "has_code", "literal"]
 
 LIBRARY_FUNCTIONS: Mapping[str, tuple[str, int]] = {
     "sin": ("sin", 1),
@@ -258,3 +258,13 @@ _OTHER: dict[str, Callable[[Writer, Expression], str]] = {
     "maximum": _choose,
     "select": _select,
 }
+
+_ELSEWHERE = frozenset({"constant", "symbol", "solve", "component", "external"})
+"""Operations that need no code, or are written elsewhere."""
+
+
+def has_code(operation: str) -> bool:
+    """Return whether there is machine code for an operation."""
+    return operation in _OTHER or any(
+        operation in known for known in (_ARITHMETIC, _CONDITIONS, LIBRARY_FUNCTIONS, _ELSEWHERE)
+    )

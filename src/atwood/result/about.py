@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from atwood.result.result import Result
-from atwood.solve.options import SOLVERS
 from atwood.solve.sundials_library import available, library
 
 __all__ = ["describe_run", "solver_name", "versions"]
@@ -28,8 +27,8 @@ def versions() -> dict[str, str]:
 
 
 def solver_name(result: Result) -> str:
-    """Return the name of the solver that a run was made with."""
-    return SOLVERS[result.run.solver]
+    """Return the name of the solver that a run was made with; of all, if it was changed on the way."""
+    return ", then ".join(one.name for one in result.run.choices)
 
 
 def describe_run(result: Result) -> dict[str, Any]:
@@ -61,6 +60,11 @@ def describe_run(result: Result) -> dict[str, Any]:
         ],
         "solver": {
             "name": solver_name(result),
+            "why": result.run.why,
+            "choices": [
+                {"from": one.time, "solver": one.solver, "name": one.name, "reason": one.reason}
+                for one in result.run.choices
+            ],
             "steps": statistics.steps,
             "residual_evaluations": statistics.residual_evaluations,
             "jacobian_evaluations": statistics.jacobian_evaluations,

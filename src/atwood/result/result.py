@@ -22,6 +22,7 @@ from atwood.result.angles import unwrap
 from atwood.result.energy import EnergyLedger, make_ledger
 from atwood.solve.driver import Statistics
 from atwood.solve.modes import Happening
+from atwood.solve.projection import misses_of
 from atwood.solve.reactions import ReactionSolver
 from atwood.solve.record import Segment
 from atwood.solve.run import Run
@@ -85,6 +86,11 @@ class Result:
     def happenings(self) -> tuple[Happening, ...]:
         """Events on the way, in order."""
         return self.run.happenings
+
+    @property
+    def solver(self) -> str:
+        """What solved it and why, as a sentence."""
+        return self.run.why
 
     @property
     def statistics(self) -> Statistics:
@@ -291,11 +297,11 @@ class Result:
             if not plan.balance.constraints:
                 continue
             speed = 1.0 / plan.scales.time
-            for i in np.flatnonzero(segment.shown):
-                q, u = segment.coordinates[:, i], segment.speeds[:, i]
-                position, velocity = plan.balance.misses(float(segment.time[i]), q, u, plan.sizes)
-                found["position"] = max(found["position"], position)
-                found["velocity"] = max(found["velocity"], velocity / speed)
+            shown = segment.shown
+            missed = misses_of(plan, segment.time[shown], segment.coordinates[:, shown], segment.speeds[:, shown])
+            position, velocity = np.max(missed, axis=1, initial=0.0)
+            found["position"] = max(found["position"], float(position))
+            found["velocity"] = max(found["velocity"], float(velocity) / speed)
             found["held_position"] = max(found["held_position"], float(np.max(segment.held[0])))
             found["held_velocity"] = max(found["held_velocity"], float(np.max(segment.held[1])) / speed)
         return found

@@ -48,8 +48,7 @@ def verify_moments(inertia: FloatArray) -> FloatArray:
     if moments[0] >= -1e-14 * moments[2]:
         return inertia
     mended: FloatArray = (axes * np.maximum(moments, 0.0)) @ axes.T
-    symmetric: FloatArray = (mended + mended.T) / 2
-    return symmetric
+    return symmetric_part(mended)
 
 
 def _advice(inertia: FloatArray, rule: str) -> str:

@@ -6,7 +6,6 @@ import ctypes
 import time
 from ctypes import c_int, c_void_p
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from atwood.kernels.llvm_build import Built, build_code
 from atwood.kernels.llvm_module import CodeOptions
+from atwood.kernels.once import once
 from atwood.solve.batch_code import FIELDS, batch_code
 from atwood.solve.driver import FloatArray
 
@@ -201,12 +201,12 @@ class Batch:
 _RUN, _BUDGET = FIELDS.index("run"), FIELDS.index("budget")
 
 
-@cache
+@once
 def _code() -> Built:
     return build_code([], CodeOptions(), more=batch_code(), exports=["batch"])
 
 
-@cache
+@once
 def _function() -> Any:
     """Return the function; a call lets other threads run."""
     return ctypes.CFUNCTYPE(c_int, c_void_p)(_code().code.addresses["batch"])

@@ -65,6 +65,16 @@ class EventWatch:
         self._settling = True
         self.evaluations = 0
 
+    @property
+    def signs(self) -> FloatArray:
+        """The sign that each event last had for certain; zero where it is not known."""
+        return np.array(self._sign_list)
+
+    @property
+    def is_settling(self) -> bool:
+        """Whether signs are still to be read a little after a restart."""
+        return self._settling
+
     def restart(self, state: State) -> None:
         """Take the signs from a new start of the solution."""
         t = state[0]

@@ -54,7 +54,11 @@ def _evaluate() -> str:
 
 
 def _run() -> str:
-    """Return the function that takes steps: 0 at the stop time, 1 at the limit of steps, 2 if steps get too small."""
+    """Return the function that takes steps.
+
+    It ends with 0 at the stop time, 1 at the limit of steps, 2 if steps get too small, and with 5 after a step in which
+    an event may have happened, or after which the problem seems stiff and that is heeded.
+    """
     return f"""define i32 @run(ptr %session) #0 {{
 entry:
 {opening()}
@@ -88,6 +92,47 @@ return0:
   ret i32 0
 return1:
   ret i32 1
+return5:
+  ret i32 5
+}}"""
+
+
+def _look() -> str:
+    """Return the function that tells whether an event may have happened in the last step."""
+    return f"""define internal i32 @look(ptr %session, double %t) #0 {{
+entry:
+{opening()}
+  %watched = load i64, ptr %event_count.at
+  %is_watched = icmp sgt i64 %watched, 0
+  br i1 %is_watched, label %ask, label %nothing
+ask:
+  %y.index = mul i64 %m, {ROWS["y"]}
+  %y = getelementptr double, ptr %arrays, i64 %y.index
+  %yp.index = mul i64 %m, 12
+  %yp = getelementptr double, ptr %arrays, i64 %yp.index
+  %code = call i32 %events(double %t, ptr %y, ptr %yp, ptr %values, ptr %events_data)
+  %has_values = icmp eq i32 %code, 0
+  br i1 %has_values, label %compare, label %something
+compare:
+  %i = phi i64 [ 0, %ask ], [ %following, %compare ]
+  %value.at = getelementptr double, ptr %values, i64 %i
+  %value = load double, ptr %value.at
+  %sign.at = getelementptr double, ptr %signs, i64 %i
+  %sign = load double, ptr %sign.at
+  %product = fmul double %value, %sign
+  %is_same = fcmp ogt double %product, 0.0
+  %following = add i64 %i, 1
+  %is_more = icmp slt i64 %following, %watched
+  %goes_on = and i1 %is_same, %is_more
+  br i1 %goes_on, label %compare, label %end
+end:
+  %changed = xor i1 %is_same, true
+  %answer = zext i1 %changed to i32
+  ret i32 %answer
+something:
+  ret i32 1
+nothing:
+  ret i32 0
 }}"""
 
 
@@ -169,7 +214,13 @@ def _acceptance() -> str:
   store i64 %stepped, ptr %steps.at
 {_stability()}
   call void @accept(ptr %arrays, i64 %m)
-  br label %step"""
+  %look = call i32 @look(ptr %session, double %t_new)
+  %happens = icmp ne i32 %look, 0
+  %heeding = load i64, ptr %heeds.at
+  %is_heeding = icmp ne i64 %heeding, 0
+  %stiffens = and i1 %found, %is_heeding
+  %is_noted = or i1 %happens, %stiffens
+  br i1 %is_noted, label %return5, label %step"""
 
 
 def _stability() -> str:
@@ -292,5 +343,5 @@ def step_code() -> str:
     They take a pointer to the pointers of a session, in the order of `POINTERS`; numbers and counts are in the order of
     `NUMBERS` and `COUNTS`.
     """
-    parts = [loop_code(), _evaluate(), begin_code(), _run(), _interpolate(), _sample()]
+    parts = [loop_code(), _evaluate(), begin_code(), _look(), _run(), _interpolate(), _sample()]
     return "\n".join([*parts, "declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"])

@@ -18,8 +18,10 @@ COUNTS = (
     "filled",
     "edgy",
     "calm",
+    "event_count",
+    "heeds",
 )
-POINTERS = ("function", "data", "numbers", "counts", "arrays")
+POINTERS = ("function", "data", "numbers", "counts", "arrays", "events", "events_data", "values", "signs")
 
 
 def _fields(names: tuple[str, ...], group: str) -> str:

@@ -10,7 +10,6 @@ import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
 from dataclasses import dataclass, fields
-from functools import cache
 from itertools import accumulate
 from math import inf
 
@@ -21,12 +20,14 @@ from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.expr import Program
 from atwood.kernels.llvm_build import Built, build_code, default_options
 from atwood.kernels.llvm_module import CodeOptions, Part
+from atwood.kernels.once import once
 from atwood.solve.batch import BatchPlaces
 from atwood.solve.driver import FloatArray, SolverOptions
 from atwood.solve.event_watch import State
 from atwood.solve.explicit_code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
 from atwood.solve.explicit_loops import ROWS, WIDTH
 from atwood.solve.explicit_problem import (
+    CompiledEvents,
     CompiledRates,
     Counts,
     ExplicitProblem,
@@ -157,7 +158,7 @@ class CompiledStepper:
         self._numbers[_R] = options.relative_tolerance
         self._numbers[_LONGEST] = options.max_step or inf
         self._numbers[_HORIZON], self._numbers[_FIRST] = options.horizon, options.first_step or 0.0
-        self._pointers[:] = rates.function, rates.data, base + 8 * ends[0], base + 8 * ends[1], base
+        self._pointers[:5] = rates.function, rates.data, base + 8 * ends[0], base + 8 * ends[1], base
         self._session = c_void_p(base + 8 * ends[2])
         self._places = c_void_p(base + 8 * ends[3]), c_void_p(base + 8 * ends[4])
         self._run, self._interpolate, self._sample, self._begin = functions()
@@ -175,6 +176,26 @@ class CompiledStepper:
     def counts(self) -> Counts:
         """What it has done so far, over all starts."""
         return Counts(*self._counts[_STEPS : _STEPS + len(fields(Counts))].tolist())
+
+    def watch(self, events: CompiledEvents) -> None:
+        """Let `run` and `sample` come back with `Outcome.NOTICED` after a step in which an event may have happened."""
+        self._values, self._signs = np.zeros((2, events.count))
+        self._keep = (self._keep, events)
+        places = (array.ctypes.data for array in (self._values, self._signs))
+        self._pointers[5:9] = events.function, events.data, *places
+        self._counts[_EVENTS] = events.count
+
+    def expect(self, signs: FloatArray) -> None:
+        """Say which sign each event has; where it is zero, every step is noticed."""
+        self._signs[:] = signs
+
+    def heed_stiffness(self) -> None:
+        """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
+        self._counts[_HEEDS] = 1
+
+    def begin_of_step(self) -> float:
+        """Return the time at the begin of the last step."""
+        return float(self._numbers[_T_OLD])
 
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
@@ -239,16 +260,18 @@ class CompiledStepper:
 
 
 _T, _STOP, _R, _LONGEST, _HORIZON, _FIRST = map(NUMBERS.index, ("t", "stop", "relative", "longest", "horizon", "first"))
+_T_OLD = NUMBERS.index("t_old")
 _LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
+_EVENTS, _HEEDS = map(COUNTS.index, ("event_count", "heeds"))
 
 
-@cache
+@once
 def _code() -> Built:
     """Return the code of the steps."""
     return build_code([], CodeOptions(level=2), more=step_code(), exports=FUNCTIONS)
 
 
-@cache
+@once
 def functions() -> tuple[Callable[..., int], ...]:
     """Return the functions `run`, `interpolate`, `sample` and `begin`."""
     addresses = _code().code.addresses

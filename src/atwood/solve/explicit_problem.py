@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from math import sqrt
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -22,11 +22,14 @@ __all__ = [
     "CALM",
     "EDGE",
     "STIFF",
+    "CompiledEvents",
     "CompiledRates",
     "Counts",
     "ExplicitProblem",
+    "HeedingStepper",
     "Outcome",
     "Stepper",
+    "WatchingStepper",
     "absolute_tolerances",
     "first_step",
 ]
@@ -59,6 +62,29 @@ class CompiledRates:
 
 
 @dataclass(frozen=True, eq=False)
+class CompiledEvents:
+    """The address of compiled event functions, for one session.
+
+    Parameters
+    ----------
+    function
+        ``int (double t, const double *y, const double *yp, double *values, void *data)``, which returns 0, or another
+        number where a value is not finite.
+    data
+        Its last argument.
+    count
+        The number of events.
+    keep
+        Whatever must live as long as the addresses are used.
+    """
+
+    function: int
+    data: int
+    count: int
+    keep: object = None
+
+
+@dataclass(frozen=True, eq=False)
 class ExplicitProblem:
     """The equations ``y' = f(t, y)`` of one mode.
 
@@ -80,6 +106,8 @@ class ExplicitProblem:
         For each event +1 (rising values only), -1 (falling values only) or 0 (both).  Empty: all 0.
     compiled
         ``compiled()``: a compiled form of `rates`.  Each session asks once, and must not share it with another one.
+    compiled_events
+        ``compiled_events()``: the same for `events`, if there is one.
     """
 
     size: int
@@ -88,6 +116,7 @@ class ExplicitProblem:
     event_count: int = 0
     event_directions: tuple[int, ...] = ()
     compiled: Callable[[], CompiledRates] | None = None
+    compiled_events: Callable[[], CompiledEvents | None] | None = None
 
     def __post_init__(self) -> None:
         if self.size < 1:
@@ -101,11 +130,12 @@ class ExplicitProblem:
 
 
 class Outcome(IntEnum):
-    """Why a stepper came back."""
+    """Why a stepper came back; `NOTICED` where it was asked to watch something."""
 
     REACHED = 0
     USED_UP = 1
     TOO_SMALL = 2
+    NOTICED = 5
 
 
 @dataclass
@@ -127,6 +157,32 @@ class Counts:
     evaluations: int = 0
     missing: int = 0
     stiff: int = 0
+
+
+@runtime_checkable
+class WatchingStepper(Protocol):
+    """What a stepper has in addition if it looks for events by itself."""
+
+    def watch(self, events: CompiledEvents) -> None:
+        """Let `run` and `sample` come back with `Outcome.NOTICED` after a step in which an event may have happened."""
+        ...
+
+    def expect(self, signs: FloatArray) -> None:
+        """Say which sign each event has; where it is zero, every step is noticed."""
+        ...
+
+    def begin_of_step(self) -> float:
+        """Return the time at the begin of the last step."""
+        ...
+
+
+@runtime_checkable
+class HeedingStepper(Protocol):
+    """What a stepper has in addition if it can come back as soon as the problem seems stiff."""
+
+    def heed_stiffness(self) -> None:
+        """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
+        ...
 
 
 class Stepper(Protocol):

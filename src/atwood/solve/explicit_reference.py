@@ -85,11 +85,16 @@ class ReferenceStepper:
         self._polynomial: FloatArray | None = None
         self._last = self._y
         self._edgy = self._calm = 0
+        self._heeds = False
 
     @property
     def counts(self) -> Counts:
         """What it has done so far, over all starts."""
         return self._counts
+
+    def heed_stiffness(self) -> None:
+        """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
+        self._heeds = True
 
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
@@ -114,8 +119,11 @@ class ReferenceStepper:
             while self._t < t_stop:
                 if self._counts.steps >= last:
                     return Outcome.USED_UP
+                stiff = self._counts.stiff
                 if not self._step():
                     return Outcome.TOO_SMALL
+                if self._heeds and self._counts.stiff > stiff:
+                    return Outcome.NOTICED
         return Outcome.REACHED
 
     def interpolate(self, t: float) -> State:

@@ -70,7 +70,7 @@ def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAc
 def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], CompiledRates] | None:
     """Return what gives each session compiled rates, made when they are first asked for; None if they cannot be."""
     try:
-        import atwood.solve.explicit_native  # noqa: F401
+        from atwood.solve import explicit_native  # noqa: F401
     except ImportError:  # no compiler: steps in Python
         return None
     if any(node.operation == "external" for node in found.program.nodes):

@@ -7,6 +7,7 @@ times and events never change the solution.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from math import inf
 from typing import Literal, cast
 
@@ -15,7 +16,7 @@ import numpy as np
 from atwood.errors import KernelEvaluationError, StartError, UsageError
 from atwood.solve.driver import Advance, Budget, FloatArray, ImplicitProblem, SolverOptions, Statistics, Status
 from atwood.solve.event_watch import ROUNDING, EventWatch, Root, State
-from atwood.solve.explicit_problem import ExplicitProblem, Outcome, Stepper
+from atwood.solve.explicit_problem import ExplicitProblem, HeedingStepper, Outcome, Stepper, WatchingStepper
 
 __all__ = ["ExplicitSession", "open_explicit"]
 
@@ -29,6 +30,9 @@ _STALLED = 50
 """So many steps in a row that do not move the time beyond rounding are a failure."""
 
 
+Leave = Callable[[float, FloatArray], bool]
+
+
 def open_explicit(
     problem: ExplicitProblem,
     options: SolverOptions,
@@ -36,6 +40,7 @@ def open_explicit(
     y: FloatArray,
     budget: Budget | None = None,
     stepper: Literal["auto", "compiled", "reference"] = "auto",
+    leave: Leave | None = None,
 ) -> ExplicitSession:
     """Start a run with the explicit method of order 8(5,3).
 
@@ -52,14 +57,17 @@ def open_explicit(
         Limits of the session.
     stepper
         What takes the steps; ``"auto"`` takes compiled steps where the problem has compiled rates.
+    leave
+        Asked, with time and values, whenever stability has kept steps short for a while, whether to leave the rest to
+        an implicit method: the run then ends there with `Status.STIFF`.
     """
     if stepper == "compiled" or (stepper == "auto" and problem.compiled is not None):
         from atwood.solve.explicit_native import CompiledStepper
 
-        return ExplicitSession(problem, options, CompiledStepper(problem, options), t, y, budget)
+        return ExplicitSession(problem, options, CompiledStepper(problem, options), t, y, budget, leave)
     from atwood.solve.explicit_reference import ReferenceStepper
 
-    return ExplicitSession(problem, options, ReferenceStepper(problem, options), t, y, budget)
+    return ExplicitSession(problem, options, ReferenceStepper(problem, options), t, y, budget, leave)
 
 
 class ExplicitSession:
@@ -67,7 +75,7 @@ class ExplicitSession:
 
     Parameters
     ----------
-    problem, options, t, y, budget
+    problem, options, t, y, budget, leave
         As in `open_explicit`.
     stepper
         What takes the steps.
@@ -81,18 +89,34 @@ class ExplicitSession:
         t: float,
         y: FloatArray,
         budget: Budget | None = None,
+        leave: Leave | None = None,
     ) -> None:
         self.budget = budget or Budget()
+        self._leave, self._judged, self._is_left = leave, 0, False
         self._size = problem.size
         self._stepper = stepper
         # The watch reads nothing of a problem but its events.
         watched = cast("ImplicitProblem", problem)
         self._watch = EventWatch(watched, options.horizon) if problem.events is not None else None
+        self._notices = self._watching_stepper(problem, stepper)
+        if leave is not None and isinstance(stepper, HeedingStepper):
+            stepper.heed_stiffness()
         self._no_events = (0,) * problem.event_count
         self._starts = 0
         self._seconds = 0.0
         self._chunk = FIRST_CHUNK
         self.reinitialize(t, y)
+
+    @staticmethod
+    def _watching_stepper(problem: ExplicitProblem, stepper: Stepper) -> WatchingStepper | None:
+        """Let the stepper look for events by itself, if it can."""
+        if problem.compiled_events is None or not isinstance(stepper, WatchingStepper):
+            return None
+        events = problem.compiled_events()
+        if events is None:
+            return None
+        stepper.watch(events)
+        return stepper
 
     @property
     def statistics(self) -> Statistics:
@@ -175,7 +199,8 @@ class ExplicitSession:
             raise UsageError(f"cannot sample from t = {self._here[0]:.9g} at these times: they must rise from there")
         values, rates = np.empty((len(times), self._size)), np.empty((len(times), self._size))
         filled, stopped = 0, None
-        if self._watch is None and self.budget.poll is None and not self._broken:
+        looks_itself = self._watch is None or self._notices is not None
+        if looks_itself and self.budget.poll is None and not self._broken:
             filled, stopped = self._sample_quickly(times, values, rates)
         if stopped is not None:
             return values[:filled], rates[:filled], stopped
@@ -189,7 +214,7 @@ class ExplicitSession:
         return values[:filled], rates[:filled], advance
 
     def _sample_quickly(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> tuple[int, Advance | None]:
-        """Let the stepper go through times as long as no limit is near.
+        """Let the stepper go through times as long as no limit is near, and nothing happens.
 
         Returns
         -------
@@ -199,17 +224,15 @@ class ExplicitSession:
         began = time.perf_counter()
         filled = 0
         try:
-            while filled < len(times):
-                if times[-1] > self._newest[0] and self._exceeded(began) is not None:
+            while filled < len(times) and self._find_root() is None:
+                is_ahead = times[-1] > self._newest[0]
+                if is_ahead and self._exceeded(began) is not None:
                     break
-                looked = time.perf_counter()
-                y, yp, outcome = self._stepper.sample(times[filled:], self._allowed())
-                self._learn(time.perf_counter() - looked, outcome)
-                values[filled : filled + len(y)], rates[filled : filled + len(y)] = y, yp
-                filled += len(y)
-                self._newest = self._stepper.state()
-                if len(y):
-                    self._here = (float(times[filled - 1]), y[-1].copy(), yp[-1].copy())
+                if is_ahead and self._watch is not None and self._watch.is_settling:
+                    outcome = self._take(float(times[-1]), 1)
+                else:
+                    count, outcome = self._fill(times[filled:], values[filled:], rates[filled:])
+                    filled += count
                 if outcome is Outcome.TOO_SMALL:
                     break
         except KeyboardInterrupt:
@@ -222,9 +245,44 @@ class ExplicitSession:
             self._broken = True
             raise
         finally:
-            self._searched = self._newest[0]
             self._seconds += time.perf_counter() - began
         return filled, None
+
+    def _fill(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> tuple[int, Outcome]:
+        """Let the stepper fill tables for a moment; return how many times it reached."""
+        looked = time.perf_counter()
+        self._tell_signs()
+        y, yp, outcome = self._stepper.sample(times, self._allowed())
+        self._learn(time.perf_counter() - looked, outcome)
+        count = len(y)
+        values[:count], rates[:count] = y, yp
+        self._arrive(outcome)
+        if count:
+            self._here = (float(times[count - 1]), y[-1].copy(), yp[-1].copy())
+        return count, outcome
+
+    def _take(self, t_out: float, steps: int) -> Outcome:
+        """Let the stepper take steps."""
+        looked = time.perf_counter()
+        self._tell_signs()
+        outcome = self._stepper.run(t_out, steps)
+        self._learn(time.perf_counter() - looked, outcome)
+        self._arrive(outcome)
+        return outcome
+
+    def _tell_signs(self) -> None:
+        if self._notices is not None and self._watch is not None:
+            self._notices.expect(self._watch.signs)
+
+    def _arrive(self, outcome: Outcome) -> None:
+        """Take up where the stepper came to, and up to where nothing has happened for certain."""
+        before = self._newest[0]
+        self._newest = self._stepper.state()
+        if self._watch is None:
+            self._searched = self._newest[0]
+        elif self._notices is not None and self._newest[0] > before and not self._watch.is_settling:
+            last = self._newest[0] if outcome is not Outcome.NOTICED else self._notices.begin_of_step()
+            self._searched = max(self._searched, last)
 
     def _run(self, t_out: float, began: float) -> Advance:
         if self._broken:
@@ -256,7 +314,8 @@ class ExplicitSession:
 
     def _allowed(self) -> int:
         """Return how many steps may be taken before the next look at limits and events."""
-        if self._watch is not None or self.budget.poll is not None:
+        watch = self._watch
+        if self.budget.poll is not None or (watch is not None and (self._notices is None or watch.is_settling)):
             return 1
         if self.budget.max_steps is None:
             return self._chunk
@@ -272,10 +331,7 @@ class ExplicitSession:
     def _step(self, t_out: float) -> Advance | None:
         """Take steps, and return an answer only if that failed."""
         before, steps = self._newest[0], self._stepper.counts.steps
-        looked = time.perf_counter()
-        outcome = self._stepper.run(t_out, self._allowed())
-        self._learn(time.perf_counter() - looked, outcome)
-        self._newest = self._stepper.state()
+        outcome = self._take(t_out, self._allowed())
         if outcome is Outcome.TOO_SMALL:
             self._here = self._newest
             self._broken = True
@@ -293,8 +349,18 @@ class ExplicitSession:
             return self._stopped(Status.FAILED, "the steps became too small to move the time")
         return None
 
+    def _leaves(self) -> bool:
+        """Tell whether the rest is to be left to an implicit method."""
+        stiff = self._stepper.counts.stiff
+        if self._leave is not None and stiff > self._judged:
+            self._judged = stiff
+            self._is_left = self._leave(*self._newest[:2])
+        return self._is_left
+
     def _exceeded(self, began: float) -> Advance | None:
         budget, t = self.budget, self._here[0]
+        if self._leave is not None and self._leaves():
+            return self._stopped(Status.STIFF, "steps are kept short by stability alone")
         if budget.poll is not None:
             budget.poll(t)
         steps = self._stepper.counts.steps

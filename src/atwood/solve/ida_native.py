@@ -31,7 +31,7 @@ from atwood.solve.driver import (
 from atwood.solve.event_watch import EventWatch, Root, State
 from atwood.solve.ida_sundae import REASONS
 from atwood.solve.native_callbacks import InterruptLater, Record, explain
-from atwood.solve.native_memory import ONE_STEP, TO_TIME, Counts
+from atwood.solve.native_memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
 from atwood.solve.native_pace import FIRST_CHUNK, FIRST_COMPILED_CHUNK, Pace
 from atwood.solve.native_setup import IdaTuning, prepare
 from atwood.solve.native_states import checked_state, copied, is_finite
@@ -39,16 +39,7 @@ from atwood.solve.sundials_library import available, why_not
 
 __all__ = ["IdaTuning", "NativeSession", "available", "open_session", "why_not"]
 
-ROOT_RETURN = 2
-"""IDA's flag when an event function has changed its sign."""
-
 EVENT_REASONS = {-10: "an event function has no value"}
-
-STOPPED_BY_WEIGHTS = -22
-"""IDA's flag when the error weights are not what they must be, or made it stop between two steps."""
-
-TOO_MUCH_WORK = -1
-"""IDA's flag when it has taken as many steps as it was allowed to."""
 
 
 def open_session(

@@ -16,10 +16,19 @@ from atwood.solve.native_signatures import JACOBIAN
 from atwood.solve.sundials_library import SundialsLibrary
 from atwood.solve.sundials_sparse import SparseSolver
 
-__all__ = ["ONE_STEP", "TO_TIME", "Counts", "IdaMemory"]
+__all__ = ["ONE_STEP", "ROOT_RETURN", "STOPPED_BY_WEIGHTS", "TOO_MUCH_WORK", "TO_TIME", "Counts", "IdaMemory"]
 
 TO_TIME, ONE_STEP = 1, 2
 """What `IdaMemory.solve` does: go on until a time is reached or passed, or take one step."""
+
+ROOT_RETURN = 2
+"""IDA's flag when an event function has changed its sign."""
+
+TOO_MUCH_WORK = -1
+"""IDA's flag when it has taken as many steps as it was allowed to."""
+
+STOPPED_BY_WEIGHTS = -22
+"""IDA's flag when the error weights are not what they must be, or made it stop between two steps."""
 
 
 @dataclass(frozen=True)

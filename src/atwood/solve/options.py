@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import UsageError, suggestion
+from atwood.errors import UsageError
 
-__all__ = ["SOLVERS", "RunOptions", "choose_solver", "sample_times"]
+__all__ = ["SOLVERS", "RunOptions", "sample_times"]
 
 FloatArray = NDArray[np.float64]
 
@@ -19,6 +18,7 @@ SOLVERS = {
     "ida": "SUNDIALS IDA",
     "ida-sundae": "SUNDIALS IDA through scikit-sundae",
     "explicit": "Dormand-Prince 8(5,3)",
+    "taylor": "Taylor series",
 }
 """What can solve a scene, and what it is called."""
 
@@ -44,7 +44,7 @@ class RunOptions:
     samples
         A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it.
     solver
-        ``"ida"``, ``"ida-sundae"``, ``"explicit"`` or ``"auto"``; see `choose_solver`.
+        A key of `SOLVERS`, or ``"auto"``; see `atwood.solve.choice`.
     """
 
     t_end: float
@@ -57,35 +57,6 @@ class RunOptions:
     max_step: float | None = None
     solver: str = "auto"
     samples: int = 400
-
-
-def choose_solver(asked: str) -> str:
-    """Return the driver to use: ``"ida"``, the shared SUNDIALS libraries driven directly, where they can be found.
-
-    Parameters
-    ----------
-    asked
-        ``"auto"``, ``"ida"``, or ``"ida-sundae"``, which drives them through scikit-sundae with kernels in Python: the
-        reference, and the way out where the libraries cannot be found (which is then said). ``"explicit"``: a
-        Runge-Kutta method of order 8(5,3), for the reduced form without loops.
-
-    Raises
-    ------
-    UsageError
-        If there is no such solver, or ``"ida"`` was asked for and cannot be had.
-    """
-    from atwood.solve.sundials_library import available, why_not
-
-    if asked not in ("auto", *SOLVERS):
-        raise UsageError(f"there is no solver {asked!r}", advice=suggestion(asked, ("auto", *SOLVERS)))
-    if asked in ("ida-sundae", "explicit"):
-        return asked
-    if available():
-        return "ida"
-    if asked == "ida":
-        raise UsageError(f"IDA cannot be driven directly: {why_not()}", advice="Use the solver 'ida-sundae'.")
-    warnings.warn(f"running through scikit-sundae, which is slower: {why_not()}", stacklevel=2)
-    return "ida-sundae"
 
 
 def sample_times(t: float, options: RunOptions) -> tuple[FloatArray, NDArray[np.bool_]]:

@@ -20,6 +20,7 @@ from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.solve.rank import RankFinding, find_rank
 from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_names, motion_scales
+from atwood.solve.uncompiled import announce, find_uncompiled
 
 if TYPE_CHECKING:
     from atwood.solve.native_loops import CompiledLoops
@@ -55,6 +56,8 @@ class Plan:
         follow from all constraints, at present. They differ only if there are constraints on velocities alone.
     switches
         How often they changed.
+    uncompiled
+        What keeps the scene from being compiled, in words; empty if nothing does.
     """
 
     assembly: Assembly
@@ -67,6 +70,7 @@ class Plan:
     dependent: tuple[int, ...]
     dependent_speeds: tuple[int, ...]
     switches: int = 0
+    uncompiled: str = ""
     _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
     _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
     _loops: CompiledLoops | None = field(default=None, repr=False)
@@ -150,7 +154,8 @@ class Plan:
 
     def poll(self, solver: str) -> Callable[[float], None] | None:
         """Return what a driver calls between two steps; compiled functions tell by themselves when it is time to."""
-        return self.between_steps if self.dependent_speeds and solver != "ida" else None
+        native = solver == "ida" and not self.uncompiled
+        return self.between_steps if self.dependent_speeds and not native else None
 
     def problem(
         self,
@@ -185,8 +190,14 @@ class Plan:
             events=events,
             event_count=len(directions),
             event_directions=directions,
-            native=self.compiled_loops if self.dependent_speeds else self.compiled,
+            native=self._native(),
         )
+
+    def _native(self) -> Callable[[LinearSolver], NativeCallbacks] | None:
+        """Return what compiles residual and Jacobian; None if nothing can."""
+        if self.uncompiled:
+            return None
+        return self.compiled_loops if self.dependent_speeds else self.compiled
 
     def compiled_loops(self, linear_solver: LinearSolver) -> NativeCallbacks:
         """Return residual and Jacobian of the reduced form with loops as machine code, for one session."""
@@ -297,7 +308,10 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = solve_balance(now, kept, t)
     scales = find_scales(assembly, length, u, accelerations, sizes, span)
-    return Plan(assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent)
+    uncompiled = find_uncompiled(assembly, program.residual)
+    if uncompiled:
+        announce(assembly, uncompiled)
+    return Plan(assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent, uncompiled=uncompiled)
 
 
 def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:

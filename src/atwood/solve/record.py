@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.solve.problem import Plan
+from atwood.solve.projection import project_safely, project_states
 
 __all__ = ["Recorder", "Segment"]
 
 FloatArray = NDArray[np.float64]
+
+_PENDING = 512
+"""So many states of the solver are projected together, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,53 +55,119 @@ class Segment:
         return self.plan.assembly
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Samples that are done: shapes (samples,), (number, samples) and (2, samples)."""
+
+    time: FloatArray
+    q: FloatArray
+    u: FloatArray
+    shown: NDArray[np.bool_]
+    held: FloatArray
+
+    def without_last(self) -> _Block:
+        return self.first(len(self.time) - 1)
+
+    def first(self, count: int) -> _Block:
+        return _Block(self.time[:count], self.q[:, :count], self.u[:, :count], self.shown[:count], self.held[:, :count])
+
+
 class Recorder:
-    """Takes up samples of a segment."""
+    """Takes up samples of a segment; they are projected many at a time.
 
-    plan: Plan
-    time: list[float] = field(default_factory=list)
-    q: list[FloatArray] = field(default_factory=list)
-    u: list[FloatArray] = field(default_factory=list)
-    shown: list[bool] = field(default_factory=list)
-    held: list[tuple[float, float]] = field(default_factory=list)
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    """
 
-    def take(self, t: float, y: FloatArray, shown: bool) -> tuple[FloatArray, FloatArray]:
-        """Record a state of the solver, projected; return what was recorded."""
-        plan = self.plan
-        q, u = (part.copy() for part in plan.program.split(y))
-        held = plan.balance.misses(t, q, u, plan.sizes)
-        q = plan.balance.turning.normalized(q)
-        if plan.is_projected:
-            q, u = plan.balance.project(t, q, u, plan.sizes)
-            plan.check_held(t, q, u)
-        if self.time and self.time[-1] == t:  # an output time that is also an event: keep the state after it
-            for last in (self.time, self.q, self.u, self.shown, self.held):
-                del last[-1]
-        self.time.append(t)
-        self.q.append(q)
-        self.u.append(u)
-        self.shown.append(shown)
-        self.held.append(held)
-        return q, u
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
+        self._samples: tuple[tuple[_Block, ...], list[tuple[float, FloatArray, bool]]] = ((), [])
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample; minus infinity if there is none."""
+        blocks, pending = self._samples
+        if pending:
+            return pending[-1][0]
+        return float(blocks[-1].time[-1]) if blocks else -np.inf
+
+    def take(self, t: float, y: FloatArray, shown: bool) -> None:
+        """Record a state of the solver; one at the time of the last takes its place, as after an event.
+
+        Raises
+        ------
+        SolveError
+            If states cannot be projected, since constraints contradict each other; what came before is kept.
+        """
+        blocks, pending = self._samples
+        if t == self.end:
+            if pending:
+                pending[-1] = (t, y, shown)
+                return
+            last = blocks[-1].without_last()
+            blocks = (*blocks[:-1], last) if len(last.time) else blocks[:-1]
+            self._samples = (blocks, [(t, y, shown)])
+            return
+        pending.append((t, y, shown))
+        if len(pending) >= _PENDING:
+            self.settle()
+
+    def take_many(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_]) -> None:
+        """Record states of the solver after the last sample, one row each."""
+        if len(t):
+            self.settle()
+            self._finish(t, y, shown)
+
+    def settle(self) -> None:
+        """Project all that waits."""
+        pending = self._samples[1]
+        if pending:
+            t = np.array([one[0] for one in pending])
+            y = np.array([one[1] for one in pending])
+            self._finish(t, y, np.array([one[2] for one in pending]))
+
+    def last(self) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+        """Return time, coordinates and speeds of the last sample, and by how much the constraints were missed."""
+        self.settle()
+        block = self._samples[0][-1]
+        return float(block.time[-1]), block.q[:, -1], block.u[:, -1], block.held[:, -1]
 
     def close(self) -> float:
-        """Drop a sample that was not recorded to its end, show the last one, and return its time."""
-        lists: tuple[list[Any], ...] = (self.time, self.q, self.u, self.shown, self.held)
-        complete = min(len(one) for one in lists)
-        for one in lists:
-            del one[complete:]
-        self.shown[-1] = True
-        return self.time[-1]
+        """Show the last sample, and return its time."""
+        self.settle()
+        self._samples[0][-1].shown[-1] = True
+        return self.end
 
     def segment(self, impact: bool) -> Segment:
         """Return what was recorded."""
-        return Segment(
-            self.plan,
-            impact,
-            np.array(self.time),
-            np.array(self.q).T.reshape(self.plan.program.coordinates, len(self.time)),
-            np.array(self.u).T.reshape(self.plan.program.speeds, len(self.time)),
-            np.array(self.shown),
-            np.array(self.held).T,
-        )
+        self.settle()
+        blocks = self._samples[0]
+        q, u, held = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u", "held"))
+        time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
+        return Segment(self.plan, impact, time, q, u, shown, held)
+
+    def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_]) -> None:
+        q, u = (part.copy() for part in self.plan.program.split(y.T))
+        q = self.plan.balance.turning.normalized(q)
+        if not self.plan.balance.constraints:
+            self._add(_Block(t, q, u, shown, np.zeros((2, len(t)))))
+            return
+        made = project_states(self.plan, t, q, u)
+        if not self.plan.is_projected:
+            self._add(_Block(t, q, u, shown, made.held))
+            return
+        block = _Block(t, made.coordinates, made.speeds, shown, made.held)
+        for i in np.flatnonzero(made.doubtful):
+            try:
+                block.q[:, i], block.u[:, i] = project_safely(self.plan, float(t[i]), q[:, i], u[:, i])
+            except SolveError:
+                self._add(block.first(int(i)))
+                raise
+        self._add(block)
+
+    def _add(self, block: _Block) -> None:
+        blocks = self._samples[0]
+        self._samples = ((*blocks, block) if len(block.time) else blocks, [])

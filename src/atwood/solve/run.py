@@ -11,17 +11,20 @@ from numpy.typing import NDArray
 from atwood.errors import SolveError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.solve.breaks import find_breaks
-from atwood.solve.driver import Advance, Budget, Session, SolverOptions, Statistics, Status
+from atwood.solve.choice import Choice, check_solver, choose, describe_choices
+from atwood.solve.driver import Statistics
 from atwood.solve.modes import EventProbe, Happening, enter_mode
-from atwood.solve.options import RunOptions, choose_solver, sample_times
-from atwood.solve.problem import Plan, make_plan, pack_state
+from atwood.solve.options import RunOptions, sample_times
+from atwood.solve.problem import Plan, make_plan
 from atwood.solve.record import Recorder, Segment
 from atwood.solve.scales import scene_length
 from atwood.solve.start import Start, own_state
+from atwood.solve.stretch import Outcome, Stretch, run_stretch
 
 __all__ = ["Run", "run"]
 
 FloatArray = NDArray[np.float64]
+Reassemble = Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float]], Assembly]
 
 _CHATTER = 50
 """So many changes of mode without time passing end a run."""
@@ -48,8 +51,8 @@ class Run:
         The start.
     options
         What was asked for.
-    solver
-        What solved it: a key of `SOLVERS`.
+    choices
+        What solved it and why, one after the other.
     """
 
     segments: tuple[Segment, ...]
@@ -59,15 +62,20 @@ class Run:
     message: str
     start: Start
     options: RunOptions
-    solver: str
+    choices: tuple[Choice, ...]
+
+    @property
+    def solver(self) -> str:
+        """What solved it, at last: a key of `SOLVERS`."""
+        return self.choices[-1].solver
+
+    @property
+    def why(self) -> str:
+        """What solved it and why, as a sentence."""
+        return describe_choices(self.choices)
 
 
-def run(
-    assembly: Assembly,
-    start: Start,
-    options: RunOptions,
-    reassemble: Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float]], Assembly],
-) -> Run:
+def run(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reassemble) -> Run:
     """Run a scene from its start to its end.
 
     Parameters
@@ -91,56 +99,105 @@ def run(
         raise UsageError(
             f"the end, t = {options.t_end:g}, is not after the start, t = {t:g}", advice="Give a later t_end."
         )
-    solver = choose_solver(options.solver)
+    check_solver(options.solver)
     times, shown = sample_times(t, options)
     _check_prescribed(assembly, times)
-    q, u = own_state(assembly, start)
-    breaks = find_breaks(assembly, t, options.t_end)
-    segments: list[Segment] = []
-    happenings: list[Happening] = []
-    statistics = Statistics(error_test_failures=0, convergence_failures=0)
-    recent, impact, show = 0, False, bool(shown[0])
-    plan: Plan | None = None
-    while True:
-        if plan is None:
-            plan = make_plan(assembly, t, q, u, start.length, options.t_end - start.time)
-            probe = EventProbe(plan, t, q, u, options.relative_tolerance)
-        recorder = Recorder(plan)
-        limit = float(np.min(breaks[breaks[:, 0] > t, 0], initial=options.t_end))
-        ahead = _until(times, shown, t, limit)
-        outcome = _run_mode(plan, probe, recorder, t, q, u, ahead, show, limit, options, solver, statistics)
-        segments.append(recorder.segment(impact))
-        statistics = statistics + outcome.statistics
-        status, message = outcome.status, outcome.message
-        recent = recent + 1 if outcome.t - t < 1e-9 * (options.t_end - start.time) else 0
-        t = outcome.t
-        if outcome.happening is None:
-            if status == "finished" and t < options.t_end:  # a law switches by the clock: on behind it
-                behind = float(breaks[breaks[:, 0] == t, 1][0])
-                show = bool(np.any(shown[(times > t) & (times <= behind)]))
-                t, q, u, impact = behind, recorder.q[-1], recorder.u[-1], False
-                continue
-            break
-        happenings.append(outcome.happening)
-        if outcome.happening.target == "stop":
-            status, message = "stopped", outcome.happening.describe()
-            break
-        if recent > _CHATTER:
-            status, message = "failed", f"{outcome.happening.part} changes its mode endlessly at t = {t:.9g}"
-            break
-        assembly, q, u = enter_mode(
-            (t, recorder.q[-1], recorder.u[-1]), assembly, outcome.happening, reassemble, start.length
+    return _Walk(assembly, start, options, reassemble, times, shown).go()
+
+
+class _Walk:
+    """The way of a run through its modes."""
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        start: Start,
+        options: RunOptions,
+        reassemble: Reassemble,
+        times: FloatArray,
+        shown: NDArray[np.bool_],
+    ) -> None:
+        self.assembly, self.start, self.options, self.reassemble = assembly, start, options, reassemble
+        self.times, self.shown = times, shown
+        self.breaks = find_breaks(assembly, start.time, options.t_end)
+        self.segments: list[Segment] = []
+        self.happenings: list[Happening] = []
+        self.choices: list[Choice] = []
+        self.statistics = Statistics(error_test_failures=0, convergence_failures=0)
+        self.t = start.time
+        self.q, self.u = own_state(assembly, start)
+        self.impact, self.show = False, bool(shown[0])
+        self.plan: Plan | None = None
+
+    def go(self) -> Run:
+        """Go from mode to mode to the end."""
+        chatter = 0
+        while True:
+            before = self.t
+            recorder, outcome = self._stretch()
+            self.t = outcome.t
+            chatter = chatter + 1 if outcome.t - before < 1e-9 * (self.options.t_end - self.start.time) else 0
+            if outcome.happening is None:
+                if outcome.status == "finished" and outcome.t < self.options.t_end:
+                    self._pass_switch(recorder)
+                    continue
+                return self._made(outcome.status, outcome.message, outcome)
+            self.happenings.append(outcome.happening)
+            if outcome.happening.target == "stop":
+                return self._made("stopped", outcome.happening.describe(), outcome)
+            if chatter > _CHATTER:
+                endless = f"{outcome.happening.part} changes its mode endlessly at t = {self.t:.9g}"
+                return self._made("failed", endless, outcome)
+            self._enter(outcome.happening, recorder)
+            if self.t >= self.options.t_end:
+                return self._made("finished", "", outcome)
+
+    def _stretch(self) -> tuple[Recorder, Outcome]:
+        """Run one stretch in the present mode."""
+        t, q, u, options = self.t, self.q, self.u, self.options
+        if self.plan is None:
+            self.plan = make_plan(self.assembly, t, q, u, self.start.length, options.t_end - self.start.time)
+            self.probe = EventProbe(self.plan, t, q, u, options.relative_tolerance)
+            self.choice = choose(self.plan, options, t, q, u)
+        limit = float(np.min(self.breaks[self.breaks[:, 0] > t, 0], initial=options.t_end))
+        ahead = _until(self.times, self.shown, t, limit)
+        stretch = Stretch(self.plan, self.probe, options, self.choice, *ahead, self.show, self.statistics)
+        recorder = Recorder(self.plan)
+        outcome = run_stretch(stretch, recorder, t, q, u)
+        self.segments.append(recorder.segment(self.impact))
+        self.statistics = self.statistics + outcome.statistics
+        for choice in outcome.choices:
+            if not self.choices or choice.solver != self.choices[-1].solver:
+                self.choices.append(choice)
+        self.choice = outcome.choices[-1]
+        return recorder, outcome
+
+    def _pass_switch(self, recorder: Recorder) -> None:
+        """Go on behind a law that switches by the clock."""
+        behind = float(self.breaks[self.breaks[:, 0] == self.t, 1][0])
+        self.show = bool(np.any(self.shown[(self.times > self.t) & (self.times <= behind)]))
+        _, self.q, self.u, _ = recorder.last()
+        self.t, self.impact = behind, False
+
+    def _enter(self, happening: Happening, recorder: Recorder) -> None:
+        """Enter the mode that an event leads to."""
+        _, q, u, _ = recorder.last()
+        self.assembly, self.q, self.u = enter_mode(
+            (self.t, q, u), self.assembly, happening, self.reassemble, self.start.length
         )
-        plan, impact, show = None, outcome.happening.impact, True
-        if t >= options.t_end:
-            status, message = "finished", ""
-            break
-    made = Run(tuple(segments), tuple(happenings), statistics, status, message, start, options, solver)
-    if status == "failed":
-        error = SolveError(message, where=assembly.flat.name, advice="Look at what came before: the error's `run`.")
-        error.run = made  # type: ignore[attr-defined]
-        raise error
-    return made
+        self.plan, self.impact, self.show = None, happening.impact, True
+
+    def _made(self, status: str, message: str, outcome: Outcome) -> Run:
+        """Return the run, or raise with it what made it fail."""
+        parts = (tuple(self.segments), tuple(self.happenings), self.statistics, status, message)
+        made = Run(*parts, self.start, self.options, tuple(self.choices))
+        if status == "failed":
+            error = outcome.error or SolveError(
+                message, where=self.assembly.flat.name, advice="Look at what came before: the error's `run`."
+            )
+            error.run = made  # type: ignore[attr-defined]
+            raise error
+        return made
 
 
 def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
@@ -170,186 +227,3 @@ def _until(times: FloatArray, shown: NDArray[np.bool_], t: float, limit: float) 
     if len(chosen) and chosen[-1] == limit:
         return chosen, seen
     return np.append(chosen, limit), np.append(seen, False)
-
-
-@dataclass(frozen=True)
-class _Outcome:
-    t: float
-    status: str
-    message: str
-    happening: Happening | None
-    statistics: Statistics
-
-
-def _run_mode(
-    plan: Plan,
-    probe: EventProbe,
-    recorder: Recorder,
-    t: float,
-    q: FloatArray,
-    u: FloatArray,
-    ahead: tuple[FloatArray, NDArray[np.bool_]],
-    first_shown: bool,
-    limit: float,
-    options: RunOptions,
-    solver: str,
-    spent: Statistics,
-) -> _Outcome:
-    """Integrate in one mode until a time, an event or a limit of the run."""
-    times, shown = ahead
-    n = plan.program.coordinates
-    y, yp = (np.zeros(0), np.zeros(0)) if n == 0 else pack_state(plan, t, q, u)
-    recorder.take(t, y, first_shown)
-    already = probe.broken_at_start(t)
-    if already is not None:
-        return _Outcome(t, "event", "", already, Statistics())
-    if n == 0:
-        return _follow(probe, recorder, t, times, shown, options)
-    session = _open(plan, probe, options, solver, t, limit, y, yp, spent)
-    try:
-        return _integrate(plan, probe, recorder, session, times, shown, options)
-    except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
-        t = recorder.close()
-        return _Outcome(t, "interrupted", f"interrupted (at t = {t:.9g})", None, session.statistics)
-
-
-def _follow(
-    probe: EventProbe,
-    recorder: Recorder,
-    t: float,
-    times: FloatArray,
-    shown: NDArray[np.bool_],
-    options: RunOptions,
-) -> _Outcome:
-    """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen."""
-    nothing, last = np.zeros(0), t
-    for moment, show in zip(times, shown, strict=True):
-        happening = probe.between(last, float(moment))
-        if happening is not None:
-            recorder.take(happening.time, nothing, True)
-            return _Outcome(happening.time, "event", "", happening, Statistics())
-        last = float(moment)
-        recorder.take(last, nothing, show)
-        if options.progress is not None:
-            options.progress(last)
-    return _Outcome(last, "finished", "", None, Statistics())
-
-
-def _integrate(
-    plan: Plan,
-    probe: EventProbe,
-    recorder: Recorder,
-    session: Session,
-    times: FloatArray,
-    shown: NDArray[np.bool_],
-    options: RunOptions,
-) -> _Outcome:
-    """Advance from sample to sample."""
-    split = plan.program.split
-    for moment, show in zip(times, shown, strict=True):
-        advance = session.advance(float(moment))
-        if advance.status is Status.FAILED and plan.review_dependent(advance.t, split(advance.y)[0]):
-            _restart(plan, session, advance)
-            advance = session.advance(float(moment))
-        if advance.status is Status.REACHED:
-            q, u = recorder.take(advance.t, advance.y, show)
-            plan.review_output(advance.t, q)
-            _repair(plan, recorder, session, advance, q, u, options)
-        elif advance.status is Status.EVENT:
-            q, u = recorder.take(advance.t, advance.y, True)
-            happening = probe.name(advance.t, advance.events)
-            return _Outcome(advance.t, "event", "", happening, session.statistics)
-        else:
-            if not recorder.time or advance.t > recorder.time[-1]:
-                recorder.take(advance.t, advance.y, True)
-            return _Outcome(advance.t, advance.status.value, advance.message, None, session.statistics)
-        if options.progress is not None:
-            options.progress(float(moment))
-    return _Outcome(float(times[-1]), "finished", "", None, session.statistics)
-
-
-def _open(
-    plan: Plan,
-    probe: EventProbe,
-    options: RunOptions,
-    solver: str,
-    t: float,
-    limit: float,
-    y: FloatArray,
-    yp: FloatArray,
-    spent: Statistics,
-) -> Session:
-    settings = SolverOptions(
-        relative_tolerance=options.relative_tolerance,
-        absolute_tolerances=plan.tolerances(options.relative_tolerance),
-        max_step=_max_step(options, t, limit),
-        max_order=options.max_order,
-        horizon=options.t_end - t if options.t_end > t else 1.0,
-    )
-    budget = Budget(
-        max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
-        wall_seconds=None if options.max_seconds is None else max(0.0, options.max_seconds - spent.seconds),
-        poll=plan.poll(solver),
-    )
-    if solver == "explicit":
-        return _open_explicit(plan, probe, settings, budget, t, y)
-    problem = plan.problem(probe.function(), probe.directions)
-    if solver == "ida":
-        from atwood.solve import ida_native
-
-        tuning = ida_native.IdaTuning(angle_like=plan.angles, stop_time=limit)
-        return ida_native.open_session(problem, settings, t, y, yp, budget, tuning)
-    from atwood.solve.ida_sundae import open_session
-
-    return open_session(problem, settings, t, y, yp, budget)
-
-
-def _max_step(options: RunOptions, t: float, limit: float) -> float | None:
-    """Return the largest step: up to a switch by the clock, so short that nothing is passed over unseen."""
-    if limit >= options.t_end:
-        return options.max_step
-    share = 0.25 * (limit - t)
-    return share if options.max_step is None else min(share, options.max_step)
-
-
-def _open_explicit(
-    plan: Plan, probe: EventProbe, settings: SolverOptions, budget: Budget, t: float, y: FloatArray
-) -> Session:
-    from atwood.solve.explicit_scene import explicit_problem
-    from atwood.solve.explicit_session import open_explicit
-
-    assembly = plan.assembly
-    problem = explicit_problem(assembly, probe.function(), probe.directions) if assembly.form == "reduced" else None
-    if problem is None:
-        raise UsageError(
-            "the explicit method needs the reduced form of a scene without closed loops",
-            where=assembly.flat.name,
-            advice="Use the solver 'ida'.",
-        )
-    return open_explicit(problem, settings, t, y, budget)
-
-
-def _restart(plan: Plan, session: Session, advance: Advance) -> None:
-    q, u = (part.copy() for part in plan.program.split(advance.y))
-    q, u = plan.balance.project(advance.t, q, u, plan.sizes)
-    session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
-
-
-def _repair(
-    plan: Plan,
-    recorder: Recorder,
-    session: Session,
-    advance: Advance,
-    q: FloatArray,
-    u: FloatArray,
-    options: RunOptions,
-) -> None:
-    """Go on from the recorded state where the solver's own has strayed.
-
-    At index 1 with projection that is where the drift outgrows the error of the steps; for any orientation, where the
-    size of its coordinates is no longer near one.
-    """
-    drift = max(recorder.held[-1]) if plan.program.level == "index1-projected" else 0.0
-    strays = plan.balance.turning.strays(plan.program.split(advance.y)[0])
-    if strays or drift > 100.0 * options.relative_tolerance:
-        session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))

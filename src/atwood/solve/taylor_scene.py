@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from atwood.errors import UsageError
 from atwood.expr.taylor import TaylorPrograms, taylor_programs
 from atwood.forms.accelerations import AccelerationProgram, acceleration_program
 from atwood.forms.assembly import Assembly
@@ -25,22 +26,23 @@ __all__ = ["open_taylor", "recurrences", "taylor_problem"]
 _LANES = 8
 
 
-def recurrences(assembly: Assembly) -> TaylorPrograms | None:
+def recurrences(assembly: Assembly) -> TaylorPrograms:
     """Return the recurrences of a scene in the reduced form, with the state (q, u).
-
-    Returns
-    -------
-    TaylorPrograms or None
-        None if the scene has no coordinates, or constraints are left among them.
 
     Raises
     ------
+    UsageError
+        If the scene has no coordinates, or constraints are left among them.
     UnsupportedError
         If a law switches with the motion, or calls a function that the graph does not look into.
     """
     found = assembly.shared.get("accelerations", lambda: acceleration_program(assembly))
     if found is None or not len(assembly.reduced.coordinates):
-        return None
+        raise UsageError(
+            "the Taylor-series method needs a scene without closed loops in which something can move",
+            where=assembly.flat.name,
+            advice="Use the solver 'ida'.",
+        )
     return assembly.shared.get(("recurrences", id(found)), lambda: (found, _make(found)))[1]
 
 
@@ -51,8 +53,8 @@ def _make(found: AccelerationProgram) -> TaylorPrograms:
     return taylor_programs(program.name, time, [*q, *u], [*rates, *program.results], program.parameters, _LANES)
 
 
-def taylor_problem(assembly: Assembly, stop_time: float = inf, has_events: bool = False) -> TaylorProblem | None:
-    """Return what the Taylor-series method is given of a scene; None and errors as for `recurrences`.
+def taylor_problem(assembly: Assembly, stop_time: float = inf, has_events: bool = False) -> TaylorProblem:
+    """Return what the Taylor-series method is given of a scene; errors as for `recurrences`.
 
     Parameters
     ----------
@@ -64,8 +66,6 @@ def taylor_problem(assembly: Assembly, stop_time: float = inf, has_events: bool 
         Whether events are looked for.
     """
     programs = recurrences(assembly)
-    if programs is None:
-        return None
     return TaylorProblem(
         programs=programs,
         parameters=np.asarray(assembly.parameter_values, dtype=np.float64),

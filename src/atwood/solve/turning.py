@@ -30,12 +30,14 @@ class Turning:
     ----------
     program
         The rates as a program.
-    kernel
-        The same, ready to run on one state; None if the rates are the speeds.
+    kernel, many
+        The same, ready to run on one state, and on many; None if the rates are the speeds.
     """
 
-    def __init__(self, program: RatesProgram, kernel: BoundKernel | None) -> None:
-        self.program, self.kernel = program, kernel
+    def __init__(
+        self, program: RatesProgram, kernel: BoundKernel | None = None, many: Callable[[], BoundKernel] | None = None
+    ) -> None:
+        self.program, self.kernel, self.many = program, kernel, many
         self._charts = [np.asarray(chart.coordinates, dtype=np.intp) for chart in program.charts]
 
     @property
@@ -60,6 +62,15 @@ class Turning:
         if self.kernel is None:
             return q + displacement
         return self.normalized(q + self.tangent(t, q) @ displacement)
+
+    def moved_each(self, t: FloatArray, q: FloatArray, displacements: FloatArray) -> FloatArray:
+        """Do the same for many states, of shape (states,) and (number, states)."""
+        if self.many is None:
+            return q + displacements
+        entries = self.many()(t[None, :], q, np.zeros_like(displacements))[1]
+        matrix = np.zeros((len(t), self.program.coordinates, self.program.speeds))
+        matrix[:, self.program.rows, self.program.columns] = entries.T
+        return self.normalized(q + np.einsum("sij,js->is", matrix, displacements))
 
     def difference(self, t: float, q: FloatArray, other: FloatArray) -> FloatArray:
         """Return the displacement that leads from one place to another near by, exact to its first order."""
@@ -150,5 +161,8 @@ def _orientations() -> tuple[tuple[float, ...], ...]:
 
 def turning_of(assembly: Assembly, form: FormName) -> Turning:
     """Return how the coordinates of a scene move in either form."""
-    program = assembly.rates(form)
-    return Turning(program, None if program.program is None else assembly.kernel(program.program))
+    made = assembly.rates(form)
+    program = made.program
+    if program is None:
+        return Turning(made)
+    return Turning(made, assembly.kernel(program), lambda: assembly.kernel(program, vectorized=True))

@@ -13,7 +13,8 @@ from atwood.forms.dae import LEVELS
 from atwood.model.composite import Model
 from atwood.model.flatten import FlatScene, flatten
 from atwood.pipeline import FORMS, assemble_flat
-from atwood.solve.options import SOLVERS, choose_solver
+from atwood.solve.choice import implicit_solver
+from atwood.solve.options import SOLVERS
 from atwood.study.reference import Reference, find_reference, run_flat, scaled_difference
 from atwood.study.verdict import judge
 
@@ -220,7 +221,7 @@ def _kinds(flat: FlatScene, forms: Sequence[str], levels: Sequence[str]) -> Iter
 
     IDA solves every form, so that form and method are told apart; the explicit method comes on top where it can.
     """
-    shared = choose_solver("auto")
+    shared = implicit_solver()
     assembly = assemble_flat(flat, form="dae")
     if "reduced" in forms:
         yield "reduced", "", shared

@@ -1,7 +1,8 @@
-"""Pictures: quantities over time, the mechanism itself, and work against precision. Needs matplotlib."""
+"""Pictures: quantities over time, the mechanism itself, work against precision, and sweeps. Needs matplotlib."""
 
 from atwood.view.drawing import animate, plot_mechanism
 from atwood.view.plot import plot
 from atwood.view.precision import plot_comparison
+from atwood.view.sweep import plot_sweep
 
-__all__ = ["animate", "plot", "plot_comparison", "plot_mechanism"]
+__all__ = ["animate", "plot", "plot_comparison", "plot_mechanism", "plot_sweep"]

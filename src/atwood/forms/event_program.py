@@ -1,0 +1,117 @@
+"""Values of events as a program of (t, q, u) alone: what they read of accelerations and reactions is solved for in it.
+
+A rope goes slack where its tension vanishes. The tension is a reaction, which follows from the balance of forces in
+maximal coordinates, where every joint is a constraint: ``M a - G^T lambda = -bias``, ``G a = -gamma``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, solve, substitute
+from atwood.forms.assembly import Assembly
+from atwood.forms.program import state_groups
+from atwood.mechanics.equations import Equations
+from atwood.mechanics.release import release_program
+
+__all__ = ["event_program"]
+
+_LARGEST = 120
+"""More unknowns than these are not solved for densely at every step."""
+
+
+def event_program(
+    assembly: Assembly, values: Sequence[Expression], kept: Sequence[int], kept_maximal: Sequence[int]
+) -> Program | None:
+    """Return the program of (t, q, u, shift) with the values of events, each with its shift added.
+
+    Parameters
+    ----------
+    assembly
+        The scene in its mode.
+    values
+        The values, of time, coordinates, speeds, accelerations and reactions.
+    kept, kept_maximal
+        Numbers of the constraints that are independent, in the coordinates of the form and in maximal coordinates.
+
+    Returns
+    -------
+    Program or None
+        None where the values cannot be had so: reactions of redundant constraints, or of very many bodies.
+    """
+    equations = assembly.equations
+    known: dict[Expression, Expression] = {}
+    symbols = [one.symbol for one in assembly.reactions if any(depends_on(value, [one.symbol]) for value in values)]
+    if symbols:
+        found = _reactions(assembly, set(symbols), kept_maximal)
+        if found is None:
+            return None
+        known.update(found)
+    if any(depends_on(value, equations.accelerations) for value in values):
+        solved = _solve(equations, kept)
+        if solved is None:
+            return None
+        known.update(zip(equations.accelerations, solved, strict=False))
+    graph = equations.graph
+    shifts = tuple(graph.symbol(f"event shift {i}") for i in range(len(values)))
+    written = substitute(list(values), known) if known else list(values)
+    outputs = (OutputGroup("events", tuple(v + s for v, s in zip(written, shifts, strict=True))),)
+    groups = (*state_groups(equations), InputGroup("shift", shifts))
+    return Program(f"{assembly.flat.name} event functions", groups, assembly.parameters, outputs)
+
+
+def _solve(equations: Equations, kept: Sequence[int]) -> list[Expression] | None:
+    """Return accelerations and multipliers of a balance of forces with independent constraints."""
+    graph, n, m = equations.graph, len(equations.coordinates), len(kept)
+    if n + m > _LARGEST:
+        return None
+    at_rest = dict.fromkeys(equations.accelerations, 0.0)
+    constraints = [equations.constraints[i] for i in kept]
+    mass = jacobian(list(equations.rows), list(equations.accelerations))
+    slope = jacobian([one.rate for one in constraints], list(equations.speeds)) if m else None
+    matrix = [[graph.zero] * (n + m) for _ in range(n + m)]
+    for row, column, entry in zip(mass.rows, mass.columns, mass.entries, strict=True):
+        matrix[row][column] = entry
+    if slope is not None:
+        for row, column, entry in zip(slope.rows, slope.columns, slope.entries, strict=True):
+            matrix[n + row][column] = entry
+            matrix[column][n + row] = -entry
+    sides = [*equations.rows, *(one.second for one in constraints)]
+    right = [-side for side in substitute(sides, at_rest)]
+    return [graph.convert(one) for one in solve(matrix, right)]
+
+
+def _reactions(assembly: Assembly, wanted: set[Expression], kept: Sequence[int]) -> dict[Expression, Expression] | None:
+    """Return reactions in terms of the form's coordinates and speeds."""
+    maximal = assembly.maximal
+    if len(kept) != len(maximal.constraints):
+        return None
+    solved = _solve(maximal, kept)
+    if solved is None:
+        return None
+    n = len(maximal.coordinates)
+    solution = dict(zip((*maximal.accelerations, *maximal.multipliers), solved, strict=True))
+    of_constraint = {one.key: i for i, one in enumerate(maximal.constraints)}
+    release = assembly.shared.get(
+        "release",
+        lambda: release_program(assembly.mechanism, maximal, assembly.reactions, assembly.parameters),
+    )
+    found: dict[Expression, Expression] = {}
+    for one in assembly.reactions:
+        if one.symbol not in wanted:
+            continue
+        if one.axis >= 0:
+            if release is None or one.path not in release.rows:
+                return None
+            value = substitute([release.program.results[release.rows[one.path]]], solution)[0]
+        elif one.key in of_constraint:
+            value = one.sign * solved[n + of_constraint[one.key]]
+        else:
+            value = maximal.graph.zero
+        found[one.symbol] = value
+    if assembly.form == "reduced":
+        outputs = assembly.to_maximal.outputs
+        symbols = (*maximal.coordinates, *maximal.speeds)
+        places = dict(zip(symbols, (*outputs[0].expressions, *outputs[1].expressions), strict=True))
+        found = dict(zip(found, substitute(list(found.values()), places), strict=True))
+    return found

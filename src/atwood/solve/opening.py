@@ -1,0 +1,129 @@
+"""From a scene in one mode and the options of a run to a solver at its start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+from atwood.errors import UsageError
+from atwood.solve.driver import Budget, FloatArray, Session, SolverOptions
+from atwood.solve.explicit_problem import CompiledEvents
+from atwood.solve.explicit_session import ExplicitSession, Leave
+from atwood.solve.modes import EventProbe
+from atwood.solve.options import SOLVERS, RunOptions
+from atwood.solve.problem import Plan
+
+__all__ = ["Order", "open_explicit_session", "open_implicit_session"]
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What is to be solved.
+
+    Attributes
+    ----------
+    plan, probe
+        The scene in its mode, and what is watched.
+    options
+        What the run was asked for.
+    end
+        Where this stretch ends at the latest, s.
+    budget
+        Limits.
+    """
+
+    plan: Plan
+    probe: EventProbe
+    options: RunOptions
+    end: float
+    budget: Budget
+
+    def settings(self, t: float) -> SolverOptions:
+        """Return the options of a solver that starts at a time."""
+        options = self.options
+        return SolverOptions(
+            relative_tolerance=options.relative_tolerance,
+            absolute_tolerances=self.plan.tolerances(options.relative_tolerance),
+            max_step=self._max_step(t),
+            max_order=options.max_order,
+            horizon=options.t_end - t if options.t_end > t else 1.0,
+        )
+
+    def _max_step(self, t: float) -> float | None:
+        """Return the largest step: up to a switch by the clock, so short that nothing is passed over unseen."""
+        options = self.options
+        if self.end >= options.t_end:
+            return options.max_step
+        share = 0.25 * (self.end - t)
+        return share if options.max_step is None else min(share, options.max_step)
+
+
+def open_implicit_session(order: Order, solver: str, t: float, y: FloatArray, yp: FloatArray) -> Session:
+    """Start IDA, driven directly or through scikit-sundae.
+
+    Parameters
+    ----------
+    order
+        What is to be solved.
+    solver
+        ``"ida"`` or ``"ida-sundae"``.
+    t, y, yp
+        Consistent start values.
+    """
+    plan, probe, settings = order.plan, order.probe, order.settings(t)
+    problem = plan.problem(probe.function(), probe.directions)
+    if solver == "ida":
+        from atwood.solve import ida_native
+
+        tuning = ida_native.IdaTuning(angle_like=plan.angles, stop_time=order.end)
+        return ida_native.open_session(problem, settings, t, y, yp, order.budget, tuning)
+    from atwood.solve.ida_sundae import open_session
+
+    return open_session(problem, settings, t, y, yp, order.budget)
+
+
+def open_explicit_session(
+    order: Order, solver: str, t: float, y: FloatArray, leave: Leave | None = None
+) -> ExplicitSession:
+    """Start an explicit method.
+
+    Parameters
+    ----------
+    order
+        What is to be solved.
+    solver
+        A key of `SOLVERS`.
+    t, y
+        Start values.
+    leave
+        See `atwood.solve.explicit_session.open_explicit`.
+
+    Raises
+    ------
+    UsageError
+        If the scene is not one for explicit methods.
+    """
+    from atwood.solve.explicit_scene import explicit_problem
+    from atwood.solve.explicit_session import open_explicit
+
+    assembly, probe = order.plan.assembly, order.probe
+    problem = explicit_problem(assembly, probe.function(), probe.directions) if assembly.form == "reduced" else None
+    if problem is None:
+        raise UsageError(
+            f"an explicit method ({SOLVERS[solver]}) needs the reduced form of a scene without closed loops",
+            where=assembly.flat.name,
+            advice="Use the solver 'ida'.",
+        )
+    if problem.events is not None:
+        problem = replace(problem, compiled_events=partial(_compiled_events, probe))
+    if solver == "taylor":
+        from atwood.solve.taylor_scene import open_taylor, taylor_problem
+
+        series = taylor_problem(assembly, order.end, has_events=bool(probe.directions))
+        return open_taylor(problem, series, order.settings(t), t, y, order.budget)
+    return open_explicit(problem, order.settings(t), t, y, order.budget, leave=leave)
+
+
+def _compiled_events(probe: EventProbe) -> CompiledEvents | None:
+    found = probe.compiled(for_ida=False)
+    return None if found is None else CompiledEvents(found.explicit, found.address, found.count, found)

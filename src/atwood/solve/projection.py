@@ -1,0 +1,168 @@
+"""States of the solver projected onto the constraints, many at once.
+
+The same Newton steps of least norm as for one state (`atwood.solve.balance.Balance.project`), by the normal equations
+of the independent constraints. A state that does not come out well is left to the slower way, which is safe where
+constraints nearly depend on each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.solve.driver import FloatArray
+from atwood.solve.problem import Plan
+
+__all__ = ["Projected", "misses_of", "project_safely", "project_states"]
+
+_MET = 1e-11
+"""Relative to the scene's sizes: a constraint that is missed by less is met."""
+
+_STEPS = 12
+
+_CHUNK = 4_000_000
+"""Numbers in the matrices that are worked on at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """Projected states.
+
+    Attributes
+    ----------
+    coordinates, speeds
+        Shape (number, states).
+    held
+        By how much the states missed the constraints on position and velocity before, shape (2, states).
+    doubtful
+        Which states have to be looked at one by one.
+    """
+
+    coordinates: FloatArray
+    speeds: FloatArray
+    held: FloatArray
+    doubtful: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class _Constraints:
+    """Constraints at many states, each in units of how much it changes with a displacement of the size that counts."""
+
+    value: FloatArray
+    slope: FloatArray
+    drift: FloatArray
+
+    def rate(self, speeds: FloatArray) -> FloatArray:
+        """Return the constraints on velocity for speeds in units of the scales, shape (states, number)."""
+        moved: FloatArray = np.einsum("smn,sn->sm", self.slope, speeds)
+        return moved + self.drift
+
+
+def project_states(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
+    """Return the nearest states that fulfil the constraints on position and velocity.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    t, q, u
+        States near the constraints, of shape (states,) and (number, states).
+    """
+    program = plan.balance.program
+    chunk = max(1, _CHUNK // max(1, program.constraints * program.speeds))
+    parts = [
+        _project(plan, t[i : i + chunk], q[:, i : i + chunk], u[:, i : i + chunk]) for i in range(0, len(t), chunk)
+    ]
+    if len(parts) == 1:
+        return parts[0]
+    joined = (
+        np.concatenate([getattr(one, name) for one in parts], axis=-1)
+        for name in ("coordinates", "speeds", "held", "doubtful")
+    )
+    return Projected(*joined)
+
+
+def misses_of(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
+    """Return by how much states miss the constraints on position and velocity, shape (2, states).
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    t, q, u
+        States, of shape (states,) and (number, states).
+    """
+    program = plan.balance.program
+    chunk = max(1, _CHUNK // max(1, program.constraints * program.speeds))
+    found = np.zeros((2, len(t)))
+    for i in range(0, len(t), chunk):
+        part = slice(i, i + chunk)
+        now = _constraints(plan, t[part], q[:, part], u[:, part])
+        found[:, part] = _largest(now, (u[:, part] / plan.sizes[:, None]).T)
+    return found
+
+
+def _largest(now: _Constraints, speeds: FloatArray) -> FloatArray:
+    return np.stack([np.max(np.abs(now.value), axis=1), np.max(np.abs(now.rate(speeds)), axis=1)])
+
+
+def _constraints(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> _Constraints:
+    p, count = plan.balance.program, len(t)
+    kernel = plan.assembly.kernel(p.program, vectorized=True)
+    _, _, value, _, _, slope, drift = kernel(t[None, :], q, u)
+    full = np.zeros((count, p.constraints, p.speeds))
+    full[:, p.slope_rows, p.slope_columns] = slope.T
+    full *= plan.sizes
+    rows = np.max(np.abs(full), axis=2)
+    rows[rows == 0.0] = 1.0
+    return _Constraints(value.T / rows, full / rows[:, :, None], drift.T / rows)
+
+
+def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
+    sizes, kept = plan.sizes[:, None], list(plan.finding.kept)
+    turning, holding = plan.balance.turning, plan.balance.holding(kept)
+    q, speeds = turning.normalized(q.copy()), (u / sizes).T
+    now = _constraints(plan, t, q, u)
+    held = _largest(now, speeds)
+    last = np.full(len(t), np.inf)
+    active = np.ones(len(t), dtype=bool)
+    for _ in range(_STEPS):
+        miss = np.max(np.abs(now.value), axis=1)
+        active &= (miss > 0.0) & ((miss >= _MET) | (miss < 0.5 * last))
+        if not active.any():
+            break
+        last = miss
+        step = _least_norm(now.slope[:, holding], now.value[:, holding])
+        q = turning.moved_each(t, q, -sizes * np.where(active[:, None], step, 0.0).T)
+        now = _constraints(plan, t, q, u)
+    for _ in range(2):  # the second pass takes out the rounding of the first
+        speeds = speeds - _least_norm(now.slope[:, kept], now.rate(speeds)[:, kept])
+    left = _largest(now, speeds) * np.array([[1.0], [plan.scales.time]])
+    doubtful = active | ~np.all(left <= 10.0 * _MET, axis=0)
+    return Projected(q, sizes * speeds.T, held, doubtful)
+
+
+def _least_norm(slope: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the shortest solutions of ``slope x = right``; not finite where rows depend on each other."""
+    with np.errstate(all="ignore"):
+        square = slope @ np.swapaxes(slope, 1, 2)
+        try:
+            solved = np.linalg.solve(square, right[:, :, None])
+        except np.linalg.LinAlgError:
+            return np.full((len(slope), slope.shape[2]), np.nan)
+        return np.asarray((np.swapaxes(slope, 1, 2) @ solved)[:, :, 0])
+
+
+def project_safely(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return one projected state that meets all constraints.
+
+    Raises
+    ------
+    SolveError
+        If there is none; it names the constraint that is missed most.
+    """
+    q, u = plan.balance.project(t, q, u, plan.sizes)
+    plan.check_held(t, q, u)
+    return q, u

@@ -1,0 +1,275 @@
+"""One stretch of a run: from a state in one mode to a time, an event, a limit or a failure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import SolveError
+from atwood.solve.choice import Choice, stiffness_of, turned_stiff
+from atwood.solve.driver import Advance, Budget, FloatArray, Session, Statistics, Status
+from atwood.solve.explicit_session import ExplicitSession
+from atwood.solve.modes import EventProbe, Happening
+from atwood.solve.opening import Order, open_explicit_session, open_implicit_session
+from atwood.solve.options import RunOptions
+from atwood.solve.problem import Plan, pack_state
+from atwood.solve.record import Recorder
+
+__all__ = ["Outcome", "Stretch", "run_stretch"]
+
+_BLOCKS = 50
+"""Progress is told about so many times."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """What one stretch is to be.
+
+    Attributes
+    ----------
+    plan, probe
+        The scene in its mode, and what is watched.
+    options
+        What the run was asked for.
+    choice
+        What solves it, at first.
+    times, shown
+        Samples, of which the last is its end, and which of them are outputs.
+    first_shown
+        Whether the start is an output.
+    spent
+        What the run has cost before.
+    """
+
+    plan: Plan
+    probe: EventProbe
+    options: RunOptions
+    choice: Choice
+    times: FloatArray
+    shown: NDArray[np.bool_]
+    first_shown: bool
+    spent: Statistics
+
+    @property
+    def end(self) -> float:
+        """Where it ends if nothing happens before."""
+        return float(self.times[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """How a stretch ended.
+
+    Attributes
+    ----------
+    t
+        When.
+    status, message
+        Why: ``"finished"``, ``"event"``, or as in `atwood.solve.run.Run`.
+    statistics
+        What it cost.
+    happening
+        The event that ended it.
+    choices
+        What solved it, one after the other.
+    error
+        What went wrong, where that names a part.
+    advance
+        The last answer of a solver that failed.
+    """
+
+    t: float
+    status: str
+    message: str
+    statistics: Statistics
+    choices: tuple[Choice, ...]
+    happening: Happening | None = None
+    error: SolveError | None = None
+    advance: Advance | None = None
+
+
+def run_stretch(stretch: Stretch, recorder: Recorder, t: float, q: FloatArray, u: FloatArray) -> Outcome:
+    """Integrate in one mode until a time, an event or a limit of the run.
+
+    Parameters
+    ----------
+    stretch
+        What it is to be.
+    recorder
+        Takes up the samples.
+    t, q, u
+        The state at its start.
+    """
+    plan = stretch.plan
+    n = plan.program.coordinates
+    y, yp = (np.zeros(0), np.zeros(0)) if n == 0 else pack_state(plan, t, q, u)
+    recorder.take(t, y, stretch.first_shown)
+    already = stretch.probe.broken_at_start(t)
+    if already is not None:
+        return Outcome(t, "event", "", Statistics(), (stretch.choice,), already)
+    if n == 0:
+        return _follow(stretch, recorder, t)
+    return _Runner(stretch, recorder).run(t, y, yp)
+
+
+def _follow(stretch: Stretch, recorder: Recorder, t: float) -> Outcome:
+    """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen."""
+    nothing, last, options = np.zeros(0), t, stretch.options
+    for moment, show in zip(stretch.times, stretch.shown, strict=True):
+        happening = stretch.probe.between(last, float(moment))
+        if happening is not None:
+            recorder.take(happening.time, nothing, True)
+            return Outcome(happening.time, "event", "", Statistics(), (stretch.choice,), happening)
+        last = float(moment)
+        recorder.take(last, nothing, bool(show))
+        if options.progress is not None:
+            options.progress(last)
+    return Outcome(last, "finished", "", Statistics(), (stretch.choice,))
+
+
+class _Runner:
+    """The way through one stretch, with whatever solves it."""
+
+    def __init__(self, stretch: Stretch, recorder: Recorder) -> None:
+        self.stretch, self.recorder = stretch, recorder
+        self.choices = [stretch.choice]
+        self.before = Statistics(error_test_failures=0, convergence_failures=0)
+        self.session: Session | None = None
+
+    def run(self, t: float, y: FloatArray, yp: FloatArray) -> Outcome:
+        """Go from sample to sample; change the solver where the scene turns out stiff."""
+        done = 0
+        try:
+            while True:
+                session = self._open(t, y, yp)
+                if isinstance(session, ExplicitSession):
+                    done, advance = self._sample(session, done)
+                else:
+                    done, advance = self._advance(session, done)
+                if advance is None or advance.status is not Status.STIFF:
+                    break
+                t, y, yp = self._change_solver(advance)
+            return self._outcome(advance)
+        except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
+            t = self.recorder.close()
+            return self._ended(t, "interrupted", f"interrupted (at t = {t:.9g})")
+        except SolveError as error:  # from a state that cannot be projected
+            return replace(self._ended(self.recorder.end, "failed", error.message), error=error)
+
+    def _ended(self, t: float, status: str, message: str) -> Outcome:
+        return Outcome(t, status, message, self._cost(), tuple(self.choices))
+
+    def _cost(self) -> Statistics:
+        return self.before if self.session is None else self.before + self.session.statistics
+
+    def _outcome(self, advance: Advance | None) -> Outcome:
+        """Record where a solver stopped early, if it did."""
+        if advance is None:
+            self.recorder.settle()
+            return self._ended(self.stretch.end, "finished", "")
+        if advance.status is Status.EVENT:
+            self.recorder.take(advance.t, advance.y, True)
+            happening = self.stretch.probe.name(advance.t, advance.events)
+            return replace(self._ended(advance.t, "event", ""), happening=happening)
+        if advance.t > self.recorder.end:
+            self.recorder.take(advance.t, advance.y, True)
+        return replace(self._ended(advance.t, advance.status.value, advance.message), advance=advance)
+
+    def _open(self, t: float, y: FloatArray, yp: FloatArray) -> Session:
+        stretch, choice = self.stretch, self.choices[-1]
+        options, spent = stretch.options, stretch.spent + self.before
+        order = Order(
+            stretch.plan,
+            stretch.probe,
+            options,
+            stretch.end,
+            Budget(
+                max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
+                wall_seconds=None if options.max_seconds is None else max(0.0, options.max_seconds - spent.seconds),
+                poll=stretch.plan.poll(choice.solver),
+            ),
+        )
+        if choice.solver.startswith("ida"):
+            self.session = open_implicit_session(order, choice.solver, t, y, yp)
+        else:
+            leave = self._is_stiff if options.solver == "auto" else None
+            self.session = open_explicit_session(order, choice.solver, t, y, leave)
+        return self.session
+
+    def _is_stiff(self, t: float, y: FloatArray) -> bool:
+        plan = self.stretch.plan
+        found = stiffness_of(plan, self.stretch.options, t, *plan.program.split(y))
+        if found is None or not found.is_stiff:
+            return False
+        self.choices.append(turned_stiff(t, found))
+        return True
+
+    def _change_solver(self, advance: Advance) -> tuple[float, FloatArray, FloatArray]:
+        """Return the state from which another solver goes on."""
+        self.before, self.session = self._cost(), None
+        self.choices[-1] = replace(self.choices[-1], time=advance.t)
+        plan = self.stretch.plan
+        return advance.t, *pack_state(plan, advance.t, *plan.program.split(advance.y))
+
+    def _sample(self, session: ExplicitSession, done: int) -> tuple[int, Advance | None]:
+        """Let an explicit method fill tables; return how many samples are done, and why it stopped early."""
+        stretch, progress = self.stretch, self.stretch.options.progress
+        block = len(stretch.times) if progress is None else -(-len(stretch.times) // _BLOCKS)
+        while done < len(stretch.times):
+            times = stretch.times[done : done + block]
+            y, _, advance = session.sample(times)
+            count = len(y)
+            self.recorder.take_many(times[:count], y, stretch.shown[done : done + count])
+            done += count
+            if advance.status is not Status.REACHED:
+                return done, advance
+            if progress is not None:
+                progress(float(times[-1]))
+        return done, None
+
+    def _advance(self, session: Session, done: int) -> tuple[int, Advance | None]:
+        """Go from sample to sample; return how many are done, and why it stopped early."""
+        stretch, recorder, progress = self.stretch, self.recorder, self.stretch.options.progress
+        times, shown = stretch.times[done:].tolist(), stretch.shown[done:].tolist()
+        plan = stretch.plan
+        looks = plan.is_projected or bool(plan.dependent_speeds) or not plan.balance.turning.is_plain
+        for moment, show in zip(times, shown, strict=True):
+            advance = session.advance(moment)
+            if advance.status is Status.FAILED and self._chose_anew(session, advance):
+                advance = session.advance(moment)
+            if advance.status is not Status.REACHED:
+                return done, advance
+            recorder.take(advance.t, advance.y, show)
+            done += 1
+            if looks:
+                plan.review_output(advance.t, advance.y[: plan.program.coordinates])
+                self._repair(session, advance)
+            if progress is not None:
+                progress(moment)
+        return done, None
+
+    def _chose_anew(self, session: Session, advance: Advance) -> bool:
+        """After a failure, go on with other dependent coordinates if those were a poor choice."""
+        plan = self.stretch.plan
+        q, u = (part.copy() for part in plan.program.split(advance.y))
+        if not plan.review_dependent(advance.t, q):
+            return False
+        q, u = plan.balance.project(advance.t, q, u, plan.sizes)
+        session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
+        return True
+
+    def _repair(self, session: Session, advance: Advance) -> None:
+        """Go on from the recorded state where the solver's own has strayed.
+
+        At index 1 with projection that is where the drift outgrows the error of the steps; for any orientation, where
+        the size of its coordinates is no longer near one.
+        """
+        plan = self.stretch.plan
+        strays = plan.balance.turning.strays(plan.program.split(advance.y)[0])
+        if plan.program.level != "index1-projected" and not strays:
+            return
+        _, q, u, held = self.recorder.last()
+        if strays or np.max(held) > 100.0 * self.stretch.options.relative_tolerance:
+            session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
