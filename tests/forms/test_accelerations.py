@@ -41,7 +41,7 @@ from ..helpers.mechanisms import parallel_four_bar
 from ..helpers.runs import nearby_states, prepare
 
 METHODS = (None, "mass matrix", "joint forces", "leaves to root", "numeric")
-UNCONSTRAINED = [name for name in SCENES if name not in ("four-bar", "slider-crank")]
+UNCONSTRAINED = [name for name in SCENES if not assemble(SCENES[name]()).reduced.constraints]
 
 
 def links(count: int) -> Scene:

@@ -91,6 +91,17 @@ def nearby_states(prepared: Prepared, count: int, size: float = 0.3) -> list[tup
     return found
 
 
+def moved(prepared: Prepared, q: FloatArray, u: FloatArray, a: FloatArray, h: float, t: float = 0.0) -> FloatArray:
+    """Return where coordinates are a time later, at speeds that change by given accelerations: one step of order 4."""
+    rates = prepared.plan.balance.turning.rates
+    k1 = rates(t, q, u)
+    k2 = rates(t, q + 0.5 * h * k1, u + 0.5 * h * a)
+    k3 = rates(t, q + 0.5 * h * k2, u + 0.5 * h * a)
+    k4 = rates(t, q + h * k3, u + h * a)
+    found: FloatArray = q + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    return found
+
+
 def packed(prepared: Prepared, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the solver's vectors at an admissible state."""
     return pack_state(prepared.plan, prepared.time, q, u)

@@ -311,9 +311,11 @@ def test_many_threads_call_one_kernel_at_once():
 @pytest.mark.parametrize("name", SCENES)
 def test_every_scene_agrees_with_the_python_back_end(name, form):
     assembly = assemble(SCENES[name](), form=form)
+    equations = assembly.equations
     loops = len(assembly.reduced.constraints) if form == "reduced" else 0
-    size = len(assembly.equations.coordinates)
-    made = assembly.form_program(None, tuple(range(size - loops, size)))
+    size, speeds = len(equations.coordinates), len(equations.speeds)
+    dependent = tuple(range(size - loops, size)), tuple(range(speeds - loops, speeds))
+    made = assembly.form_program(None, *dependent)
     rng = np.random.default_rng(1)
     for program in (made.residual, made.jacobian):
         parameters = assembly.parameter_values
