@@ -48,7 +48,8 @@ def why_not_batched(order: Order) -> str:
         return "the dae form keeps constraints"
     equations = assembly.reduced
     if equations.constraints or not equations.coordinates:
-        return "closed loops leave constraints" if equations.constraints else "nothing is free to move"
+        is_free = not equations.constraints
+        return "nothing is free to move" if is_free else "constraints are left among its coordinates"
     if find_watches(assembly):
         return "events are watched"
     if switches_by_clock(assembly) or equations.prescribed:

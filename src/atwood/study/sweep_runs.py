@@ -223,6 +223,8 @@ def _run(order: Order, records: Records, structures: _Structures, run: int) -> N
             solver=options.solver,
             samples=samples,
         )
+    except UsageError:  # what was asked for makes no sense, for this run and all others
+        raise
     except AtwoodError as error:
         records.fail(run, error)
         before = getattr(error, "run", None)
