@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from atwood.forms.loops import LoopProgram
 from atwood.kernels.llvm_loops import LoopShape
+from atwood.topology.groups import connected_groups
 
 __all__ = ["POOR", "choice_lists", "choose_dependent", "loop_shape", "review_choice"]
 
@@ -137,24 +138,17 @@ def choice_lists(program: LoopProgram, dependent: tuple[int, ...]) -> NDArray[np
 
 def _blocks(program: LoopProgram, dependent: tuple[int, ...]) -> list[tuple[list[int], list[int]]]:
     """Return constraints and dependent speeds in groups that share nothing."""
-    group = list(range(program.rates))
     given = set(dependent)
     owner: dict[int, int] = {}
-
-    def root(j: int) -> int:
-        while group[j] != j:
-            group[j] = j = group[group[j]]
-        return j
-
-    for row, column in zip(program.slope_rows.tolist(), program.slope_columns.tolist(), strict=True):
-        if column in given:
-            group[root(row)] = root(owner.setdefault(column, row))
-    blocks: dict[int, tuple[list[int], list[int]]] = {}
-    for j in range(program.rates):
-        blocks.setdefault(root(j), ([], []))[0].append(j)
-    for i in dependent:
-        if i in owner:
-            blocks[root(owner[i])][1].append(i)
-    if all(len(constraints) == len(speeds) for constraints, speeds in blocks.values()):
-        return list(blocks.values())
+    shared = [
+        (owner.setdefault(column, row), row)
+        for row, column in zip(program.slope_rows.tolist(), program.slope_columns.tolist(), strict=True)
+        if column in given
+    ]
+    blocks: list[tuple[list[int], list[int]]] = []
+    for group in connected_groups(range(program.rates), shared):
+        inside = set(group)
+        blocks.append((group, [i for i in dependent if owner.get(i) in inside]))
+    if all(len(constraints) == len(speeds) for constraints, speeds in blocks):
+        return blocks
     return [(list(range(program.rates)), list(dependent))]  # it cannot be solved, which the numbers will say
