@@ -55,7 +55,7 @@ CASES = {
     "starts": {"start": {"rod1.angle": RANDOM[0], "rod2.angle": RANDOM[1]}, "combine": "list"},
     "speeds": {"start": {"rod1.angle": RANDOM[0], "rod2.angular_velocity": 3.0 * RANDOM[1]}, "combine": "list"},
     "parts": {"vary": {"bob1.mass": [0.5, 1.0, 2.5], "rod2.length": ["30 cm", "1 m"]}},
-    "bound parameters": {
+    "bound": {
         "vary": {"length1": [0.5, 2.0], "mass2": [0.1, 3.0]},
         "start": {"rod1.angle": ["40 deg", 2.0]},
     },
@@ -286,7 +286,9 @@ def test_what_an_interruption_leaves_is_said(threads: int) -> None:
     def interrupt(done: int, of: int) -> None:
         raise KeyboardInterrupt
 
-    found = sweep(FourBar(), {"crank_length": np.linspace(0.2, 0.3, 6)}, t_end=0.1, threads=threads, progress=interrupt)
+    found = sweep(
+        FourBar(), {"crank_length": np.linspace(0.2, 0.3, 60)}, t_end=1.0, threads=threads, progress=interrupt
+    )
     assert "finished" in found.status
     assert "interrupted" in found.status
     lost = [run for run, status in enumerate(found.status) if status == "interrupted"]

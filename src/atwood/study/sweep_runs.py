@@ -114,7 +114,8 @@ def expand_paths(assembly: Assembly, quantities: Iterable[str] | None) -> tuple[
     for path in map(str, quantities):
         below = [one for one in known if one.startswith(f"{path}.")]
         if path not in known and not below:
-            raise ResultError("there is no such quantity", where=path, advice=suggestion(path, known))
+            around = [one.rpartition(".")[0] for one in known]
+            raise ResultError("there is no such quantity", where=path, advice=suggestion(path, {*known, *around}))
         found += [path] if path in known else below
     return tuple(dict.fromkeys(found))
 
