@@ -16,7 +16,8 @@ from atwood.kernels.llvm_ida_loops import compile_loop_callbacks
 from atwood.kernels.llvm_loops import LoopShape
 from atwood.kernels.llvm_routine import Routine
 from atwood.solve import sundials_library
-from atwood.solve.dependent import POOR, choice_lists, choose_dependent, loop_shape
+from atwood.solve.dependent import POOR, choose_dependent
+from atwood.solve.loop_choice import choice_lists, loop_shape
 from atwood_library.scenes import FourBar, SliderCrank
 
 from ..helpers.mechanisms import double_four_bar, two_four_bars

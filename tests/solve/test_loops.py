@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from atwood import simulate
 from atwood.forms.loops import loop_program
 from atwood.solve import sundials_library
-from atwood.solve.dependent import POOR, choice_lists, choose_dependent, loop_shape, review_choice
+from atwood.solve.dependent import POOR, choose_dependent, review_choice
+from atwood.solve.loop_choice import choice_lists, loop_shape
 from atwood.solve.problem import Plan
 from atwood_library.scenes import FourBar, SliderCrank
 

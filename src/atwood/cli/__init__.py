@@ -1,11 +1,14 @@
 """The command line. Its modules import what is heavy only inside the functions that need it."""
 
+import gc
 import os
 
 # Matrices here are small: threads of the linear algebra would wait for each other longer than they work. It is read
 # when NumPy is loaded, so it stands before everything else; whoever has set it keeps the last word.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 from atwood.cli.app import main
+
+# What is built stays until the end: to look through it again and again for something to free takes a tenth of a run.
+gc.set_threshold(100_000, 20, 100)
 
 __all__ = ["main"]

@@ -7,21 +7,18 @@ import importlib
 import importlib.util
 import sys
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
-from importlib.metadata import entry_points
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from atwood.cli.libraries import all_libraries, declared_libraries
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
 
 if TYPE_CHECKING:
     from atwood.model.composite import Model
 
 __all__ = ["bundled_scenes", "find_scene", "pairs", "prepare"]
-
-GROUP = "atwood.libraries"
-"""The entry point group in which component libraries make themselves known."""
 
 
 def bundled_scenes() -> dict[str, type[Model]]:
@@ -32,17 +29,21 @@ def bundled_scenes() -> dict[str, type[Model]]:
     UsageError
         If a library cannot be loaded.
     """
+    return _scenes_of(all_libraries())
+
+
+def _scenes_of(libraries: Iterable[str]) -> dict[str, type[Model]]:
     found: dict[str, type[Model]] = {}
-    for entry in entry_points(group=GROUP):
-        name = f"{entry.value}.scenes"
+    for library in libraries:
+        name = f"{library}.scenes"
         try:
             module = importlib.import_module(name)
         except ModuleNotFoundError as error:
             if error.name == name:
                 continue  # a library without scenes
-            raise UsageError(f"the library cannot be loaded ({error})", where=entry.value) from error
+            raise UsageError(f"the library cannot be loaded ({error})", where=library) from error
         except ImportError as error:
-            raise UsageError(f"the library cannot be loaded ({error})", where=entry.value) from error
+            raise UsageError(f"the library cannot be loaded ({error})", where=library) from error
         for scene, kind in getattr(module, "SCENES", {}).items():
             found.setdefault(scene, kind)
     return found
@@ -66,7 +67,9 @@ def find_scene(text: str) -> tuple[Model, str]:
         return _scene_in_file(Path(file), name), name
     if text.endswith(".py"):
         return _only_scene(Path(text))
-    scenes = bundled_scenes()
+    scenes = _scenes_of(declared_libraries())
+    if text not in scenes:
+        scenes = bundled_scenes()
     if text in scenes:
         return scenes[text](), text
     if not scenes:

@@ -28,7 +28,7 @@ __all__ = ["SweepRequest", "read_values", "sweep_scene"]
 _ROWS, _COLUMNS, _REASONS = 16, 8, 5
 """So many runs, quantities and reasons are shown."""
 
-_RANGE = re.compile(r"([^:]+):([^:]+):\s*(\d+)\s*(.*)\Z")
+_RANGE = re.compile(r"([^:]+):([^:]+):\s*(\d+)\s*([^:]*)\Z")
 _LARGEST = 10_000_000
 
 

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-import networkx as nx
-
 from atwood.expr import Expression, jacobian, solve
 from atwood.forms.program import FormProgram, either_sign, kinematic_rows, make_form_program, rows_along_speeds
 from atwood.mechanics.equations import Equations
+from atwood.topology.groups import connected_groups
 
 __all__ = ["reduced_form"]
 
@@ -71,11 +70,12 @@ def _project(
     """Return ``r_i - G_i^T G_d^-T r_d``, solving separately for loops that share nothing."""
     slope = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
     entry = {(r, c): e for r, c, e in zip(slope.rows, slope.columns, slope.entries, strict=True)}
-    sharing: nx.Graph[tuple[str, int]] = nx.Graph()
-    sharing.add_nodes_from(("constraint", r) for r in range(len(equations.constraints)))
-    sharing.add_edges_from((("constraint", r), ("speed", c)) for r, c in entry if c in set(dependent))
+    given = set(dependent)
+    sharing = [(("constraint", r), ("speed", c)) for r, c in entry if c in given]
+    members = [("constraint", r) for r in range(len(equations.constraints))]
+    members += dict.fromkeys(speed for _, speed in sharing)
     weights: dict[int, Expression] = {}
-    for group in nx.connected_components(sharing):
+    for group in connected_groups(members, sharing):
         constraints = sorted(i for kind, i in group if kind == "constraint")
         speeds = sorted(i for kind, i in group if kind == "speed")
         zero = equations.graph.constant(0.0)

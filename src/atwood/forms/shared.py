@@ -16,6 +16,7 @@ from atwood.expr import Expression
 from atwood.mechanics.build import Mechanism, check_closures
 from atwood.mechanics.orientation import body_offsets
 from atwood.model.flatten import FlatScene, Part
+from atwood.model.local import LocalPart
 from atwood.topology.sides import find_sides
 
 __all__ = ["Shared", "Slot", "find_slots", "with_values_of"]
@@ -201,14 +202,16 @@ def _shown(value: Any) -> str:
 
 def _moved(mechanism: Mechanism, other: FlatScene, values: Mapping[Expression, float]) -> Mechanism:
     """Return a mechanism with other numbers in its places."""
-    locals_ = {path: replace(local, part=_kept(local.part, other)) for path, local in mechanism.locals_.items()}
+    locals_ = {path: _local(local, other.parts[path]) for path, local in mechanism.locals_.items()}
     return replace(mechanism, table=replace(mechanism.table, values=dict(values)), locals_=locals_)
 
 
-def _kept(part: Part, other: FlatScene) -> Part:
-    """Return a part with the other scene's numbers; its component, whose laws were read, stays."""
-    now = other.parts[part.path]
-    return replace(part, values=now.values, signals=now.signals)
+def _local(local: LocalPart, now: Part) -> LocalPart:
+    """Return a part with other numbers; its component, whose laws were read, stays."""
+    part = local.part
+    if part.values == now.values and part.signals == now.signals:
+        return local
+    return replace(local, part=replace(part, values=now.values, signals=now.signals))
 
 
 def _sides(mechanism: Mechanism, flat: FlatScene, shared: Shared) -> Mapping[tuple[str, str, str], float]:

@@ -6,7 +6,8 @@ They tell in which steps something may happen, so that no Python runs in all the
 from __future__ import annotations
 
 import ctypes
-from ctypes import c_void_p
+from collections.abc import Callable
+from ctypes import Array, c_double, c_int, c_void_p
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ __all__ = ["EVENTS_PLACE", "EventCode", "EventData", "compile_events"]
 EVENTS_PLACE = 31
 """Which of the pointers of IDA's user data leads to the data of the events."""
 
+_EVENTS = ctypes.CFUNCTYPE(c_int, c_double, *[c_void_p] * 4)
 _PROLOGUE = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
 
 _TEXT = """define i32 @events(double %t, ptr %y, ptr %yp, ptr %values, ptr %data) #0 {{
@@ -73,6 +75,35 @@ class EventData:
     address: int
     count: int
     keep: object
+
+    def function(self) -> Callable[[float, NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]:
+        """Return the values as a function of (t, y, y')."""
+        call, found, address = _EVENTS(self.explicit), np.empty(self.count), self.address
+        place = found.ctypes.data
+
+        def values(
+            t: float, y: NDArray[np.float64], yp: NDArray[np.float64], _: EventData = self
+        ) -> NDArray[np.float64]:
+            state = np.ascontiguousarray(y, dtype=np.float64)
+            call(t, state.ctypes.data, None, place, address)
+            return found.copy()
+
+        return values
+
+    def joined(self, user_data: int, size: int) -> Array[c_void_p]:
+        """Return user data of IDA's other functions with those of the events behind them.
+
+        Parameters
+        ----------
+        user_data, size
+            Where they are, and how long: nothing but pointers.
+        """
+        block = (c_void_p * (EVENTS_PLACE + 1))()
+        if size > EVENTS_PLACE * ctypes.sizeof(c_void_p):
+            raise UsageError(f"user data of {size} bytes leave no place for those of events")
+        ctypes.memmove(block, user_data, size)
+        block[EVENTS_PLACE] = self.address
+        return block
 
 
 class EventCode:

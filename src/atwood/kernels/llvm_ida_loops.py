@@ -93,6 +93,11 @@ class LoopData:
     _pointers: _Pointers
     _arrays: dict[str, NDArray[np.generic]]
 
+    @property
+    def bytes(self) -> int:
+        """How long the user's data are; they hold nothing but pointers."""
+        return ctypes.sizeof(self._pointers)
+
     def set_weights(self, relative: ArrayLike, absolute: ArrayLike) -> None:
         """Make the error weights ``1 / (relative[i] |y[i]| + absolute[i])``."""
         self._arrays["relative"][:] = relative

@@ -11,8 +11,6 @@ import heapq
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import networkx as nx
-
 from atwood.expr import Expression, Graph, algebra, live
 
 __all__ = [
@@ -159,24 +157,26 @@ def minimum_degree(places: Sequence[Place], size: int, first: Sequence[int] = ()
     first
         Unknowns that go first among those with as many neighbours.
     """
-    touching: nx.Graph[int] = nx.Graph()
-    touching.add_nodes_from(range(size))
-    touching.add_edges_from((i, j) for i, j in places if i != j)
+    touching: dict[int, set[int]] = {i: set() for i in range(size)}
+    for i, j in places:
+        if i != j:
+            touching[i].add(j)
+            touching[j].add(i)
     preferred = set(first)
     order: list[int] = []
-    heap = [(touching.degree[i], i not in preferred, -i) for i in touching]
+    heap = [(len(around), i not in preferred, -i) for i, around in touching.items()]
     heapq.heapify(heap)
     while heap:
         degree, _, negative = heapq.heappop(heap)
         i = -negative
-        if i not in touching or degree != touching.degree[i]:
+        if i not in touching or degree != len(touching[i]):
             continue
-        around = list(touching[i])
-        touching.remove_node(i)
+        around = touching.pop(i)
         order.append(i)
-        touching.add_edges_from((a, b) for n, a in enumerate(around) for b in around[n + 1 :])
         for a in around:
-            heapq.heappush(heap, (touching.degree[a], a not in preferred, -a))
+            touching[a] |= around
+            touching[a] -= {a, i}
+            heapq.heappush(heap, (len(touching[a]), a not in preferred, -a))
     return order
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,8 @@ __all__ = ["describe_run", "solver_name", "versions"]
 
 def versions() -> dict[str, str]:
     """Return the versions of what a run depends on."""
+    from importlib.metadata import PackageNotFoundError, version
+
     found = {"python": platform.python_version()}
     for name in ("atwood", "numpy", "scipy", "scikit-sundae"):
         try:

@@ -10,10 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.forms.loops import LoopProgram
-from atwood.kernels.llvm_loops import LoopShape
-
-__all__ = ["POOR", "choice_lists", "choose_dependent", "loop_shape", "review_choice"]
+__all__ = ["POOR", "choose_dependent", "review_choice"]
 
 FloatArray = NDArray[np.float64]
 
@@ -94,71 +91,3 @@ def _weights(scaled: FloatArray, chosen: list[int], free: list[int]) -> FloatArr
     except np.linalg.LinAlgError:
         return None
     return weights if np.all(np.isfinite(weights)) else None
-
-
-def loop_shape(program: LoopProgram) -> LoopShape:
-    """Return how many there are of each in a mechanism."""
-    return LoopShape(program.coordinates, program.speeds, program.values, program.rates)
-
-
-def choice_lists(
-    program: LoopProgram, dependent: tuple[int, ...], places: tuple[int, ...] | None = None
-) -> NDArray[np.int64]:
-    """Return a choice as the lists of numbers that compiled code reads.
-
-    The rows come in the order kinematic rows of independent coordinates, constraints, balances of independent speeds,
-    rates of constraints.
-
-    Parameters
-    ----------
-    program
-        The mechanism.
-    dependent
-        The choice: as many speeds as there are constraints.
-    places
-        As many speeds as there are constraints on positions, along which displacements follow; the same when None.
-    """
-    shape, given = loop_shape(program), set(dependent)
-    free = [i for i in range(shape.speeds) if i not in given]
-    kinematic = [i for i in range(shape.coordinates) if i not in set(dependent if places is None else places)]
-    balances = [shape.coordinates + i for i in free]
-    values = [shape.size + j for j in range(shape.values)]
-    rates = [shape.size + shape.values + j for j in range(shape.rates)]
-    blocks = _blocks(program, dependent)
-    starts = np.cumsum([0, *(len(constraints) for constraints, _ in blocks)]).tolist()
-    starts += [starts[-1]] * (shape.rates + 1 - len(starts))
-    lists = {
-        "source": [*kinematic, *values, *balances, *rates],
-        "target": [len(kinematic) + shape.values + k for k in range(shape.free)],
-        "independent": free,
-        "dependent": [i for _, speeds in blocks for i in speeds],
-        "constraints": [j for constraints, _ in blocks for j in constraints],
-        "starts": starts,
-        "blocks": [len(blocks)],
-    }
-    return np.array([number for name in shape.choice if name != "end" for number in lists[name]], dtype=np.int64)
-
-
-def _blocks(program: LoopProgram, dependent: tuple[int, ...]) -> list[tuple[list[int], list[int]]]:
-    """Return constraints and dependent speeds in groups that share nothing."""
-    group = list(range(program.rates))
-    given = set(dependent)
-    owner: dict[int, int] = {}
-
-    def root(j: int) -> int:
-        while group[j] != j:
-            group[j] = j = group[group[j]]
-        return j
-
-    for row, column in zip(program.slope_rows.tolist(), program.slope_columns.tolist(), strict=True):
-        if column in given:
-            group[root(row)] = root(owner.setdefault(column, row))
-    blocks: dict[int, tuple[list[int], list[int]]] = {}
-    for j in range(program.rates):
-        blocks.setdefault(root(j), ([], []))[0].append(j)
-    for i in dependent:
-        if i in owner:
-            blocks[root(owner[i])][1].append(i)
-    if all(len(constraints) == len(speeds) for constraints, speeds in blocks.values()):
-        return list(blocks.values())
-    return [(list(range(program.rates)), list(dependent))]  # it cannot be solved, which the numbers will say

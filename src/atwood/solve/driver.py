@@ -79,6 +79,8 @@ class NativeCallbacks:
         The factor cj of the last Jacobian, with which it is worked out anew when the equations have changed.
     keep
         Whatever must live as long as the addresses are used.
+    data_bytes
+        How long what `user_data` leads to is, if it holds nothing but pointers and so may be copied; else 0.
     """
 
     residual: int
@@ -91,6 +93,7 @@ class NativeCallbacks:
     attend: Callable[[float, FloatArray], bool | None] | None = None
     last_rate: Callable[[], float] | None = None
     keep: object = None
+    data_bytes: int = 0
 
 
 @dataclass(frozen=True, eq=False)

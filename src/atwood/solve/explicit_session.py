@@ -41,6 +41,7 @@ def open_explicit(
     budget: Budget | None = None,
     stepper: Literal["auto", "compiled", "reference"] = "auto",
     leave: Leave | None = None,
+    end: float = inf,
 ) -> ExplicitSession:
     """Start a run with the explicit method of order 8(5,3).
 
@@ -60,14 +61,16 @@ def open_explicit(
     leave
         Asked, with time and values, whenever stability has kept steps short for a while, whether to leave the rest to
         an implicit method: the run then ends there with `Status.STIFF`.
+    end
+        The last time that will be asked for; events behind it are not looked for.
     """
     if stepper == "compiled" or (stepper == "auto" and problem.compiled is not None):
         from atwood.solve.explicit_native import CompiledStepper
 
-        return ExplicitSession(problem, options, CompiledStepper(problem, options), t, y, budget, leave)
+        return ExplicitSession(problem, options, CompiledStepper(problem, options), t, y, budget, leave, end)
     from atwood.solve.explicit_reference import ReferenceStepper
 
-    return ExplicitSession(problem, options, ReferenceStepper(problem, options), t, y, budget, leave)
+    return ExplicitSession(problem, options, ReferenceStepper(problem, options), t, y, budget, leave, end)
 
 
 class ExplicitSession:
@@ -75,7 +78,7 @@ class ExplicitSession:
 
     Parameters
     ----------
-    problem, options, t, y, budget, leave
+    problem, options, t, y, budget, leave, end
         As in `open_explicit`.
     stepper
         What takes the steps.
@@ -90,8 +93,10 @@ class ExplicitSession:
         y: FloatArray,
         budget: Budget | None = None,
         leave: Leave | None = None,
+        end: float = inf,
     ) -> None:
         self.budget = budget or Budget()
+        self._end = end
         self._leave, self._judged, self._is_left = leave, 0, False
         self._size = problem.size
         self._stepper = stepper
@@ -307,9 +312,10 @@ class ExplicitSession:
     def _find_root(self) -> Root | None:
         """Return the first root in the part of the last step that has not been handed out."""
         watch = self._watch
-        if watch is not None and self._root is None and self._searched < self._newest[0]:
-            self._root = watch.search(self._searched, self._newest[0], self._stepper.interpolate)
-            self._searched = self._root.state[0] if self._root else self._newest[0]
+        end = min(self._newest[0], self._end)
+        if watch is not None and self._root is None and self._searched < end:
+            self._root = watch.search(self._searched, end, self._stepper.interpolate)
+            self._searched = self._root.state[0] if self._root else end
         return self._root
 
     def _allowed(self) -> int:

@@ -178,7 +178,7 @@ class NativeSession:
             raise UsageError(f"cannot advance past t = {self._stop_time:.9g}, where the run must stop")
         began = time.perf_counter()
         try:
-            if not self._record.calls_python and self._watch is None:
+            if not self._record.calls_python and (self._watch is None or self._finds_events):
                 return self._run(float(t_out), began)
             with np.errstate(all="ignore"), InterruptLater(self._record):
                 end = self._run(float(t_out), began)

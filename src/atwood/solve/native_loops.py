@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 from atwood.forms.loops import LoopProgram
 from atwood.kernels.llvm_ida_loops import LoopCallbacks, LoopData, compile_loop_callbacks
-from atwood.solve.dependent import POOR, choice_lists, loop_shape
+from atwood.solve.dependent import POOR
 from atwood.solve.driver import FloatArray, LinearSolver, NativeCallbacks
+from atwood.solve.loop_choice import choice_lists, loop_shape
 
 __all__ = ["CompiledLoops", "compile_loops"]
 
@@ -78,6 +79,7 @@ class CompiledLoops:
             attend=attend,
             last_rate=lambda: data.rate,
             keep=(code, data),
+            data_bytes=data.bytes,
         )
 
     def choose(self, places: tuple[int, ...], speeds: tuple[int, ...]) -> None:

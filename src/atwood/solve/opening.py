@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass, replace
-from functools import partial
 
 from atwood.errors import UsageError
-from atwood.solve.driver import Budget, FloatArray, Session, SolverOptions
+from atwood.solve.driver import (
+    Budget,
+    FloatArray,
+    ImplicitProblem,
+    LinearSolver,
+    NativeCallbacks,
+    Session,
+    SolverOptions,
+)
 from atwood.solve.explicit_problem import CompiledEvents
 from atwood.solve.explicit_session import ExplicitSession, Leave
 from atwood.solve.modes import EventProbe
@@ -71,15 +79,33 @@ def open_implicit_session(order: Order, solver: str, t: float, y: FloatArray, yp
         Consistent start values.
     """
     plan, probe, settings = order.plan, order.probe, order.settings(t)
-    problem = plan.problem(probe.function(), probe.directions)
     if solver == "ida":
+        problem = _with_events(plan.problem(probe.function(), probe.directions), probe)
         from atwood.solve import ida_native
 
         tuning = ida_native.IdaTuning(angle_like=plan.angles, stop_time=order.end)
         return ida_native.open_session(problem, settings, t, y, yp, order.budget, tuning)
     from atwood.solve.ida_sundae import open_session
 
-    return open_session(problem, settings, t, y, yp, order.budget)
+    return open_session(plan.problem(probe.function(), probe.directions), settings, t, y, yp, order.budget)
+
+
+def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem:
+    """Return a problem whose compiled functions, if it has any, look for events too."""
+    make = problem.native
+    found = None if problem.events is None or make is None else probe.compiled(for_ida=True)
+    if found is None or make is None:
+        return problem
+
+    def native(linear_solver: LinearSolver) -> NativeCallbacks:
+        made = make(linear_solver)
+        if not made.data_bytes:
+            return made
+        block = found.joined(made.user_data, made.data_bytes)
+        keep = (made.keep, found, block)
+        return replace(made, user_data=ctypes.addressof(block), data_bytes=0, events=found.ida, keep=keep)
+
+    return replace(problem, events=found.function(), native=native)
 
 
 def open_explicit_session(
@@ -114,16 +140,13 @@ def open_explicit_session(
             where=assembly.flat.name,
             advice="Use the solver 'ida'.",
         )
-    if problem.events is not None:
-        problem = replace(problem, compiled_events=partial(_compiled_events, probe))
+    found = None if problem.events is None else probe.compiled(for_ida=False)
+    if found is not None:
+        own = CompiledEvents(found.explicit, found.address, found.count, found)
+        problem = replace(problem, events=found.function(), compiled_events=lambda: own)
     if solver == "taylor":
         from atwood.solve.taylor_scene import open_taylor, taylor_problem
 
         series = taylor_problem(assembly, order.end, has_events=bool(probe.directions))
         return open_taylor(problem, series, order.settings(t), t, y, order.budget)
-    return open_explicit(problem, order.settings(t), t, y, order.budget, leave=leave)
-
-
-def _compiled_events(probe: EventProbe) -> CompiledEvents | None:
-    found = probe.compiled(for_ida=False)
-    return None if found is None else CompiledEvents(found.explicit, found.address, found.count, found)
+    return open_explicit(problem, order.settings(t), t, y, order.budget, leave=leave, end=order.end)

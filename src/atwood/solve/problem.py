@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 from atwood.errors import KernelEvaluationError, SolveError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import keep_constraints
-from atwood.forms.loops import LoopProgram, loop_program
 from atwood.forms.program import FormProgram
 from atwood.kernels import BoundKernel
 from atwood.solve.balance import Balance, balance_of, least_norm, row_scales, solve_balance
@@ -23,6 +23,7 @@ from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_n
 from atwood.solve.uncompiled import announce, find_uncompiled
 
 if TYPE_CHECKING:
+    from atwood.forms.loops import LoopProgram
     from atwood.solve.native_loops import CompiledLoops
 
 __all__ = ["Plan", "make_plan", "pack_state"]
@@ -243,6 +244,7 @@ class Plan:
             code.weights_address,
             data.set_weights,
             keep=(code, data),
+            data_bytes=ctypes.sizeof(data),
         )
 
     @property
@@ -258,6 +260,8 @@ class Plan:
 
 
 def _loop_program(assembly: Assembly, kept: tuple[int, ...]) -> LoopProgram:
+    from atwood.forms.loops import loop_program
+
     equations = keep_constraints(assembly.equations, kept)
     return loop_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)
 

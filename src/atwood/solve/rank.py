@@ -21,6 +21,10 @@ _ADMISSIBLE = 1e-9
 """How well a position near the start must fulfil the constraints to be asked for their rank."""
 
 
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+"""The angle whose multiples are spread most evenly."""
+
+
 @dataclass(frozen=True)
 class RankFinding:
     """What the constraints of a form determine.
@@ -74,17 +78,17 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
 
     at_start = independent_rows(scaled(q))
     best = at_start
-    random = np.random.default_rng(20240229)
     # Constraints on velocities alone keep nothing from being reached.
     matrix = scaled(q)[balance.holonomic]
     _, sizes, directions = np.linalg.svd(matrix)
     rank = int(np.sum(sizes > 1e-7 * np.max(sizes, initial=0.0)))
     admissible = directions[rank:]
     asked = 0
-    for step in (1e-2, 3e-2, 3e-2):
+    for attempt, step in enumerate((1e-2, 3e-2, 3e-2), 1):
         if not len(admissible):
             break
-        along = random.standard_normal(len(admissible)) @ admissible
+        # any direction that no symmetry singles out
+        along = np.sin(attempt * _GOLDEN * np.arange(1.0, len(admissible) + 1.0)) @ admissible
         moved = balance.turning.moved(t, q, step * scales * along / np.linalg.norm(along))
         nearby, _ = balance.project(t, moved, still, scales)
         if balance.misses(t, nearby, still, scales)[0] > _ADMISSIBLE:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
@@ -378,6 +377,8 @@ def _raise_open_loop(
 
 def _loop_through(assembly: Assembly, part: str) -> list[str]:
     """Return the parts of the shortest loop through a joint, in order, with the bodies between them."""
+    import networkx as nx
+
     graph, bodies = assembly.mechanism.graph, assembly.mechanism.bodies
     others: nx.Graph[int] = nx.Graph()
     ends: tuple[int, int] | None = None

@@ -14,7 +14,6 @@ from typing import Any
 from atwood.expr import Expression, live
 from atwood.expr.program import Program
 from atwood.forms.assembly import Assembly
-from atwood.kernels.llvm_text import has_code
 from atwood.model.component import bind
 from atwood.model.local import LocalPart
 from atwood.model.vector import Vector
@@ -59,11 +58,14 @@ def announce(assembly: Assembly, uncompiled: str) -> None:
 
 
 def _is_obstacle(node: Expression) -> bool:
+    from atwood.kernels.llvm_text import has_code  # not with this module: code that is cached needs no more of LLVM
+
     return node.operation == "external" or not has_code(node.operation)
 
 
 def _describe(assembly: Assembly, program: Program) -> str:
-    obstacle = next((node for node in program.nodes if _is_obstacle(node)), None)
+    kinds = {node.operation: node for node in program.nodes}
+    obstacle = next((node for node in kinds.values() if _is_obstacle(node)), None)
     if obstacle is None:
         return ""
     for path, local in assembly.mechanism.locals_.items():

@@ -15,6 +15,8 @@ from atwood.errors import AtwoodError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.model.composite import Model
 from atwood.pipeline import assemble
+from atwood.solve.choice import check_solver
+from atwood.solve.driver import SolverOptions
 from atwood.solve.options import RunOptions, sample_times
 from atwood.study.cases import Cases, make_cases
 from atwood.study.sweep_batch import run_batches, why_not_batched
@@ -95,6 +97,8 @@ def sweep(
         If there is no such parameter, start value or quantity, or a value is not admissible.
     """
     began = time.perf_counter()
+    check_solver(solver)
+    SolverOptions(relative_tolerance=rtol)  # refuses what makes no sense
     assembly = scene if isinstance(scene, Assembly) else assemble(scene, form=form, level=level, name=name)
     source = assembly.source.scene if assembly.source is not None else None
     if source is None:

@@ -48,8 +48,11 @@ def why_not_batched(order: Order) -> str:
     if assembly.form != "reduced":
         return "the dae form keeps constraints"
     equations = assembly.reduced
-    if equations.constraints or equations.charts or not equations.coordinates:
-        return "closed loops leave constraints" if equations.constraints else "nothing is free to move"
+    if equations.charts:
+        return "bodies turn in space"
+    if equations.constraints or not equations.coordinates:
+        is_free = not equations.constraints
+        return "nothing is free to move" if is_free else "constraints are left among its coordinates"
     if find_watches(assembly):
         return "events are watched"
     if switches_by_clock(assembly) or equations.prescribed:

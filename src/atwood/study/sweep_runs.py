@@ -114,7 +114,8 @@ def expand_paths(assembly: Assembly, quantities: Iterable[str] | None) -> tuple[
     for path in map(str, quantities):
         below = [one for one in known if one.startswith(f"{path}.")]
         if path not in known and not below:
-            raise ResultError("there is no such quantity", where=path, advice=suggestion(path, known))
+            around = [one.rpartition(".")[0] for one in known]
+            raise ResultError("there is no such quantity", where=path, advice=suggestion(path, {*known, *around}))
         found += [path] if path in known else below
     return tuple(dict.fromkeys(found))
 
@@ -223,6 +224,8 @@ def _run(order: Order, records: Records, structures: _Structures, run: int) -> N
             solver=options.solver,
             samples=samples,
         )
+    except UsageError:  # what was asked for makes no sense, for this run and all others
+        raise
     except AtwoodError as error:
         records.fail(run, error)
         before = getattr(error, "run", None)

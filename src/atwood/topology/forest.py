@@ -11,14 +11,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-import networkx as nx
-
 from atwood.errors import DeclarationError
 from atwood.model.local import LocalPart
 from atwood.model.space import Space
 from atwood.topology.bodies import Bodies, reads_position
 from atwood.topology.charts import Chart
 from atwood.topology.graph import Joint, MechanismGraph
+from atwood.topology.groups import connected_groups
 
 __all__ = ["Attachment", "Coordinate", "Forest", "OrientationStep", "grow_forest"]
 
@@ -170,10 +169,9 @@ def grow_forest(
             by_position = reads_position(local, constraint)
             if id(joint) in hung if by_position else id(joint) in locked:
                 solved.add((joint.part, constraint.law.name, constraint.index))
-    cycles: nx.MultiGraph[int] = nx.MultiGraph()
-    cycles.add_nodes_from(range(len(bodies.bodies)))
-    cycles.add_edges_from((bodies.body_of[j.a], bodies.body_of[j.b]) for j in joints)
-    loops = cycles.number_of_edges() - cycles.number_of_nodes() + nx.number_connected_components(cycles)
+    pairs = [(bodies.body_of[joint.a], bodies.body_of[joint.b]) for joint in joints]
+    numbers = range(len(bodies.bodies))
+    loops = len(pairs) - len(numbers) + len(connected_groups(numbers, pairs))
     cuts = tuple(joint for joint in joints if id(joint) not in hung) if form == "reduced" else ()
     return Forest(
         form,

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-
-import networkx as nx
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 from atwood.errors import ConnectError, DeclarationError, suggestion
 from atwood.expr import Expression, depends_on
@@ -13,6 +13,10 @@ from atwood.model.connectors import Frame
 from atwood.model.flatten import FlatScene
 from atwood.model.local import LocalJoint, LocalPart
 from atwood.model.rotation import FREE, Rotation
+from atwood.topology.groups import connected_groups
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 __all__ = ["WORLD", "Joint", "MechanismGraph", "Node", "build_graph"]
 
@@ -100,14 +104,21 @@ class MechanismGraph:
         Node of each connector (part path, connector name).
     joints
         All joint laws.
-    network
-        The same as a networkx multigraph: nodes by index, an edge with its ``joint`` for each joint.
     """
 
     nodes: tuple[Node, ...]
     node_of: Mapping[tuple[str, str], int]
     joints: tuple[Joint, ...]
-    network: nx.MultiGraph[int]
+
+    @cached_property
+    def network(self) -> nx.MultiGraph[int]:
+        """The same as a networkx multigraph: nodes by index, an edge with its ``joint`` for each joint."""
+        import networkx as nx
+
+        made: nx.MultiGraph[int] = nx.MultiGraph()
+        made.add_nodes_from((node.index, {"name": node.name}) for node in self.nodes)
+        made.add_edges_from((joint.a, joint.b, {"joint": joint}) for joint in self.joints)
+        return made
 
 
 def build_graph(flat: FlatScene, locals_: Mapping[str, LocalPart]) -> MechanismGraph:
@@ -127,21 +138,18 @@ def build_graph(flat: FlatScene, locals_: Mapping[str, LocalPart]) -> MechanismG
     """
     nodes, node_of = _nodes(flat)
     joints = tuple(_joint(path, local, joint, node_of) for path, local in locals_.items() for joint in local.joints)
-    network: nx.MultiGraph[int] = nx.MultiGraph()
-    network.add_nodes_from((node.index, {"name": node.name}) for node in nodes)
-    network.add_edges_from((joint.a, joint.b, {"joint": joint}) for joint in joints)
-    return MechanismGraph(nodes, node_of, joints, network)
+    return MechanismGraph(nodes, node_of, joints)
 
 
 def _nodes(flat: FlatScene) -> tuple[tuple[Node, ...], dict[tuple[str, str], int]]:
     owners: dict[str, tuple[str, str]] = {}
     frames: set[str] = set()
-    meeting: nx.Graph[str] = nx.Graph()
+    meeting: dict[str, None] = {}
     for path, part in flat.parts.items():
         for name, one in part.component.connectors().items():
             full = f"{path}.{name}"
             owners[full] = (path, name)
-            meeting.add_node(full)
+            meeting[full] = None
             if isinstance(one, Frame):
                 frames.add(full)
     for a, b in flat.connections:
@@ -149,12 +157,13 @@ def _nodes(flat: FlatScene) -> tuple[tuple[Node, ...], dict[tuple[str, str], int
             # A connector of a nested model is no leaf's: it only passes the connection on.
             if end not in owners and end.rpartition(".")[0] in flat.parts:
                 raise ConnectError("there is no such connector", where=end, advice=suggestion(end, owners))
-        meeting.add_edge(a, b)
-    _check_frames(meeting, frames, set(owners) - frames)
+        meeting |= {a: None, b: None}
+    met = connected_groups(meeting, flat.connections)
+    _check_frames(met, flat.connections, frames, set(owners) - frames)
     nodes = [Node(WORLD, "world", (), True)]
     node_of: dict[tuple[str, str], int] = {}
     order = {name: i for i, name in enumerate(owners)}
-    groups = [[name for name in group if name in owners] for group in nx.connected_components(meeting)]
+    groups = [[name for name in group if name in owners] for group in met]
     for group in sorted((sorted(g, key=order.__getitem__) for g in groups if g), key=lambda g: order[g[0]]):
         node = Node(len(nodes), group[0], tuple(owners[name] for name in group), any(n in frames for n in group))
         nodes.append(node)
@@ -162,7 +171,9 @@ def _nodes(flat: FlatScene) -> tuple[tuple[Node, ...], dict[tuple[str, str], int
     return tuple(nodes), node_of
 
 
-def _check_frames(meeting: nx.Graph[str], frames: set[str], points: set[str]) -> None:
+def _check_frames(
+    met: Sequence[Sequence[str]], connections: Iterable[tuple[str, str]], frames: set[str], points: set[str]
+) -> None:
     """Refuse frames that meet through a point only: it does not say whether they are welded or hinged.
 
     Raises
@@ -170,11 +181,12 @@ def _check_frames(meeting: nx.Graph[str], frames: set[str], points: set[str]) ->
     ConnectError
         If there are such frames.
     """
-    rigid = meeting.subgraph([name for name in meeting if name not in points])
-    class_of = {name: i for i, group in enumerate(nx.connected_components(rigid)) for name in group}
-    for group in nx.connected_components(meeting):
+    rigid = [name for group in met for name in group if name not in points]
+    direct = [pair for pair in connections if points.isdisjoint(pair)]
+    class_of = {name: i for i, group in enumerate(connected_groups(rigid, direct)) for name in group}
+    for group in met:
         found: dict[int, str] = {}
-        for name in sorted(group & frames):
+        for name in sorted(frames.intersection(group)):
             found.setdefault(class_of[name], name)
         if len(found) > 1:
             first, second = list(found.values())[:2]

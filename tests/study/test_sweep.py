@@ -1,0 +1,359 @@
+"""Sweeps: the same answers as runs one by one, whatever way they are made; nothing is lost, nothing compiles twice."""
+
+import csv
+import json
+import threading
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.io import netcdf_file
+
+from atwood import (
+    ParameterError,
+    ResultError,
+    Scene,
+    StartError,
+    UsageError,
+    assemble,
+    simulate,
+    sweep,
+)
+from atwood.solve.options import RunOptions
+from atwood.study import sweep_batch, sweep_runs
+from atwood.study.cases import make_cases
+from atwood_library import Ground, PointMass, Rod, Rope
+from atwood_library.scenes import SCENES, Chain, DoublePendulum, FourBar
+
+
+def one_by_one(monkeypatch: pytest.MonkeyPatch, *arguments: Any, **options: Any) -> Any:
+    """Return a sweep all of whose runs are made by themselves."""
+    from sys import modules
+
+    with monkeypatch.context() as patch:
+        patch.setattr(modules["atwood.study.sweep"], "why_not_batched", lambda order: "a test wants it so")
+        found = sweep(*arguments, **options)
+    assert found.statistics.batched == 0
+    return found
+
+
+def assert_same(batched: Any, single: Any, tolerance: float = 1e-12) -> None:
+    """Check that all runs of a sweep were made many at a time, and equal those of another sweep."""
+    assert batched.statistics.batched == len(batched) == len(single)
+    assert batched.status == single.status
+    assert_array_equal(batched.steps, single.steps)
+    assert_array_equal(batched.end_time, single.end_time)
+    for path in single.paths:
+        assert_allclose(batched[path], single[path], rtol=tolerance, atol=tolerance * 20.0, err_msg=path)
+
+
+RANDOM = np.random.default_rng(12).uniform(-1.5, 1.5, (4, 12))
+
+CASES = {
+    "starts": {"start": {"rod1.angle": RANDOM[0], "rod2.angle": RANDOM[1]}, "combine": "list"},
+    "speeds": {"start": {"rod1.angle": RANDOM[0], "rod2.angular_velocity": 3.0 * RANDOM[1]}, "combine": "list"},
+    "parts": {"vary": {"bob1.mass": [0.5, 1.0, 2.5], "rod2.length": ["30 cm", "1 m"]}},
+    "bound": {
+        "vary": {"length1": [0.5, 2.0], "mass2": [0.1, 3.0]},
+        "start": {"rod1.angle": ["40 deg", 2.0]},
+    },
+    "gravity": {"vary": {"gravity": [1.6, 3.7, 9.8]}},
+    "forces": {
+        "vary": {"bob1.mass": [0.5, 2.0]},
+        "start": {"rod1.angle": [0.3, 1.0]},
+        "quantities": ["rod1.tension", "bob2"],
+    },
+    "outputs": {"vary": {"bob1.mass": [0.5, 2.0]}, "outputs": 7, "quantities": ["bob2", "rod1.tension"]},
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_many_at_a_time_is_one_by_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    options = {"t_end": 1.0, "threads": 1, **CASES[name]}
+    assert_same(sweep(DoublePendulum(), **options), one_by_one(monkeypatch, DoublePendulum(), **options))
+
+
+def test_starts_that_are_no_coordinates(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = DoublePendulum()
+    scene.start.clear()
+    scene.guess["rod1.angle"] = 0.5
+    options = {"start": {"bob1.position.x": [0.1, 0.4, 0.8]}, "t_end": 0.5, "threads": 1}
+    assert_same(sweep(scene, **options), one_by_one(monkeypatch, scene, **options))
+
+
+def test_each_run_is_that_of_simulate() -> None:
+    found = sweep(DoublePendulum(), {"mass2": [0.5, 2.0]}, start={"rod1.angle": [0.3, 1.0]}, t_end=1.0, outputs=5)
+    assert found.shape == (2, 2)
+    for run in range(4):
+        scene = DoublePendulum(mass2=found.parameters["mass2"][run])
+        scene.start["rod1.angle"] = found.start["rod1.angle"][run]
+        alone = simulate(scene, t_end=1.0, outputs=5)
+        assert_array_equal(alone.time, found.time)
+        assert_allclose(found["rod2.angle"][run], alone["rod2.angle"], rtol=1e-12, atol=1e-12)
+        assert found.steps[run] == alone.statistics.steps
+
+
+@pytest.mark.parametrize("scene", ["double-pendulum", "pendulum-on-cart", "chain", "mass-spring-chain"])
+def test_scenes_of_the_library(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = SCENES[scene]()
+    path = next(iter(assemble(made).flat.start or assemble(made).flat.guess), "")
+    value = assemble(made).flat.start.get(path, 0.1)
+    options = {"start": {path: [value, value + 1e-3]}, "t_end": 0.3, "threads": 1}
+    found, single = sweep(made, **options), one_by_one(monkeypatch, made, **options)
+    assert found.status == single.status
+    for one in single.paths:
+        assert_allclose(found[one], single[one], rtol=1e-11, atol=1e-11)
+
+
+def test_threads_change_nothing() -> None:
+    options = {**CASES["starts"], "t_end": 1.0}
+    alone, together = (sweep(DoublePendulum(), **options, threads=n) for n in (1, 3))
+    for path in alone.paths:
+        assert_array_equal(alone[path], together[path])
+    loops = [sweep(FourBar(), {"crank_length": [0.2, 0.25, 0.3]}, t_end=0.2, threads=n) for n in (1, 3)]
+    assert loops[0].statistics.why_single == "constraints are left among its coordinates"
+    for path in loops[0].paths:
+        assert_array_equal(loops[0][path], loops[1][path])
+
+
+def test_processes_change_nothing() -> None:
+    options = {**CASES["bound"], "t_end": 0.5}
+    alone = sweep(DoublePendulum(), **options, threads=1)
+    with ProcessPoolExecutor(1) as pool:
+        sent = sweep(DoublePendulum(), **options, executor=pool)
+    for path in alone.paths:
+        assert_array_equal(alone[path], sent[path])
+    assert (sent.status, sent.statistics.batched) == (alone.status, len(alone))
+
+
+# -- combining -----------------------------------------------------------------------------------------------------
+
+
+def test_a_grid_has_every_value_with_every_other() -> None:
+    found = sweep(DoublePendulum(), {"mass1": [1.0, 2.0]}, start={"rod1.angle": ["10 deg", 0.5, 1.0]}, t_end=0.1)
+    assert (len(found), found.shape) == (6, (2, 3))
+    assert_array_equal(found.parameters["mass1"], [1, 1, 1, 2, 2, 2])
+    assert_allclose(found.axis("rod1.angle"), [np.pi / 18, 0.5, 1.0])
+    assert_array_equal(found.axis("mass1"), [1.0, 2.0])
+    assert_array_equal(found.grid("rod2.angle"), found.end("rod2.angle").reshape(2, 3))
+    assert found.units["mass1"] == "kg"
+    assert found.units["rod1.angle"] == "rad"
+
+
+def test_a_list_takes_values_together() -> None:
+    found = sweep(DoublePendulum(), {"mass1": [1.0, 2.0]}, start={"rod1.angle": [0.5, 1.0]}, combine="list", t_end=0.1)
+    assert found.shape == (2,)
+    assert_array_equal(found.start["rod1.angle"], [0.5, 1.0])
+    with pytest.raises(UsageError, match="differ in length: mass1 has 2, mass2 has 3"):
+        sweep(DoublePendulum(), {"mass1": [1.0, 2.0], "mass2": [1.0, 2.0, 3.0]}, combine="list")
+
+
+# -- bad input -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("given", "kind", "message"),
+    [
+        ({"vary": {"mas1": [1.0]}}, ParameterError, "mass1"),
+        ({"vary": {"bob3.mass": [1.0]}}, UsageError, "bob1"),
+        ({"vary": {"mass1": ["1 m"]}}, ParameterError, "kg"),
+        ({"vary": {"mass1": [-1.0]}}, ParameterError, "mass1"),
+        ({"vary": {"mass1": 1.0}}, UsageError, "list of values"),
+        ({"vary": {"mass1": []}}, UsageError, "no values"),
+        ({"vary": {"mass1": np.ones((2, 2))}}, UsageError, "one dimension"),
+        ({"vary": {"t_end": [1.0]}}, UsageError, "same for all runs"),
+        ({"start": {"rod1.angel": [1.0]}}, StartError, "rod1.angle"),
+        ({"start": {"rod1.angle": ["1 kg"]}}, StartError, "rad"),
+        ({"vary": {"mass1": [1.0]}, "quantities": ["rod1.angel"]}, ResultError, "rod1.angle"),
+        ({"vary": {"mass1": [1.0]}, "combine": "gird"}, UsageError, "grid"),
+        ({"vary": {"mass1": [1.0]}, "threads": 0}, UsageError, "thread"),
+        ({"vary": {"mass1": [1.0]}, "t_end": -1.0}, UsageError, "after the start"),
+        ({"vary": {"mass1": [1.0]}, "solver": "explict"}, UsageError, "explicit"),
+        ({"vary": {"mass1": [1.0]}, "solver": "explicit", "form": "dae"}, UsageError, "reduced form"),
+        ({"vary": {"mass1": [1.0]}, "rtol": 2.0}, UsageError, "between 0 and 1"),
+        ({}, UsageError, "nothing is varied"),
+    ],
+)
+def test_bad_input_is_said_at_once(given: Any, kind: Any, message: str) -> None:
+    with pytest.raises(kind, match=message) as caught:
+        sweep(DoublePendulum(), **given)
+    assert message in f"{caught.value}"
+
+
+def contradicting() -> Scene:
+    """Return a pendulum whose start is fixed twice over."""
+    scene = Scene()
+    scene.add("ground", Ground())
+    scene.add("rod", Rod(length=1.0))
+    scene.add("bob", PointMass(mass=1.0))
+    scene.connect(scene["ground"].frame, scene["rod"].a)
+    scene.connect(scene["rod"].b, scene["bob"].point)
+    scene.start["rod.angle"] = 0.0
+    return scene
+
+
+@pytest.mark.parametrize("solver", ["auto", "ida"])
+def test_runs_that_fail_are_reported(solver: str) -> None:
+    found = sweep(contradicting(), start={"bob.position.x": [0.0, 0.5, 0.0]}, t_end=0.2, solver=solver)
+    assert found.status == ("finished", "failed", "finished")
+    assert found.failed == (1,)
+    assert "contradict" in found.messages[1]
+    assert np.isnan(found["rod.angle"][1]).all()
+    assert np.isfinite(found["rod.angle"][[0, 2]]).all()
+    assert found.statistics.failed == 1
+
+
+def test_limits_are_those_of_each_run() -> None:
+    options = {"start": {"rod1.angle": [0.0, 2.0, 0.0]}, "t_end": 5.0, "solver": "explicit"}
+    scene = DoublePendulum()
+    scene.start["rod2.angle"] = 0.0
+    free = sweep(scene, **options)
+    found = sweep(scene, **options, max_steps=int(np.max(free.steps)) - 1)
+    assert found.status == ("finished", "step_limit", "finished")
+    assert_array_equal(np.isnan(found.end("rod1.angle")), [False, True, False])
+    assert 0.0 < found.end_time[1] < 5.0
+    assert "steps" in found.messages[1]
+
+
+# -- structure -----------------------------------------------------------------------------------------------------
+
+
+def test_values_that_shape_the_equations_are_assembled_anew() -> None:
+    found = sweep(Chain(), {"links": [2, 3]}, start={"rod[0].angle": [0.1, 0.2]}, t_end=0.2)
+    assert set(found.status) == {"finished"}
+    assert set(found.statistics.reassembled.values()) == {"it has other parts"}
+    assert len(found.statistics.reassembled) == 1  # the other run with three links takes what was made
+    for run, links in enumerate((2, 2, 3, 3)):
+        scene = Chain(links=links)
+        scene.start["rod[0].angle"] = found.start["rod[0].angle"][run]
+        alone = simulate(scene, t_end=0.2, outputs=2)
+        assert_allclose(found.end("rod[0].angle")[run], alone.array("rod[0].angle")[-1], rtol=1e-10)
+
+
+def test_a_mass_of_zero_is_another_scene() -> None:
+    scene = contradicting()
+    found = sweep(scene, {"rod.mass": [0.5, 0.0, 1.0]}, t_end=0.2, start={"rod.angle": [0.3]})
+    assert set(found.status) == {"finished"}
+    assert list(found.statistics.reassembled) == [1]
+    assert "rod.mass" in found.statistics.reassembled[1]
+    for run, mass in enumerate((0.5, 0.0, 1.0)):
+        scene["rod"].mass = mass
+        scene.start["rod.angle"] = 0.3
+        assert_allclose(found.end("rod.angle")[run], simulate(scene, t_end=0.2).array("rod.angle")[-1], rtol=1e-9)
+
+
+def test_events_and_modes() -> None:
+    scene = Scene()
+    scene.add("ground", Ground())
+    scene.add("rope", Rope(length=1.0))
+    scene.add("bob", PointMass(mass=1.0))
+    scene.connect(scene["ground"].frame, scene["rope"].a)
+    scene.connect(scene["rope"].b, scene["bob"].point)
+    scene.start["bob.position.x"] = 0.0
+    scene.start["bob.position.z"] = -1.0
+    found = sweep(scene, start={"bob.velocity.x": [1.0, 5.5]}, t_end=1.0, quantities=["bob.position"])
+    assert found.statistics.why_single
+    for run, speed in enumerate((1.0, 5.5)):
+        scene.start["bob.velocity.x"] = speed
+        alone = simulate(scene, t_end=1.0, outputs=2)
+        assert found.status[run] == alone.status
+        assert_allclose(found.end("bob.position.z")[run], alone.array("bob.position.z")[-1], rtol=1e-9)
+
+
+def test_the_dae_form() -> None:
+    found = sweep(DoublePendulum(), {"mass1": [1.0, 2.0]}, t_end=0.3, form="dae", quantities=["rod1.tension"])
+    assert found.statistics.why_single == "the dae form keeps constraints"
+    reduced = sweep(DoublePendulum(), {"mass1": [1.0, 2.0]}, t_end=0.3, quantities=["rod1.tension"])
+    assert_allclose(found["rod1.tension"], reduced["rod1.tension"], rtol=1e-5)
+
+
+# -- interruption and progress -------------------------------------------------------------------------------------
+
+
+def test_progress_counts_to_the_end() -> None:
+    seen: list[tuple[int, int]] = []
+    sweep(
+        DoublePendulum(), start={"rod1.angle": RANDOM[0]}, t_end=0.2, progress=lambda done, of: seen.append((done, of))
+    )
+    assert seen[-1] == (12, 12)
+    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_what_an_interruption_leaves_is_said(threads: int) -> None:
+    def interrupt(done: int, of: int) -> None:
+        raise KeyboardInterrupt
+
+    found = sweep(
+        FourBar(), {"crank_length": np.linspace(0.2, 0.3, 60)}, t_end=1.0, threads=threads, progress=interrupt
+    )
+    assert "finished" in found.status
+    assert "interrupted" in found.status
+    lost = [run for run, status in enumerate(found.status) if status == "interrupted"]
+    assert np.isnan(found.end(found.paths[0])[lost]).all()
+    assert threading.active_count() < 20
+
+
+# -- files ---------------------------------------------------------------------------------------------------------
+
+
+def made_for_files() -> Any:
+    return sweep(contradicting(), start={"bob.position.x": [0.0, 0.5]}, t_end=0.2, outputs=3, quantities=["bob"])
+
+
+def test_csv(tmp_path: Any) -> None:
+    found = made_for_files()
+    with found.save(tmp_path / "a.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6
+    assert [row["status"] for row in rows] == ["finished"] * 3 + ["failed"] * 3
+    assert float(rows[2]["bob.position.z [m]"]) == found["bob.position.z"][0, 2]
+    assert rows[3]["bob.position.z [m]"] == ""
+
+
+def test_json(tmp_path: Any) -> None:
+    found = made_for_files()
+    data = json.loads(found.save(tmp_path / "a.json").read_text())
+    assert data["quantities"]["bob.position.z"][0] == found["bob.position.z"][0].tolist()
+    assert data["quantities"]["bob.position.z"][1] == [None] * 3
+    assert data["messages"]["1"] == found.messages[1]
+
+
+def test_netcdf(tmp_path: Any) -> None:
+    found = made_for_files()
+    with netcdf_file(str(found.save(tmp_path / "a.nc")), mmap=False) as data:
+        kept = {name: (variable.path.decode(), variable[:].copy()) for name, variable in data.variables.items()}
+        about = json.loads(data.atwood.decode())
+    quantities = dict(one for name, one in kept.items() if name.startswith("quantity"))
+    assert set(quantities) == set(found.paths)
+    for path in found.paths:
+        assert_array_equal(quantities[path], found[path])
+    assert kept["varied_0"][0] == "bob.position.x"
+    assert_array_equal(kept["varied_0"][1], found.start["bob.position.x"])
+    assert about["status"] == ["finished", "failed"]
+
+
+def test_unknown_files_are_refused(tmp_path: Any) -> None:
+    with pytest.raises(UsageError, match="suffix"):
+        made_for_files().save(tmp_path / "a.xyz")
+    with pytest.raises(ResultError, match="bob"):
+        made_for_files()["bob.position.y2"]
+
+
+def order_of(options: RunOptions, scene: Any = None, form: str = "reduced") -> sweep_runs.Order:
+    assembly = assemble(scene or DoublePendulum(), form=form)
+    cases = make_cases(scene or DoublePendulum(), {"gravity": [1.0]}, None, "grid")
+    return sweep_runs.Order(assembly, cases, ("rod1.angle",), np.array([1.0]), True, options)
+
+
+def test_nothing_is_batched_by_mistake() -> None:
+    """Whatever the shortcuts of `sweep_batch` assume is asked for before."""
+    why = sweep_batch.why_not_batched
+    assert why(order_of(RunOptions(1.0))) == ""
+    assert "ida" in why(order_of(RunOptions(1.0, solver="ida")))
+    assert "time" in why(order_of(RunOptions(1.0, max_seconds=1.0)))
+    assert "dae" in why(order_of(RunOptions(1.0), form="dae"))
+    scene = SCENES["slider-crank"]()
+    assert "constraints" in why(order_of(RunOptions(1.0), scene))
