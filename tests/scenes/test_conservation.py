@@ -31,9 +31,9 @@ from atwood_library.scenes import (
     SimplePendulum,
 )
 
-from ..helpers.runs import FORMS
+from ..helpers.runs import EVERYDAY, FORMS
 
-UNDRIVEN = [name for name in SCENES if name != "driven-pendulum"]
+UNDRIVEN = [name for name in EVERYDAY if name != "driven-pendulum"]
 
 
 @pytest.mark.parametrize("form", FORMS)

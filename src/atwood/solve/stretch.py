@@ -216,7 +216,9 @@ class _Runner:
     def _sample(self, session: ExplicitSession, done: int) -> tuple[int, Advance | None]:
         """Let an explicit method fill tables; return how many samples are done, and why it stopped early."""
         stretch, progress = self.stretch, self.stretch.options.progress
-        block = len(stretch.times) if progress is None else -(-len(stretch.times) // _BLOCKS)
+        turning = stretch.plan.balance.turning
+        whole = progress is None and turning.is_plain
+        block = len(stretch.times) if whole else -(-len(stretch.times) // _BLOCKS)
         while done < len(stretch.times):
             times = stretch.times[done : done + block]
             y, _, advance = session.sample(times)
@@ -225,6 +227,9 @@ class _Runner:
             done += count
             if advance.status is not Status.REACHED:
                 return done, advance
+            q, u = stretch.plan.program.split(y[-1])
+            if turning.strays(q):
+                session.reinitialize(float(times[-1]), np.concatenate([turning.normalized(q), u]))
             if progress is not None:
                 progress(float(times[-1]))
         return done, None
