@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
+from dataclasses import replace
 from functools import cache
 from itertools import accumulate
 from math import inf, log2
@@ -51,7 +52,7 @@ class CompiledRecurrences:
         self.size = len(programs.start.inputs[1].symbols)
         order = Part("order", programs.order, positions(programs.pairs, programs.squares, self.size))
         parts = [Part("start", programs.start), order]
-        self.built = build_code(parts, default_options(parts))
+        self.built = build_code(parts, replace(default_options(parts), contract=True))
         self.addresses = self.built.code.addresses
 
     def bind(self, parameter_values: ArrayLike) -> FloatArray:
