@@ -169,8 +169,7 @@ class CompiledStepper:
         n, arrays = self._size, self._arrays
         for name in ("t", "t_old", "t_new"):
             self._set(name, t)
-        for name in ("t_low", "t_old_low", "last"):
-            self._set(name, 0.0)
+        self._set("last", 0.0)
         arrays[: ROWS["y"]] = 0.0
         self._table[:] = 0.0  # nothing that is not finite must be left
         for name in ("y", "new"):
