@@ -18,6 +18,7 @@ from atwood.kernels import BoundKernel
 from atwood.solve.balance import Balance, least_norm, row_scales, solve_balance
 from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
+from atwood.solve.matrices import Matrix, is_full, to_array
 from atwood.solve.rank import RankFinding, find_rank
 from atwood.solve.scales import Scales, coordinate_scales, find_scales
 from atwood.solve.uncompiled import announce, find_uncompiled
@@ -102,7 +103,7 @@ class Plan:
         if not self.dependent:
             return False
         now = self.balance.at(t, q, np.zeros_like(q))
-        better = review_choice(now.slope[list(self.finding.kept)], self.sizes, self.dependent)
+        better = review_choice(to_array(now.slope[list(self.finding.kept)]), self.sizes, self.dependent)
         if better == self.dependent:
             return False
         self.dependent = better
@@ -295,7 +296,7 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     _check_inertia(assembly, now.mass, slope, sizes)
     if finding.starts_singular:
         raise _singular_start(assembly, finding)
-    dependent = choose_dependent(slope, sizes) if assembly.form == "reduced" else ()
+    dependent = choose_dependent(to_array(slope), sizes) if assembly.form == "reduced" else ()
     program = assembly.form_program(_kept_or_none(finding), dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = solve_balance(now, kept, t)
@@ -318,10 +319,17 @@ def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
     )
 
 
-def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, sizes: FloatArray) -> None:
+def _check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatArray) -> None:
     """Refuse a direction in which something can move without inertia."""
     n = mass.shape[0]
     if n == 0:
+        return
+    if not is_full(mass):
+        from atwood.solve.sparse import without_inertia
+
+        moving = without_inertia(mass, slope, sizes)
+        if moving is not None:
+            raise _without_inertia(assembly, moving)
         return
     scaled = mass * sizes[:, None] * sizes[None, :]
     if slope.shape[0]:
@@ -335,9 +343,12 @@ def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, size
     values, vectors = np.linalg.eigh(free @ scaled @ free.T)
     if values[0] > 1e-14 * max(values[-1], 1e-300):
         return
-    moving = np.abs(vectors[:, 0] @ free)
+    raise _without_inertia(assembly, np.abs(vectors[:, 0] @ free))
+
+
+def _without_inertia(assembly: Assembly, moving: FloatArray) -> StartError:
     names = [c.name for c, size in zip(assembly.equations.names, moving, strict=True) if size > 0.1 * np.max(moving)]
-    raise StartError(
+    return StartError(
         f"something without inertia is free to move along {', '.join(names)}: "
         "a force would accelerate it without bound",
         where=names[0].rpartition(".")[0],

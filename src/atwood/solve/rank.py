@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.solve.balance import Balance, independent_rows, row_scales
+from atwood.solve.matrices import Matrix, to_array
+from atwood.solve.matrices import scaled as scale
 
 __all__ = ["RankFinding", "find_rank"]
 
@@ -72,14 +74,16 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
         return RankFinding((), (), 0, 0)
     still = np.zeros_like(q)
 
-    def scaled(position: FloatArray) -> FloatArray:
-        slope = balance.at(t, position, still).slope * scales
-        return slope / row_scales(slope, np.ones_like(scales))[:, None]
+    def scaled(position: FloatArray) -> Matrix:
+        slope = balance.at(t, position, still).slope
+        return scale(slope, scales, row_scales(slope, scales))
 
-    at_start = independent_rows(scaled(q))
-    best = at_start
     matrix = scaled(q)
-    _, sizes, directions = np.linalg.svd(matrix)
+    at_start = independent_rows(matrix)
+    if len(at_start) == count:  # no position has more
+        return RankFinding(tuple(at_start), (), count, count)
+    best = at_start
+    _, sizes, directions = np.linalg.svd(to_array(matrix))
     rank = int(np.sum(sizes > 1e-7 * sizes[0]))
     admissible = directions[rank:]
     asked = 0
