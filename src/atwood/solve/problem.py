@@ -18,6 +18,7 @@ from atwood.kernels import BoundKernel
 from atwood.solve.balance import Balance, balance_of, least_norm, row_scales, solve_balance
 from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
+from atwood.solve.matrices import Matrix, is_full, to_array
 from atwood.solve.rank import RankFinding, find_rank
 from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_names, motion_scales
 from atwood.solve.uncompiled import announce, find_uncompiled
@@ -280,7 +281,7 @@ def _choices(
     balance: Balance, finding: RankFinding, t: float, q: FloatArray, sizes: FloatArray, coordinate_sizes: FloatArray
 ) -> tuple[_Choice, _Choice]:
     """Return what dependent coordinates and dependent speeds are chosen by; the same if there is no difference."""
-    slope = balance.at(t, q, np.zeros_like(sizes)).slope
+    slope = to_array(balance.at(t, q, np.zeros_like(sizes)).slope)
     by_speeds = _Choice(slope[list(finding.kept)], sizes)
     holding = [i for i in finding.kept if i in balance.program.holonomic]
     if balance.turning.is_plain and len(holding) == len(finding.kept):
@@ -362,10 +363,17 @@ def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
     )
 
 
-def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, sizes: FloatArray) -> None:
+def _check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatArray) -> None:
     """Refuse a direction in which something can move without inertia."""
     n = mass.shape[0]
     if n == 0:
+        return
+    if not is_full(mass):
+        from atwood.solve.sparse import without_inertia
+
+        moving = without_inertia(mass, slope, sizes)
+        if moving is not None:
+            raise _without_inertia(assembly, moving)
         return
     scaled = mass * sizes[:, None] * sizes[None, :]
     if slope.shape[0]:
@@ -379,10 +387,13 @@ def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, size
     values, vectors = np.linalg.eigh(free @ scaled @ free.T)
     if values[0] > 1e-14 * max(values[-1], 1e-300):
         return
-    moving = np.abs(vectors[:, 0] @ free)
+    raise _without_inertia(assembly, np.abs(vectors[:, 0] @ free))
+
+
+def _without_inertia(assembly: Assembly, moving: FloatArray) -> StartError:
     every = motion_names(assembly.equations)
     names = [name for name, size in zip(every, moving, strict=True) if size > 0.1 * np.max(moving)]
-    raise StartError(
+    return StartError(
         f"something without inertia is free to move along {', '.join(names)}: "
         "a force would accelerate it without bound",
         where=names[0].rpartition(".")[0],
