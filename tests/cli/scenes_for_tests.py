@@ -1,7 +1,7 @@
 """Scenes that the tests of the command line give as files."""
 
-from atwood import Scene, connect
-from atwood_library import Ground, PointMass, Rod
+from atwood import Scene, connect, log
+from atwood_library import Force, Ground, PointMass, Rod
 
 
 class Swing(Scene):
@@ -32,3 +32,13 @@ def raises():
 
 instance = Swing()
 number = 3
+
+
+def ends():
+    """Return a scene that cannot go on after 0.5 s."""
+    scene = Scene(gravity=0.0, t_end=2.0)
+    bob = scene.add("bob", PointMass())
+    push = scene.add("push", Force(value=lambda t: log(1.0 - 2.0 * t)))
+    scene.connect(push.point, bob.point)
+    scene.start.update({"bob.position.x": 0.0, "bob.position.z": 0.0, "bob.velocity.x": 0.0, "bob.velocity.z": 0.0})
+    return scene

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from atwood.cli import main
-from atwood.cli.output import strict
 from atwood.cli.libraries import GROUP
+from atwood.cli.output import strict
 from atwood.cli.summary import sparkline
 from atwood.result.files import load_result
 
@@ -109,6 +109,37 @@ def test_a_run_is_plotted(tmp_path: Path) -> None:
     file = tmp_path / "swing.svg"
     assert run("run", f"{FILE}:Swing", "--plot", str(file)).exit_code == 0
     assert "<svg" in file.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("solver", ["auto", "ida", "explicit", "taylor"])
+def test_what_came_before_a_failure_is_saved(solver: str, tmp_path: Path) -> None:
+    file = tmp_path / "before.npz"
+    done = run("run", f"{FILE}:ends", "--solver", solver, "--save", str(file), "--json")
+    assert done.exit_code == 1
+    error = json.loads(done.stdout)["error"]
+    assert error["where"] == "push"
+    assert "the input 'value' has no value" in error["message"]
+    assert f"up to t = 0.5 s, is in {file}" in done.stderr
+    saved = load_result(file)
+    assert saved.time[-1] == pytest.approx(0.5, abs=1e-3)
+    assert len(saved.time) > 40
+    assert saved["bob.velocity.x"][-1] == pytest.approx(-0.5, abs=0.01)
+    assert not run("run", f"{FILE}:ends").stdout
+
+
+def test_a_scene_that_cannot_start_saves_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "nothing.npz"
+    done = run("run", f"{FILE}:raises", "--save", str(file))
+    assert done.exit_code == 1
+    assert not file.exists()
+
+
+def test_the_largest_step_and_what_solves_it_are_said() -> None:
+    shown = run("run", f"{FILE}:Swing", "--max-step", "0.01", "--no-progress").stdout
+    assert "Dormand-Prince 8(5,3): no constraints are left" in " ".join(shown.split())
+    data = run_json("run", f"{FILE}:Swing", "--max-step", "0.01")
+    assert data["asked"]["max_step"] == 0.01
+    assert data["solver"]["steps"] >= 100
 
 
 def test_a_limit_ends_a_run_early_and_says_so() -> None:

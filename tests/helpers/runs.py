@@ -14,10 +14,15 @@ from atwood.forms.assembly import Assembly
 from atwood.pipeline import assemble, simulate
 from atwood.solve.problem import Plan, make_plan, pack_state
 from atwood.solve.start import Start, find_start
+from atwood_library.scenes import SCENES
 
 FloatArray = NDArray[np.float64]
 
 FORMS = ("reduced", "dae")
+
+EVERYDAY = [name for name, make in SCENES.items() if make().space != "space" and name != "four-bar-row"]
+"""Scenes on a line and in a plane that come to no singular place; those in space have tests of their own."""
+
 EVERY_FORM = (("reduced", "ggl"), ("dae", "ggl"), ("dae", "index1"), ("dae", "index1-projected"))
 
 

@@ -96,7 +96,7 @@ def test_power_balance_at_any_state(name: str, form: str) -> None:
         if dampers(prepared):
             assembly = prepared.assembly
             program = assembly.known_program(
-                "power", "power", lambda: [applied_power(assembly.mechanism, assembly.equations)]
+                "power", "power", lambda a=assembly: [applied_power(a.mechanism, a.equations)]
             )
             power += assembly.kernel(program)([t], q, u, a, [0.0] * len(assembly.reactions))[0][0]
         if name == "foucault-pendulum":

@@ -10,7 +10,7 @@ import pytest
 
 from atwood_library.scenes import SCENES
 
-from ..helpers.runs import prepare
+from ..helpers.runs import EVERYDAY, prepare
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ TABLE: dict[tuple[str, str], ByHand] = {
 
 
 def test_the_table_is_complete() -> None:
-    assert set(TABLE) == {(name, form) for name in SCENES for form in ("reduced", "dae")}
+    assert set(TABLE) == {(name, form) for name in EVERYDAY for form in ("reduced", "dae")}
 
 
 @pytest.mark.parametrize(("name", "form"), TABLE)

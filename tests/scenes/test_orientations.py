@@ -108,7 +108,7 @@ def test_a_rough_run_goes_on_although_coordinates_shrink(form: str, monkeypatch:
     strayed: list[bool] = []
     strays = Turning.strays
     monkeypatch.setattr(Turning, "strays", lambda self, q: strayed.append(strays(self, q)) or strayed[-1])
-    made = simulate(top(gravity=0.0), form=form, rtol=1e-3, t_end=600.0, outputs=31, solver="ida")
+    made = simulate(top(gravity=0.0), form=form, solver="ida", rtol=1e-3, t_end=600.0, outputs=31)
     assert made.status == "finished"
     assert any(strayed)
     for segment in made.run.segments:

@@ -17,6 +17,7 @@ from atwood import (
     connector,
     cos,
     force,
+    select,
     signal,
     simulate,
     sin,
@@ -28,7 +29,7 @@ from atwood.solve.choice import ASKED, stiffness_of
 from atwood.solve.options import RunOptions
 from atwood.solve.problem import make_plan
 from atwood.solve.start import find_start
-from atwood_library import Damper, Ground, PointMass, Spring
+from atwood_library import Damper, Force, Ground, PointMass, Spring
 from atwood_library.scenes import SCENES
 
 from ..helpers.mechanisms import pendulum_on_a_string
@@ -87,6 +88,25 @@ def test_each_scene_is_given_to_what_suits_it(name: str) -> None:
     assert "the dae form keeps constraints" in dae.solver
 
 
+@pytest.mark.parametrize("name", sorted(set(SCENES) - LOOPS))
+def test_very_accurate_answers_come_from_taylor_series(name: str) -> None:
+    scene = SCENES[name]()
+    results = [simulate(scene, t_end=0.2, rtol=rtol, outputs=3) for rtol in (1.01e-10, 1e-10)]
+    assert [solvers(one) for one in results] == [["explicit"], ["taylor"]]
+    assert "1e-10 or better is asked for" in results[1].solver
+
+
+def test_what_can_die_away_or_has_no_series_stays_with_runge_and_kutta() -> None:
+    assert solvers(simulate(elastic_pendulum(10.0, 1.0), t_end=0.2, rtol=1e-12, outputs=3)) == ["explicit"]
+    scene = Scene(gravity=0.0, t_end=0.2)
+    bob = scene.add("bob", PointMass())
+    push = scene.add("push", Force(value=lambda t: select(t < 0.1, 1.0, 0.0)))
+    scene.connect(push.point, bob.point)
+    scene.start.update({"bob.position.x": 0.0, "bob.position.z": 0.0, "bob.velocity.x": 1.0, "bob.velocity.z": 0.0})
+    result = simulate(scene, rtol=1e-12, outputs=3)
+    assert result.array("bob.velocity.x")[-1] == pytest.approx(1.1, rel=1e-12)
+
+
 @pytest.mark.parametrize("solver", ["ida", "ida-sundae", "explicit"])
 def test_what_is_asked_for_is_used(solver: str) -> None:
     result = simulate(elastic_pendulum(1e4, 3e3), t_end=0.05, solver=solver, outputs=3)
@@ -128,6 +148,18 @@ def test_without_dampers_nothing_is_stiff() -> None:
     q, u = start.coordinates, start.speeds
     plan = make_plan(assembly, 0.0, q, u, start.length, 1.0)
     assert stiffness_of(plan, RunOptions(t_end=1.0), 0.0, q, u) is None
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+def test_what_is_chosen_errs_no_more_than_ida(rtol: float) -> None:
+    scene = SCENES["simple-pendulum"]()
+    errors = []
+    for solver in ("auto", "ida"):
+        result = simulate(scene, rtol=rtol, t_end=5.0, solver=solver)
+        exact = scene.closed_form(result.time)["rod.angle"]
+        errors.append(float(np.max(np.abs(result.array("rod.angle") - exact))))
+    assert errors[0] < 4.0 * errors[1]  # four times at 1e-4, where a step is long; a hundredth at 1e-10
+    assert rtol > 1e-8 or errors[0] < errors[1]
 
 
 def turns_stiff() -> Scene:

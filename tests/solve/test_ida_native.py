@@ -22,12 +22,15 @@ from atwood.solve import ida_native, ida_sundae, sundials_library
 from atwood.solve.driver import Budget, ImplicitProblem, NativeCallbacks, SolverOptions, Status
 from atwood.solve.ida_native import IdaTuning, NativeSession
 from atwood.solve.native_callbacks import Record, address, jacobian_function, residual_function, weight_function
+from atwood_library.scenes import DoublePendulum
+
+from ..helpers.runs import packed, prepare
 
 pytestmark = pytest.mark.skipif(not ida_native.available(), reason=ida_native.why_not() or "available")
 
 GRAVITY = 9.81
 TIGHT = SolverOptions(relative_tolerance=1e-9, absolute_tolerances=1e-11)
-AS_SUNDAE = IdaTuning(newton_coefficient=0.33)
+AS_SUNDAE = IdaTuning(newton_coefficient=0.33, least_growth=2.0, jacobian_age=0.25)
 
 
 def dense_pattern(size: int) -> tuple[Any, Any]:
@@ -291,6 +294,28 @@ class TestTuning:
         assert steps[1][0] < 0.75 * steps[0][0]
         assert steps[1][1] < 1.1 * steps[0][1]
 
+    @pytest.mark.parametrize("form", ["reduced", "dae"])
+    def test_younger_jacobians_reach_the_same_error_with_fewer_residuals(self, form: str) -> None:
+        prepared = prepare(DoublePendulum(), form)
+        plan, n = prepared.plan, len(prepared.q)
+        start = packed(prepared, prepared.q, prepared.u)
+
+        def states(rtol: float, tuning: IdaTuning | None) -> tuple[Any, int]:
+            options = SolverOptions(rtol, plan.tolerances(rtol), horizon=5.0)
+            with ida_native.open_session(plan.problem(), options, 0.0, *start, tuning=tuning) as session:
+                found = [session.advance(float(t)).y[:n] for t in np.linspace(0.25, 5.0, 20)]
+                return np.array(found), session.statistics.residual_evaluations
+
+        exact, _ = states(1e-13, None)
+        as_ida = IdaTuning(least_growth=2.0, jacobian_age=0.25)
+        cost = []
+        for tuning in (as_ida, None):
+            found = [states(float(rtol), tuning) for rtol in np.geomspace(1e-4, 1e-9, 16)]
+            errors = [np.sqrt(np.mean((y - exact) ** 2)) for y, _ in found]
+            fit = np.polyfit(np.log(errors), np.log([count for _, count in found]), 1)
+            cost.append(np.polyval(fit, np.log(1e-5)))
+        assert np.exp(cost[1] - cost[0]) < 0.85
+
     @pytest.mark.parametrize("weights", ["constant", "python", "native"])
     def test_an_angle_that_goes_round_keeps_its_accuracy(self, weights: str) -> None:
         """Far away from zero the same motion must come out, but for the rounding of the angle itself."""
@@ -340,7 +365,15 @@ class TestTuning:
         assert max(seen) <= 1.5
 
     @pytest.mark.parametrize(
-        "change", [{"newton_coefficient": 0.0}, {"angle_size": -1.0}, {"stop_time": math.nan}, {"angle_like": (2,)}]
+        "change",
+        [
+            {"newton_coefficient": 0.0},
+            {"least_growth": 1.0},
+            {"jacobian_age": 1.0},
+            {"angle_size": -1.0},
+            {"stop_time": math.nan},
+            {"angle_like": (2,)},
+        ],
     )
     def test_bad_tuning_is_refused(self, change: dict[str, Any]) -> None:
         with pytest.raises(UsageError):
@@ -374,7 +407,8 @@ class TestCompiled:
         problem = replace(
             oscillator(), native=lambda _: NativeCallbacks(*compiled, user_data=flags.ctypes.data, keep=keep)
         )
-        session = ida_native.open_session(problem, TIGHT, 0.0, np.array([1.0, 0]), np.array([0, -1.0]))
+        start = np.array([1.0, 0]), np.array([0, -1.0])
+        session = ida_native.open_session(problem, TIGHT, 0.0, *start, tuning=AS_SUNDAE)
 
         def release() -> None:
             while not flags[0]:

@@ -14,6 +14,7 @@ import click
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, warn
 from atwood.cli.scenes import prepare
+from atwood.errors import AtwoodError
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
@@ -37,6 +38,7 @@ class RunRequest:
     outputs: int = 201
     max_steps: int | None = None
     max_seconds: float | None = None
+    max_step: float | None = None
     plot: Path | None = None
     save: Path | None = None
     progress: bool = True
@@ -57,21 +59,23 @@ def run_scene(request: RunRequest) -> None:
 
     assembly = assemble(scene, form=request.form, level=request.level, name=name)
     t_start, t_end = assembly.flat.t_start, assembly.flat.t_end if request.t_end is None else request.t_end
-    with progress_bar(request.progress, name, t_start, t_end) as progress:
-        result = simulate(
-            assembly,
-            t_end=request.t_end,
-            rtol=request.rtol,
-            outputs=request.outputs,
-            max_steps=request.max_steps,
-            max_seconds=request.max_seconds,
-            solver=request.solver,
-            progress=progress,
-        )
-    if request.save is not None:
-        result.save(request.save)
-    if request.plot is not None:
-        result.plot(file=request.plot)
+    try:
+        with progress_bar(request.progress, name, t_start, t_end) as progress:
+            result = simulate(
+                assembly,
+                t_end=request.t_end,
+                rtol=request.rtol,
+                outputs=request.outputs,
+                max_steps=request.max_steps,
+                max_seconds=request.max_seconds,
+                max_step=request.max_step,
+                solver=request.solver,
+                progress=progress,
+            )
+    except AtwoodError as error:
+        _keep_what_came_before(error, request)
+        raise
+    _keep(result, request)
     if request.as_json:
         print_json(run_data(result, request))
     else:
@@ -81,6 +85,31 @@ def run_scene(request: RunRequest) -> None:
     if result.status == "interrupted":
         warn(f"Interrupted at t = {result.time[-1]:.6g} s.")
         click.get_current_context().exit(INTERRUPTED)
+
+
+def _keep(result: Result, request: RunRequest) -> None:
+    """Save and plot a run, if that was asked for."""
+    if request.save is not None:
+        result.save(request.save)
+    if request.plot is not None:
+        result.plot(file=request.plot)
+
+
+def _keep_what_came_before(error: AtwoodError, request: RunRequest) -> None:
+    """Save and plot what came before an error, if that was asked for, and say so."""
+    made = getattr(error, "run", None)
+    if made is None or (request.save is None and request.plot is None):
+        return
+    from atwood.result.result import Result
+
+    result = Result(made)
+    try:
+        _keep(result, request)
+    except AtwoodError as other:  # the first error says more
+        warn(f"What came before could not be kept: {other}")
+        return
+    files = " and ".join(str(file) for file in (request.save, request.plot) if file is not None)
+    warn(f"What came before, up to t = {result.time[-1]:.6g} s, is in {files}.")
 
 
 def _check_files(request: RunRequest) -> None:

@@ -42,6 +42,10 @@ def add(a: Expression, b: Expression) -> Expression:
     merged = _merge(a, b, 1.0)
     if merged is not None:
         return merged
+    if a.operation == "sub" and a.arguments[1] is b:
+        return a.arguments[0]
+    if b.operation == "sub" and b.arguments[1] is a:
+        return b.arguments[0]
     return graph.node("add", _in_order(a, b))
 
 
@@ -63,7 +67,25 @@ def subtract(a: Expression, b: Expression) -> Expression:
             return subtract(opposite, a.arguments[0])
         return negate(add(a.arguments[0], b))
     merged = _merge(a, b, -1.0)
-    return graph.node("sub", (a, b)) if merged is None else merged
+    if merged is not None:
+        return merged
+    left = _without(a, b)
+    if left is not None:
+        return left
+    left = _without(b, a)
+    return graph.node("sub", (a, b)) if left is None else negate(left)
+
+
+def _without(a: Expression, b: Expression) -> Expression | None:
+    """Return ``a - b`` if b is one of the two terms of a.
+
+    So the difference of two positions along a chain is the one link between them.
+    """
+    if a.operation == "add" and b in a.arguments:
+        return a.arguments[1] if a.arguments[0] is b else a.arguments[0]
+    if a.operation == "sub" and a.arguments[0] is b:
+        return negate(a.arguments[1])
+    return None
 
 
 def _shift(c: float, b: Expression) -> Expression:

@@ -147,6 +147,11 @@ class Recurrence:
         assert value is not None
         return value
 
+    def or_zero(self, node: Expression) -> Expression:
+        """Return the coefficient of any value."""
+        value = self.of(node)
+        return self.target.zero if value is None else value
+
     def keep(self, node: Expression, value: Expression) -> None:
         """Keep the coefficient of a value that was found together with another."""
         self._series[node.index] = value
@@ -192,12 +197,12 @@ class Recurrence:
         operation, arguments = node.operation, node.arguments
         zero = self.target.zero
         if operation == "select":
-            a, b = (self.of(argument) or zero for argument in arguments[1:])
+            a, b = (self.or_zero(argument) for argument in arguments[1:])
             self._refuse_motion(node, arguments[:1])
             return None if a is b is zero else algebra.select(self.value(arguments[0]), a, b)
         self._refuse_motion(node, arguments)
         if operation in ("minimum", "maximum"):
-            a, b = (self.of(argument) or zero for argument in arguments)
+            a, b = (self.or_zero(argument) for argument in arguments)
             low, high = arguments if operation == "minimum" else arguments[::-1]
             return None if a is b is zero else algebra.select(self.value(algebra.less_equal(low, high)), a, b)
         if operation == "absolute":

@@ -158,7 +158,7 @@ def _system(one: Recurrence, node: Expression) -> Series:
     rests: list[Expression] = []
     opened: list[tuple[int, Convolution]] = []
     for i in range(size):
-        rest = one.of(right[i]) or one.target.zero
+        rest = one.or_zero(right[i])
         for j, entry in enumerate(entries[i * size : (i + 1) * size]):
             moving = one.of(entry)
             if moving is not None:

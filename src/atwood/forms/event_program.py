@@ -62,7 +62,7 @@ def event_program(
 
 def _solve(equations: Equations, kept: Sequence[int]) -> list[Expression] | None:
     """Return accelerations and multipliers of a balance of forces with independent constraints."""
-    graph, n, m = equations.graph, len(equations.coordinates), len(kept)
+    graph, n, m = equations.graph, len(equations.speeds), len(kept)
     if n + m > _LARGEST:
         return None
     at_rest = dict.fromkeys(equations.accelerations, 0.0)
@@ -89,7 +89,7 @@ def _reactions(assembly: Assembly, wanted: set[Expression], kept: Sequence[int])
     solved = _solve(maximal, kept)
     if solved is None:
         return None
-    n = len(maximal.coordinates)
+    n = len(maximal.speeds)
     solution = dict(zip((*maximal.accelerations, *maximal.multipliers), solved, strict=True))
     of_constraint = {one.key: i for i, one in enumerate(maximal.constraints)}
     release = assembly.shared.get(

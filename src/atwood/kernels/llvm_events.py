@@ -163,7 +163,7 @@ def compile_events(program: Program, for_ida: bool) -> EventCode:
         If the program has other inputs or outputs.
     """
     groups = [len(group.symbols) for group in program.inputs]
-    if len(groups) != 4 or groups[0] != 1 or groups[1] != groups[2] or [groups[3]] != [len(program.results)]:
+    if len(groups) != 4 or groups[0] != 1 or [groups[3]] != [len(program.results)]:
         raise UsageError(f"needs the input groups t, q, u and shift, not groups of {groups}", where=program.name)
     part = Part("kernel", program)
     text, exports = _TEXT.format(count=groups[1]), ["events"]

@@ -47,11 +47,15 @@ class CodeOptions:
         How hard LLVM works on the machine code, from 0 to 3.
     sincos
         The C library's function for sine and cosine together, empty where it has none.
+    contract
+        Whether a product and a sum may become one operation, which rounds once: faster, but the last digits are then
+        not those of every other machine.
     """
 
     longest_chunk: int = 150
     level: int = 1
     sincos: str = ""
+    contract: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,7 +91,7 @@ class Part:
     program
         What it computes.
     positions
-        Where the results of the only output group go, if not one after the other.
+        Where all results go in the arrays of their groups, if not one after the other.
     """
 
     name: str
@@ -126,11 +130,20 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
             except UnsupportedError as error:
                 raise UnsupportedError(error.message, where=program.name) from None
         parts.append(_write_prologue(name))
+    if options.contract:
+        parts = [_contracted(text) for text in parts]
     parts.append(more)
     if needs.elimination:
         parts.append(ROUTINES)
     parts.extend(_declarations(needs, options.sincos))
     return ModuleText("\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals))
+
+
+def _contracted(text: str) -> str:
+    """Return code in which products and sums may become one operation."""
+    for operation in ("fadd", "fsub", "fmul", "fneg"):
+        text = text.replace(f"= {operation} double", f"= {operation} contract double")
+    return text
 
 
 def _write_function(name: str, body: Body, layout: Layout, options: CodeOptions, needs: Needs) -> list[str]:

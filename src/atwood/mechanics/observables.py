@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, Scalar, substitute
@@ -155,7 +155,8 @@ def observe(mechanism: Mechanism, equations: Equations, reactions: Sequence[Reac
             _take(mechanism, found, f"{path}.potential_energy", potential, "J", "Potential energy.", False)
     for reaction in reactions:
         found[reaction.path] = Observable(reaction.path, reaction.unit, reaction.doc, False, reaction.symbol)
-    return found
+    # A rate that has no value, as of an angle that never leaves a pole, tells no turns.
+    return {path: one if one.rate in found else replace(one, rate="") for path, one in found.items()}
 
 
 def _take(

@@ -12,26 +12,41 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.program import BalanceProgram
 from atwood.kernels import BoundKernel
+from atwood.solve.matrices import (
+    Matrix,
+    from_entries,
+    independent_rows,
+    is_best_full,
+    is_full,
+    least_norm,
+    row_scales,
+    scaled,
+)
 from atwood.solve.turning import Turning, turning_of
 
-__all__ = ["Balance", "BalanceValues", "balance_of"]
+__all__ = [
+    "Balance",
+    "BalanceValues",
+    "balance_of",
+    "independent_rows",
+    "least_norm",
+    "row_scales",
+    "solve_balance",
+]
 
 FloatArray = NDArray[np.float64]
-
-_RANK = 1e-9
-"""Relative size below which a direction counts as lost."""
 
 
 @dataclass(frozen=True)
 class BalanceValues:
     """The balance ``M a + bias = G^T lambda``, ``G a + gamma = 0`` at one state, along the speeds."""
 
-    mass: FloatArray
+    mass: Matrix
     bias: FloatArray
     value: FloatArray
     rate: FloatArray
     gamma: FloatArray
-    slope: FloatArray
+    slope: Matrix
     drift: FloatArray
 
 
@@ -62,11 +77,9 @@ class Balance:
         """Return the balance at a state."""
         p = self.program
         mass, bias, value, rate, gamma, slope, drift = self.kernel([t], q, u)
-        matrix = np.zeros((p.speeds, p.speeds))
-        matrix[p.mass_rows, p.mass_columns] = mass
-        jacobian = np.zeros((p.constraints, p.speeds))
-        if p.constraints:
-            jacobian[p.slope_rows, p.slope_columns] = slope
+        full = is_best_full((p.speeds, p.speeds), len(mass))
+        matrix = from_entries(p.mass_rows, p.mass_columns, mass, (p.speeds, p.speeds), full)
+        jacobian = from_entries(p.slope_rows, p.slope_columns, slope, (p.constraints, p.speeds), full)
         parts = (np.asarray(x, dtype=float) for x in (bias, value, rate, gamma))
         b, v, r, g = parts
         return BalanceValues(matrix, b, v, r, g, jacobian, np.asarray(drift, dtype=float))
@@ -118,12 +131,12 @@ class Balance:
             if miss == 0.0 or (miss < 1e-11 and miss >= 0.5 * last):
                 break
             last = miss
-            q = self.turning.moved(t, q, -scales * least_norm(slope * scales / rows[:, None], value / rows))
+            q = self.turning.moved(t, q, -scales * least_norm(scaled(slope, scales, rows), value / rows))
         now = self.at(t, q, u)
         rows = row_scales(now.slope, scales)
         for _ in range(2):  # the second pass takes out the rounding of the first
             rate = now.slope @ u + now.drift
-            u = u - scales * least_norm(now.slope * scales / rows[:, None], rate / rows)
+            u = u - scales * least_norm(scaled(now.slope, scales, rows), rate / rows)
         return q, u
 
     def on_positions(self, now: BalanceValues) -> tuple[FloatArray, FloatArray]:
@@ -157,6 +170,13 @@ def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -
     slope = now.slope if kept is None else now.slope[kept]
     gamma = now.gamma if kept is None else now.gamma[kept]
     m = len(gamma)
+    if not is_full(now.mass):
+        from atwood.solve.sparse import solve_bordered
+
+        solved = solve_bordered(now.mass, slope, now.bias, gamma)
+        if solved is None:
+            raise _undetermined(t)
+        return solved[0], solved[1] if m == len(now.gamma) else least_norm(now.slope.T, now.mass @ solved[0] + now.bias)
     matrix = np.zeros((n + m, n + m))
     matrix[:n, :n] = now.mass
     matrix[:n, n:] = -slope.T
@@ -182,34 +202,3 @@ def _undetermined(t: float) -> SolveError:
         f"at t = {t:.6g} the forces do not determine the accelerations",
         advice="Something without mass is free to move here, or the mechanism is in a singular position.",
     )
-
-
-def row_scales(slope: FloatArray, scales: FloatArray) -> FloatArray:
-    """Return the size of each constraint: how much it changes with a displacement of the size that counts."""
-    rows: FloatArray = np.max(np.abs(slope * scales), axis=1, initial=0.0)
-    rows[rows == 0.0] = 1.0
-    return rows
-
-
-def least_norm(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Return the shortest solution of a linear system, or the best where there is none."""
-    return np.asarray(np.linalg.lstsq(matrix, right, rcond=_RANK)[0], dtype=float)
-
-
-def independent_rows(matrix: FloatArray, tolerance: float = 1e-7) -> list[int]:
-    """Return the numbers of rows that depend on none before them (modified Gram-Schmidt, twice for safety)."""
-    kept: list[int] = []
-    basis: list[FloatArray] = []
-    for i, row in enumerate(matrix):
-        size = float(np.linalg.norm(row))
-        if size == 0.0:
-            continue
-        left = row / size
-        for _ in range(2):
-            for direction in basis:
-                left = left - (left @ direction) * direction
-        rest = float(np.linalg.norm(left))
-        if rest > tolerance:
-            kept.append(i)
-            basis.append(left / rest)
-    return kept

@@ -13,12 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from atwood.errors import UsageError, suggestion
+from atwood.errors import AtwoodError, UsageError, suggestion
+from atwood.forms.assembly import Assembly
 from atwood.solve.driver import FloatArray
 from atwood.solve.explicit_scene import explicit_problem
 from atwood.solve.options import SOLVERS, RunOptions
 from atwood.solve.problem import Plan
 from atwood.solve.stiffness import Stiffness, can_be_stiff, find_stiffness
+from atwood.solve.taylor_scene import recurrences
 
 __all__ = [
     "ASKED",
@@ -32,6 +34,9 @@ __all__ = [
 ]
 
 ASKED = "as asked for"
+
+VERY_ACCURATE = 1e-10
+"""From this relative tolerance on Taylor series, whose order follows it, cost least, and err a hundredth as much."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +122,23 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
     found = stiffness_of(plan, options, t, q, u)
     if found is not None and found.is_stiff:
         return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
+    if found is None and options.relative_tolerance <= VERY_ACCURATE and _has_series(assembly):
+        reason = f"no constraints are left among its coordinates, nothing dies away, and {VERY_ACCURATE:g} or better"
+        return Choice(t, "taylor", f"{reason} is asked for")
     return Choice(t, "explicit", "no constraints are left among its coordinates, and it is not stiff")
+
+
+def _has_series(assembly: Assembly) -> bool:
+    """Return whether the accelerations of a scene have Taylor series: nothing switches, nothing is called in Python."""
+
+    def find() -> bool:
+        try:
+            recurrences(assembly)
+        except AtwoodError:
+            return False
+        return True
+
+    return assembly.shared.get("has series", find)
 
 
 def turned_stiff(t: float, found: Stiffness) -> Choice:

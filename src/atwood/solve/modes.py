@@ -17,7 +17,8 @@ from atwood.expr import OutputGroup, Program, depends_on, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import event_program
 from atwood.mechanics.watches import Watch, list_watches
-from atwood.solve.balance import Balance, balance_of, least_norm
+from atwood.solve.balance import Balance, BalanceValues, balance_of, least_norm
+from atwood.solve.matrices import is_full, to_array
 from atwood.solve.problem import Plan
 from atwood.solve.reactions import ReactionSolver, maximal_state
 from atwood.solve.scales import motion_scales
@@ -271,10 +272,8 @@ def _plastic_impact(
     has, can only pull: an impact that would make it push is refused.
     """
     now = balance.at(t, q, u)
-    n, m = len(u), len(now.gamma)
-    matrix = np.block([[now.mass, -now.slope.T], [now.slope, np.zeros((m, m))]])
-    right = np.concatenate([now.mass @ u, -now.drift])
-    solution: FloatArray = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+    n = len(u)
+    solution = _solve_impact(now, u)
     impulses = solution[n:]
     size = float(np.max(np.abs(impulses), initial=0.0))
     for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
@@ -285,6 +284,20 @@ def _plastic_impact(
                 advice="Several ropes that jerk at once, of which some go slack, cannot be solved yet.",
             )
     return solution[:n]
+
+
+def _solve_impact(now: BalanceValues, u: FloatArray) -> FloatArray:
+    """Return velocities after an impact, and impulses: those of least size where constraints depend on each other."""
+    if not is_full(now.mass):
+        from atwood.solve.sparse import solve_bordered
+
+        solved = solve_bordered(now.mass, now.slope, -(now.mass @ u), now.drift)
+        if solved is not None:
+            return np.concatenate(solved)
+    m = len(now.gamma)
+    mass, slope = to_array(now.mass), to_array(now.slope)
+    matrix = np.block([[mass, -slope.T], [slope, np.zeros((m, m))]])
+    return np.asarray(np.linalg.lstsq(matrix, np.concatenate([mass @ u, -now.drift]), rcond=1e-12)[0])
 
 
 def _to_reduced(

@@ -18,6 +18,7 @@ from atwood.kernels import BoundKernel
 from atwood.solve.balance import Balance, balance_of, least_norm, row_scales, solve_balance
 from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
+from atwood.solve.matrices import Matrix, is_full, to_array
 from atwood.solve.rank import RankFinding, find_rank
 from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_names, motion_scales
 from atwood.solve.uncompiled import announce, find_uncompiled
@@ -106,7 +107,7 @@ class Plan:
         """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
         if not self.dependent_speeds:
             return False
-        slope = self.balance.at(t, q, np.zeros_like(self.sizes)).slope
+        slope = to_array(self.balance.at(t, q, np.zeros_like(self.sizes)).slope)
         speeds = review_choice(slope[list(self.finding.kept)], self.sizes, self.dependent_speeds)
         holding = self.balance.holding(self.finding.kept)
         is_same = len(holding) == len(speeds)
@@ -307,7 +308,9 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
         raise _singular_start(assembly, finding)
     dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
     if assembly.form == "reduced" and finding.kept:
-        dependent = choose_dependent(now.slope[balance.holding(finding.kept)], sizes), choose_dependent(slope, sizes)
+        every = to_array(now.slope)
+        chosen = (choose_dependent(every[list(one)], sizes) for one in (balance.holding(finding.kept), finding.kept))
+        dependent = next(chosen), next(chosen)
     program = assembly.form_program(_kept_or_none(finding), *dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = solve_balance(now, kept, t)
@@ -330,10 +333,17 @@ def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
     )
 
 
-def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, sizes: FloatArray) -> None:
+def _check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatArray) -> None:
     """Refuse a direction in which something can move without inertia."""
     n = mass.shape[0]
     if n == 0:
+        return
+    if not is_full(mass):
+        from atwood.solve.sparse import without_inertia
+
+        moving = without_inertia(mass, slope, sizes)
+        if moving is not None:
+            raise _without_inertia(assembly, moving)
         return
     scaled = mass * sizes[:, None] * sizes[None, :]
     if slope.shape[0]:
@@ -347,10 +357,13 @@ def _check_inertia(assembly: Assembly, mass: FloatArray, slope: FloatArray, size
     values, vectors = np.linalg.eigh(free @ scaled @ free.T)
     if values[0] > 1e-14 * max(values[-1], 1e-300):
         return
-    moving = np.abs(vectors[:, 0] @ free)
+    raise _without_inertia(assembly, np.abs(vectors[:, 0] @ free))
+
+
+def _without_inertia(assembly: Assembly, moving: FloatArray) -> StartError:
     every = motion_names(assembly.equations)
     names = [name for name, size in zip(every, moving, strict=True) if size > 0.1 * np.max(moving)]
-    raise StartError(
+    return StartError(
         f"something without inertia is free to move along {', '.join(names)}: "
         "a force would accelerate it without bound",
         where=names[0].rpartition(".")[0],

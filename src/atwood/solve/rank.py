@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.solve.balance import Balance, independent_rows, row_scales
+from atwood.solve.matrices import Matrix, to_array
+from atwood.solve.matrices import scaled as scale
 
 __all__ = ["RankFinding", "find_rank"]
 
@@ -72,14 +74,17 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
         return RankFinding((), (), 0, 0)
     still = np.zeros_like(scales)
 
-    def scaled(position: FloatArray) -> FloatArray:
-        slope = balance.at(t, position, still).slope * scales
-        return slope / row_scales(slope, np.ones_like(scales))[:, None]
+    def scaled(position: FloatArray) -> Matrix:
+        slope = balance.at(t, position, still).slope
+        return scale(slope, scales, row_scales(slope, scales))
 
-    at_start = independent_rows(scaled(q))
+    whole = scaled(q)
+    at_start = independent_rows(whole)
+    if len(at_start) == count:  # no position has more
+        return RankFinding(tuple(at_start), (), count, count)
     best = at_start
     # Constraints on velocities alone keep nothing from being reached.
-    matrix = scaled(q)[balance.holonomic]
+    matrix = to_array(whole)[balance.holonomic]
     _, sizes, directions = np.linalg.svd(matrix)
     rank = int(np.sum(sizes > 1e-7 * np.max(sizes, initial=0.0)))
     admissible = directions[rank:]

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import SolveError, TopologyError, UsageError
+from atwood.errors import AtwoodError, SolveError, StartError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.solve.breaks import find_breaks
 from atwood.solve.choice import Choice, check_solver, choose, describe_choices
 from atwood.solve.driver import Statistics
+from atwood.solve.missing import missing_at
 from atwood.solve.modes import EventProbe, Happening, enter_mode
 from atwood.solve.options import RunOptions, sample_times
 from atwood.solve.problem import Plan, make_plan
@@ -130,7 +131,15 @@ class _Walk:
         self.plan: Plan | None = None
 
     def go(self) -> Run:
-        """Go from mode to mode to the end."""
+        """Go from mode to mode to the end; whatever stops it on the way takes along what came before."""
+        try:
+            return self._go()
+        except AtwoodError as error:
+            if self.segments and not hasattr(error, "run"):
+                error.run = self._run_so_far("failed", error.message)  # type: ignore[attr-defined]
+            raise
+
+    def _go(self) -> Run:
         chatter = 0
         while True:
             before = self.t
@@ -156,7 +165,7 @@ class _Walk:
         """Run one stretch in the present mode."""
         t, q, u, options = self.t, self.q, self.u, self.options
         if self.plan is None:
-            self.plan = make_plan(self.assembly, t, q, u, self.start.length, options.t_end - self.start.time)
+            self.plan = self._plan()
             self.probe = EventProbe(self.plan, t, q, u, options.relative_tolerance)
             self.choice = choose(self.plan, options, t, q, u)
         limit = float(np.min(self.breaks[self.breaks[:, 0] > t, 0], initial=options.t_end))
@@ -171,6 +180,22 @@ class _Walk:
                 self.choices.append(choice)
         self.choice = outcome.choices[-1]
         return recorder, outcome
+
+    def _plan(self) -> Plan:
+        """Return the plan of a mode from the present state; if a law has no value there, it is named."""
+        span = self.options.t_end - self.start.time
+        try:
+            return make_plan(self.assembly, self.t, self.q, self.u, self.start.length, span)
+        except AtwoodError as error:
+            found = missing_at(self.assembly, self.t, self.q, self.u)
+            if found is None:
+                raise
+            raise StartError(
+                f"{found.describe()}, so that there is nothing to start from",
+                where=found.part,
+                advice="Do two points coincide that a spring, damper or rope joins? Give start positions that part "
+                "them; or look at the formula of the law.",
+            ) from error
 
     def _pass_switch(self, recorder: Recorder) -> None:
         """Go on behind a law that switches by the clock."""
@@ -189,8 +214,9 @@ class _Walk:
 
     def _made(self, status: str, message: str, outcome: Outcome) -> Run:
         """Return the run, or raise with it what made it fail."""
-        parts = (tuple(self.segments), tuple(self.happenings), self.statistics, status, message)
-        made = Run(*parts, self.start, self.options, tuple(self.choices))
+        if outcome.error is not None:
+            message = outcome.error.message
+        made = self._run_so_far(status, message)
         if status == "failed":
             error = outcome.error or SolveError(
                 message, where=self.assembly.flat.name, advice="Look at what came before: the error's `run`."
@@ -198,6 +224,10 @@ class _Walk:
             error.run = made  # type: ignore[attr-defined]
             raise error
         return made
+
+    def _run_so_far(self, status: str, message: str) -> Run:
+        parts = (tuple(self.segments), tuple(self.happenings), self.statistics, status, message)
+        return Run(*parts, self.start, self.options, tuple(self.choices))
 
 
 def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:

@@ -16,13 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import KernelEvaluationError, StartError
-from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, jacobian
+from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, jacobian, jvp, live
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
 from atwood.forms.source import no_start_quantity
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.observables import Observable
-from atwood.solve.balance import independent_rows, least_norm, row_scales
+from atwood.solve.matrices import (
+    Matrix,
+    from_entries,
+    independent_rows,
+    is_full,
+    least_norm,
+    row_scales,
+    scaled,
+    to_array,
+)
 from atwood.solve.scales import motion_names, motion_scales, scene_length
 from atwood.solve.turning import Turning, resting_place, roughly_turned, turning_of
 
@@ -151,20 +160,34 @@ def _find_level(assembly: Assembly, equations: Equations, path: str) -> int:
     if path not in observables:
         raise no_start_quantity(path, observables)
     one = observables[path]
-    if depends_on(one.value, [*equations.accelerations, *(r.symbol for r in assembly.reactions)]):
+    reads = {node for node in live([one.value]) if node.is_symbol}
+    late, speeds = assembly.shared.get("start symbols", lambda: _later_symbols(assembly, equations))
+    if not late.isdisjoint(reads):
         raise StartError(
             "it follows from positions and speeds and cannot be chosen at the start",
             where=path,
             advice="Give coordinates, positions and velocities.",
         )
-    if not depends_on(one.value, equations.speeds):
+    own = [symbol for symbol in reads if symbol in speeds]
+    if not own:
         return 0
-    slopes = jacobian([one.value], list(equations.speeds)).entries
-    if any(depends_on(slope, equations.speeds) for slope in slopes):
+    if not _is_linear(one.value, own):
         raise StartError(
             "it is not linear in the speeds and cannot be chosen at the start", where=path, advice="Give velocities."
         )
     return 1
+
+
+def _later_symbols(assembly: Assembly, equations: Equations) -> tuple[frozenset[Expression], frozenset[Expression]]:
+    """Return what is known only after positions and speeds, and the speeds."""
+    late = frozenset([*equations.accelerations, *(one.symbol for one in assembly.reactions)])
+    return late, frozenset(equations.speeds)
+
+
+def _is_linear(value: Expression, speeds: Sequence[Expression]) -> bool:
+    """Return whether an expression is linear in the speeds: its derivative along them does not depend on them."""
+    directions: dict[Expression, Expression | float] = {u: u.graph.symbol(f"direction:{u.name}") for u in speeds}
+    return value.is_symbol or not depends_on(jvp([value], directions)[0], speeds)
 
 
 @dataclass(frozen=True)
@@ -232,13 +255,12 @@ class _System:
         self.targets, self.constraints = targets, made.shape[0] - len(targets)
         self.speeds = len(equations.speeds)
 
-    def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, Matrix]:
         """Return what is missing in each equation, and the derivatives."""
         values, slopes = self.kernel([t], q, u)
-        matrix = np.zeros(self.shape)
-        matrix[self.rows, self.columns] = slopes
+        matrix = from_entries(self.rows, self.columns, slopes, self.shape)
         if self.turning is not None and not self.turning.is_plain:
-            matrix = matrix @ self.turning.tangent(t, q)
+            matrix = to_array(matrix) @ self.turning.tangent(t, q)
         missing = np.asarray(values, dtype=float)
         for i, target in enumerate(self.targets, start=self.constraints):
             missing[i] -= target.value
@@ -249,7 +271,7 @@ class _System:
 
 def _newton(
     system: _System, scales: FloatArray, t: float, q: FloatArray, iterations: int = 60
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, Matrix]:
     """Move to the nearest configuration that fulfils a system; return it with what is missing, scaled."""
     still = np.zeros_like(scales)
     assert system.turning is not None
@@ -259,7 +281,7 @@ def _newton(
         size = float(np.max(np.abs(missing / rows), initial=0.0))
         if size < 1e-15:
             break
-        step = scales * least_norm(matrix * scales / rows[:, None], missing / rows)
+        step = scales * least_norm(scaled(matrix, scales, rows), missing / rows)
         longest = float(np.max(np.abs(step / scales), initial=0.0))
         step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
         for _ in range(8):
@@ -274,7 +296,7 @@ def _newton(
         rows = row_scales(matrix, scales)
     # What hardly changes with any coordinate, as where links line up, is measured by the scene.
     sizes = np.maximum(rows, 1e-4 * max(np.max(rows, initial=0.0), np.max(scales, initial=0.0)))
-    return q, missing / sizes, matrix * scales / rows[:, None]
+    return q, missing / sizes, scaled(matrix, scales, rows)
 
 
 def _solve_positions(
@@ -290,8 +312,9 @@ def _solve_positions(
     q, missing, matrix = _newton(system, scales, t, q)
     if missing.size and not float(np.max(np.abs(missing))) <= _MET:
         _explain_positions(assembly, equations, level, scales, t, q, missing)
-    tangent = turning.tangent(t, q)
+    tangent = None if turning.is_plain else turning.tangent(t, q)
     for chart in equations.charts:  # what turns at all has no orientation, whichever coordinate shows it here
+        assert tangent is not None
         tangent[list(chart.coordinates)] = np.max(np.abs(tangent[list(chart.coordinates)]), axis=0)
     names = [one.name for one in equations.names]
     return q, *_counted(names, tangent, level.fixed, system.constraints, matrix)
@@ -323,9 +346,10 @@ def _far_off(system: _System, t: float, q: FloatArray) -> float:
 def _said(unknowns: Sequence[Expression], targets: Sequence[Target], otherwise: FloatArray) -> tuple[FloatArray, bool]:
     """Return what is said of unknowns themselves, which needs no iteration, and whether that is all that is said."""
     values, is_direct = otherwise.copy(), True
+    places = {symbol: i for i, symbol in enumerate(unknowns)} if targets else {}
     for target in targets:
-        if target.observable.value in unknowns:
-            values[unknowns.index(target.observable.value)] = target.value
+        if target.observable.value in places:
+            values[places[target.observable.value]] = target.value
         else:
             is_direct = False
     return values, is_direct
@@ -419,46 +443,51 @@ def _solve_speeds(
     if level.guessed and not is_direct:
         rough = _System(assembly, equations, level.guessed, False, of_speeds=True)
         missing, matrix = rough.at(t, q, u)
-        u = u - scales * least_norm(matrix * scales, missing)
+        u = u - scales * least_norm(scaled(matrix, scales), missing)
     system = _System(assembly, equations, level.fixed, True, of_speeds=True)
     for _ in range(3):  # linear: the second pass takes out rounding
         missing, matrix = system.at(t, q, u)
         if not np.any(missing):
             break
         rows = row_scales(matrix, scales)
-        u = u - scales * least_norm(matrix * scales / rows[:, None], missing / rows)
+        u = u - scales * least_norm(scaled(matrix, scales, rows), missing / rows)
     missing, matrix = system.at(t, q, u)
     if missing.size:
         rows = row_scales(matrix, scales)
         # Each equation is measured by its own terms, so that what is small beside another speed is not lost.
-        own = np.abs(matrix) @ np.abs(u)
+        own = abs(matrix) @ np.abs(u)
         # What is summed up within an equation rounds, even if all that comes out of it is zero.
-        own += (
-            1e-6 * np.max(np.abs(matrix * scales), axis=1, initial=0.0) * float(np.max(np.abs(u / scales), initial=0.0))
-        )
+        fastest = float(np.max(np.abs(u / scales), initial=0.0))
+        own += 1e-6 * fastest * row_scales(matrix, scales)
         own[system.constraints :] += [abs(x.value) for x in level.fixed]
         share = np.abs(missing) / np.where(own > 0.0, own, 1.0)
         if not float(np.max(share)) <= 1e-8:
             _raise_contradiction(level.fixed, share[system.constraints :], equations)
-        matrix = matrix * scales / rows[:, None]
+        matrix = scaled(matrix, scales, rows)
     names = motion_names(equations)
-    return u, *_counted(names, np.eye(len(u)), level.fixed, system.constraints, matrix)
+    return u, *_counted(names, None, level.fixed, system.constraints, matrix)
 
 
 def _counted(
-    names: Sequence[str], tangent: FloatArray, fixed: Sequence[Target], constraints: int, matrix: FloatArray
+    names: Sequence[str], tangent: FloatArray | None, fixed: Sequence[Target], constraints: int, matrix: Matrix
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return which coordinates or speeds nothing determines, and which fixed values repeat others.
 
-    Of coordinates, `tangent` says how they move with the speeds.
+    Of coordinates, `tangent` says how they move with the speeds; None where each has its own.
     """
-    if not matrix.size:
+    if 0 in matrix.shape:
         return tuple(names), ()
-    kept = independent_rows(matrix)
+    kept = set(independent_rows(matrix))
     repeated = tuple(t.path for i, t in enumerate(fixed, start=constraints) if i not in kept)
+    if len(kept) == matrix.shape[1]:
+        return (), repeated
+    if not is_full(matrix):
+        from atwood.solve.sparse import free_columns
+
+        return tuple(n for n, is_free in zip(names, free_columns(matrix), strict=True) if is_free), repeated
     _, sizes, directions = np.linalg.svd(matrix)
     rank = int(np.sum(sizes > 1e-9 * max(sizes[0], 1e-300))) if sizes.size else 0
-    open_directions = directions[rank:] @ tangent.T
+    open_directions = directions[rank:] if tangent is None else directions[rank:] @ tangent.T
     free = tuple(
         n for i, n in enumerate(names) if open_directions.size and np.max(np.abs(open_directions[:, i])) > 1e-6
     )

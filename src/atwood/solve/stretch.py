@@ -11,6 +11,7 @@ from atwood.errors import SolveError
 from atwood.solve.choice import Choice, stiffness_of, turned_stiff
 from atwood.solve.driver import Advance, Budget, FloatArray, Session, Statistics, Status
 from atwood.solve.explicit_session import ExplicitSession
+from atwood.solve.missing import find_missing, states_ahead
 from atwood.solve.modes import EventProbe, Happening
 from atwood.solve.opening import Order, open_explicit_session, open_implicit_session
 from atwood.solve.options import RunOptions
@@ -76,8 +77,6 @@ class Outcome:
         What solved it, one after the other.
     error
         What went wrong, where that names a part.
-    advance
-        The last answer of a solver that failed.
     """
 
     t: float
@@ -87,7 +86,6 @@ class Outcome:
     choices: tuple[Choice, ...]
     happening: Happening | None = None
     error: SolveError | None = None
-    advance: Advance | None = None
 
 
 def run_stretch(stretch: Stretch, recorder: Recorder, t: float, q: FloatArray, u: FloatArray) -> Outcome:
@@ -175,7 +173,23 @@ class _Runner:
             return replace(self._ended(advance.t, "event", ""), happening=happening)
         if advance.t > self.recorder.end:
             self.recorder.take(advance.t, advance.y, True)
-        return replace(self._ended(advance.t, advance.status.value, advance.message), advance=advance)
+        ended = self._ended(advance.t, advance.status.value, advance.message)
+        return ended if advance.status is not Status.FAILED else replace(ended, error=self._explain(advance))
+
+    def _explain(self, advance: Advance) -> SolveError | None:
+        """Return an error that names what has no value; None if everything has one."""
+        n, assembly, options = self.stretch.plan.program.coordinates, self.stretch.plan.assembly, self.stretch.options
+        q, u, a = advance.y[:n], advance.y[n : 2 * n], advance.yp[n : 2 * n]
+        states = states_ahead(advance.t, q, u, a, options.t_end - self.stretch.choice.time)
+        found = find_missing(assembly, *states)
+        if found is None:
+            return None
+        return SolveError(
+            f"{found.describe()}, so that the run cannot go on: {advance.message}",
+            where=found.part,
+            advice="A law is evaluated where it has no value: look at its formula, and at what the scene does before "
+            "(the error's `run`).",
+        )
 
     def _open(self, t: float, y: FloatArray, yp: FloatArray) -> Session:
         stretch, choice = self.stretch, self.choices[-1]
@@ -216,7 +230,9 @@ class _Runner:
     def _sample(self, session: ExplicitSession, done: int) -> tuple[int, Advance | None]:
         """Let an explicit method fill tables; return how many samples are done, and why it stopped early."""
         stretch, progress = self.stretch, self.stretch.options.progress
-        block = len(stretch.times) if progress is None else -(-len(stretch.times) // _BLOCKS)
+        turning = stretch.plan.balance.turning
+        whole = progress is None and turning.is_plain
+        block = len(stretch.times) if whole else -(-len(stretch.times) // _BLOCKS)
         while done < len(stretch.times):
             times = stretch.times[done : done + block]
             y, _, advance = session.sample(times)
@@ -225,6 +241,9 @@ class _Runner:
             done += count
             if advance.status is not Status.REACHED:
                 return done, advance
+            q, u = stretch.plan.program.split(y[-1])
+            if turning.strays(q):
+                session.reinitialize(float(times[-1]), np.concatenate([turning.normalized(q), u]))
             if progress is not None:
                 progress(float(times[-1]))
         return done, None

@@ -72,6 +72,8 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
     "IDASetSuppressAlg": (c_int, _P, c_int),
     "IDASetNonlinConvCoef": (c_int, _P, _D),
     "IDASetMaxOrd": (c_int, _P, c_int),
+    "IDASetEtaFixedStepBounds": (c_int, _P, _D, _D),
+    "IDASetDeltaCjLSetup": (c_int, _P, _D),
     "IDASetInitStep": (c_int, _P, _D),
     "IDASetMaxStep": (c_int, _P, _D),
     "IDASetStopTime": (c_int, _P, _D),

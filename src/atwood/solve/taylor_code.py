@@ -14,7 +14,7 @@ __all__ = ["COUNTS", "FUNCTIONS", "NUMBERS", "POINTERS", "step_code"]
 
 NUMBERS = (
     *("order_number", "order_inverse", "order_step", "order_tick"),  # what the program of an order is told
-    *("t", "t_low", "t_old", "t_old_low", "t_new", "t_new_low", "time"),
+    *("t", "t_old", "t_new", "time"),
     *("unit", "last", "first", "stop", "stop_time", "share", "allowed", "longest", "reach"),
 )
 COUNTS = (
@@ -226,7 +226,6 @@ entry:
   br label %step
 step:
   %t = load double, ptr %t.at
-  %t_low = load double, ptr %t_low.at
   %reached = fcmp oge double %t, %stop
   br i1 %reached, label %return0, label %going
 going:
@@ -244,27 +243,21 @@ choose:
   %first = select i1 %long, double %chosen, double %longest
   %size = call double @llvm.fabs.f64(double %t)
   %least = fmul double %size, {exact(10.0 * 2.0**-52)}
-  %ahead = fsub double %stop_time, %t
-  %rest = fsub double %ahead, %t_low
   br label %attempt
 attempt:
   %wanted = phi double [ %first, %choose ], [ %shorter, %retreat ]
-  %ends = fcmp oge double %wanted, %rest
-  %h = select i1 %ends, double %rest, double %wanted
+  %sum = fadd double %t, %wanted
+  %ends = fcmp oge double %sum, %stop_time
+  %t_new = select i1 %ends, double %stop_time, double %sum
+  %h = fsub double %t_new, %t
   %moves = fcmp ogt double %h, %least
+  %forward = fcmp ogt double %h, 0.0
   %is_normal = fcmp oge double %h, {exact(1e-300)}
-  %usable = and i1 %moves, %is_normal
+  %is_rest = and i1 %ends, %forward
+  %long.enough = and i1 %moves, %is_normal
+  %usable = or i1 %long.enough, %is_rest
   br i1 %usable, label %try, label %too_small
 try:
-  %low = fadd double %t_low, %h
-  %sum = fadd double %t, %low
-  %part = fsub double %sum, %t
-  %back = fsub double %sum, %part
-  %lost = fsub double %t, %back
-  %kept = fsub double %low, %part
-  %sum.low = fadd double %lost, %kept
-  %t_new = select i1 %ends, double %stop_time, double %sum
-  %t_new_low = select i1 %ends, double 0.0, double %sum.low
   store double %t_new, ptr %t_new.at
   %share = fdiv double %h, %unit
   call void @move(ptr %arrays, i64 %m, i64 %p, double %share)
@@ -284,9 +277,7 @@ retreat:
   br label %attempt
 accept:
   store double %t, ptr %t_old.at
-  store double %t_low, ptr %t_old_low.at
   store double %t_new, ptr %t.at
-  store double %t_new_low, ptr %t_low.at
   store double %h, ptr %last.at
   %stepped = add i64 %steps, 1
   store i64 %stepped, ptr %steps.at
@@ -322,10 +313,8 @@ at_end:
   ret i32 0
 inside:
   %t = load double, ptr %t_old.at
-  %t_low = load double, ptr %t_old_low.at
   %unit = load double, ptr %unit.at
-  %after = fsub double %time, %t
-  %since = fsub double %after, %t_low
+  %since = fsub double %time, %t
   %share = fdiv double %since, %unit
   store double %time, ptr %time.at
   call void @look(ptr %arrays, i64 %m, i64 %p, double %share)

@@ -263,12 +263,14 @@ def _move() -> str:
     moved, slope = _horner(loop)
     loop.keep(slope, "slope")
     high = loop.row("y")
-    low = loop.each("fadd", loop.row("y_low"), moved)
-    total = loop.each("fadd", high, low)
+    total = loop.each("fadd", high, moved)
     part = loop.each("fsub", total, high)
     lost = loop.each("fsub", high, loop.each("fsub", total, part))
-    loop.keep(total, "new")
-    loop.keep(loop.each("fadd", lost, loop.each("fsub", low, part)), "new_low")
+    lost = loop.each("fadd", lost, loop.each("fsub", moved, part))
+    low = loop.each("fadd", loop.row("y_low"), lost)
+    new = loop.each("fadd", total, low)
+    loop.keep(new, "new")
+    loop.keep(loop.each("fsub", low, loop.each("fsub", new, total)), "new_low")
     return loop.function("move", ", i64 %order, double %share", ("share",))
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
+from dataclasses import replace
 from functools import cache
 from itertools import accumulate
 from math import inf, log2
@@ -51,7 +52,7 @@ class CompiledRecurrences:
         self.size = len(programs.start.inputs[1].symbols)
         order = Part("order", programs.order, positions(programs.pairs, programs.squares, self.size))
         parts = [Part("start", programs.start), order]
-        self.built = build_code(parts, default_options(parts))
+        self.built = build_code(parts, replace(default_options(parts), contract=True))
         self.addresses = self.built.code.addresses
 
     def bind(self, parameter_values: ArrayLike) -> FloatArray:
@@ -168,8 +169,7 @@ class CompiledStepper:
         n, arrays = self._size, self._arrays
         for name in ("t", "t_old", "t_new"):
             self._set(name, t)
-        for name in ("t_low", "t_old_low", "last"):
-            self._set(name, 0.0)
+        self._set("last", 0.0)
         arrays[: ROWS["y"]] = 0.0
         self._table[:] = 0.0  # nothing that is not finite must be left
         for name in ("y", "new"):

@@ -45,8 +45,12 @@ __all__ = [
 LOWEST, HIGHEST = 5, 28
 """The orders that are used."""
 
-FACTOR = 0.5
-"""Orders for each factor e of the tolerance: with a half, a step is 1/e^2 of the radius of convergence."""
+FACTOR = 0.65
+"""Orders for each factor e of the tolerance; a step is then e^(-1/FACTOR) of the radius of convergence.
+
+A half is best if an order costs as much as its number of terms; here convolutions are cheap beside what every order
+costs, and 0.6 to 0.7 takes the least time for an error (chains of 2, 10 and 40 links, errors from 1e-3 to 1e-12).
+"""
 
 WATCHED = 4
 """The radius of convergence is estimated from so many last coefficients."""
@@ -96,7 +100,7 @@ class TaylorProblem:
 
 
 def choose_order(options: SolverOptions) -> int:
-    """Return the order that suits a tolerance: Jorba and Zou, equation (11), for the factor 1/2."""
+    """Return the order that suits a tolerance: Jorba and Zou, section 3.1, where the factor is 1/2."""
     found = ceil(1.0 - FACTOR * log(options.relative_tolerance))
     return min(max(found, LOWEST), HIGHEST)
 

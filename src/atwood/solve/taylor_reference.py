@@ -1,7 +1,8 @@
 """The Taylor-series method in Python and NumPy: the reference for the compiled one; see `atwood.solve.taylor_problem`.
 
-State and time are kept with what their last addition rounded off (D. E. Knuth, The Art of Computer Programming,
-volume 2, section 4.2.2, theorem B), so that rounding does not add up over many steps.
+The state is kept with what its additions rounded off (D. E. Knuth, The Art of Computer Programming, volume 2, section
+4.2.2, theorem B), so that rounding does not add up over many steps; and steps are those between two times that are
+exact.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ class ReferenceStepper:
         self._series = np.zeros((p + 1, n))
         self._left, self._right = np.zeros((p + 1, programs.pairs)), np.zeros((p + 1, programs.pairs))
         self._squares = np.zeros((p + 1, programs.squares))
-        self._t = self._t_low = self._t_old = self._t_old_low = 0.0
+        self._t = self._t_old = 0.0
         self._y = self._y_low = self._rates = np.zeros(n)
         self._known: list[float] = []
         self._unit, self._last = 1.0, 0.0
@@ -77,7 +78,6 @@ class ReferenceStepper:
         """Start anew from a state; return whether it has finite rates."""
         self._last = 0.0
         self._t = self._t_old = t
-        self._t_low = self._t_old_low = 0.0
         self._y, self._y_low = y.copy(), np.zeros(self._size)
         found = self._evaluate(t, self._y)
         if found is None:
@@ -109,7 +109,7 @@ class ReferenceStepper:
         if t == self._t:
             return self.state()
         with np.errstate(all="ignore"):
-            y = self._series[0] + self._moved(((t - self._t_old) - self._t_old_low) / self._unit)
+            y = self._series[0] + self._moved((t - self._t_old) / self._unit)
             found = self._evaluate(t, y)
         if found is None or not np.isfinite(y).all():
             raise no_interpolation(t)
@@ -134,21 +134,20 @@ class ReferenceStepper:
             return False
         h = min(self._choose(), self._longest)
         while True:
-            rest = (self._stop_time - self._t) - self._t_low
-            ends = h >= rest
-            h = rest if ends else h
-            if not (h > 10.0 * 2.0**-52 * abs(self._t) and h >= 1e-300):
+            t = min(self._t + h, self._stop_time)
+            h = t - self._t
+            is_rest = t == self._stop_time and h > 0.0  # however short it is
+            if not is_rest and not (h > 10.0 * 2.0**-52 * abs(self._t) and h >= 1e-300):
                 return False
-            t, t_low = (self._stop_time, 0.0) if ends else _add(self._t, self._t_low + h)
             share = h / self._unit
-            y, y_low = _add(self._y, self._y_low + self._moved(share))
+            y, y_low = _add(self._y, self._y_low, self._moved(share))
             found = self._evaluate(t, y)
             if found is not None and self._fits(share, h, y, found[0]):
                 break
             self._counts.failures += 1
             h *= RETREAT
-        self._t_old, self._t_old_low = self._t, self._t_low
-        self._t, self._t_low, self._y, self._y_low = t, t_low, y, y_low
+        self._t_old, self._t = self._t, t
+        self._y, self._y_low = y, y_low
         self._rates, self._known = found
         self._counts.steps += 1
         self._last = h
@@ -228,8 +227,10 @@ class ReferenceStepper:
         return bool(np.all(apart <= self._allowed * sizes))
 
 
-def _add(high: Any, low: Any) -> tuple[Any, Any]:
-    """Return the sum of two numbers, and what was rounded off."""
-    total = high + low
+def _add(high: Any, low: Any, more: Any) -> tuple[Any, Any]:
+    """Return a number, kept with what it leaves out, and something more, in the same way."""
+    total = high + more
     part = total - high
-    return total, (high - (total - part)) + (low - part)
+    low = low + ((high - (total - part)) + (more - part))
+    new = total + low
+    return new, low - (new - total)

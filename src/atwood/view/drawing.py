@@ -1,4 +1,4 @@
-"""The mechanism itself: rods, links, springs, ropes, pulleys and masses, at a few times or moving."""
+"""The mechanism itself: rods, links, springs, ropes, pulleys, masses and bodies, at a few times or moving."""
 
 from __future__ import annotations
 
@@ -13,25 +13,36 @@ from numpy.typing import NDArray
 from atwood.errors import UsageError
 from atwood.result.files import write_atomically
 from atwood.result.result import Result
-from atwood.view.canvas import INK, check_picture, new_figure, save_figure
-from atwood.view.geometry import Picture, make_picture
+from atwood.view.camera import View, as_camera
+from atwood.view.canvas import COLOURS, INK, check_picture, new_figure, save_figure
+from atwood.view.geometry import Picture, find_connectors, make_picture
+from atwood.view.space_drawing import draw_space, frame_space, space_panels
+from atwood.view.space_picture import SpacePicture, make_space_picture
 from atwood.view.strokes import Pen, draw_trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["animate", "plot_mechanism"]
+__all__ = ["animate", "check_view", "plot_mechanism"]
 
 FloatArray = NDArray[np.float64]
 
 
 def plot_mechanism(
-    result: Result, file: str | os.PathLike[str] | None = None, times: Sequence[float] | None = None
+    result: Result,
+    file: str | os.PathLike[str] | None = None,
+    times: Sequence[float] | None = None,
+    *,
+    view: View | None = None,
+    trace: str | Sequence[str] = (),
 ) -> Figure:
     """Draw the mechanism at a few times, with the paths of its masses.
 
-    In the plane all times are drawn in one picture, earlier ones fainter; on a line they stand side by side.
+    In the plane all times are drawn in one picture, earlier ones fainter; on a line and in space they stand side by
+    side. In space a rigid body is drawn as the uniform box, or the uniform cylinder where two of its principal moments
+    are equal, that has its mass and its inertia; what joins it is drawn from what its joints let move. The path of
+    its axis is drawn where the body turns about a point.
 
     Parameters
     ----------
@@ -41,6 +52,12 @@ def plot_mechanism(
         Where to save the picture (``.png``, ``.svg`` or ``.pdf``).
     times
         Times, s; four of the run when not given. The output times nearest to them are drawn.
+    view
+        In space, from where it is seen: azimuth and elevation of the eye, degrees. At (0, 0) it looks along y, with x
+        to the right and z upwards, as in the plane; a positive azimuth takes it to the right, a positive elevation up.
+        (30, 20) when not given.
+    trace
+        Connectors such as ``"rod2.b"`` whose paths are drawn too; the path of a part that has one connector will do.
 
     Returns
     -------
@@ -50,19 +67,43 @@ def plot_mechanism(
     Raises
     ------
     UsageError
-        If matplotlib is missing, a time lies outside the run, or the picture cannot be saved.
-    UnsupportedError
-        If the scene is spatial.
+        If matplotlib is missing, a time lies outside the run, there is no such view, there is no such connector, or the
+        picture cannot be saved.
     """
-    picture = make_picture(result)
+    traced = find_connectors(result, trace)
     moments = _moments(result, times)
-    if picture.direction:
-        figure = _draw_apart(result, picture, moments)
+    if check_view(result, view):
+        figure = _draw_space(result, make_space_picture(result, as_camera(view), traced), moments)
     else:
-        figure = _draw_together(result, picture, moments)
+        picture = make_picture(result, traced.values())
+        drawn = _draw_apart if picture.direction else _draw_together
+        figure = drawn(result, picture, moments, list(traced.values()))
     if file is not None:
         save_figure(figure, file)
     return figure
+
+
+def check_view(result: Result, view: View | None) -> bool:
+    """Return whether a run's scene is in space, or raise an error where a view is given and it is not.
+
+    Parameters
+    ----------
+    result
+        The run.
+    view
+        From where it is to be seen.
+
+    Raises
+    ------
+    UsageError
+        If the scene has one side only.
+    """
+    space = result.assembly.mechanism.space.name
+    if space != "space" and view is not None:
+        where = {"plane": "in a plane", "line": "on a line"}[space]
+        advice = "Leave the view away; only scenes in space have other sides."
+        raise UsageError(f"a scene {where} is always seen from the front", where="view", advice=advice)
+    return space == "space"
 
 
 def _moments(result: Result, times: Sequence[float] | None) -> list[int]:
@@ -77,11 +118,21 @@ def _moments(result: Result, times: Sequence[float] | None) -> list[int]:
     return sorted({int(np.argmin(np.abs(result.time - time))) for time in times})
 
 
-def _draw_together(result: Result, picture: Picture, moments: Sequence[int]) -> Figure:
+def _draw_space(result: Result, picture: SpacePicture, moments: Sequence[int]) -> Figure:
+    """Draw times in panels of their own, each with the paths until then."""
+    titles, name = [f"t = {result.time[moment]:.3g} s" for moment in moments], _name(result)
+    alone = len(moments) == 1
+    figure, panels = space_panels(picture, [f"{name}, {titles[0]}"] if alone else titles, "" if alone else name)
+    for axes, moment in zip(panels, moments, strict=True):
+        draw_space(axes, picture, moment)
+    return figure
+
+
+def _draw_together(result: Result, picture: Picture, moments: Sequence[int], traced: Sequence[int]) -> Figure:
     """Draw all times in one picture, with traces."""
     shown = slice(0, moments[-1] + 1)
     figure, axes, pen = _page(picture, shown)
-    _draw_traces(axes, picture, pen, shown)
+    _draw_traces(axes, picture, pen, shown, traced)
     for rank, moment in enumerate(moments):
         share = 1.0 if len(moments) == 1 else rank / (len(moments) - 1)
         pen.draw(axes, moment, alpha=0.16 + 0.84 * share**1.5, depth=3 + rank)
@@ -90,21 +141,23 @@ def _draw_together(result: Result, picture: Picture, moments: Sequence[int]) -> 
     return figure
 
 
-def _draw_traces(axes: Axes, picture: Picture, pen: Pen, shown: slice) -> None:
-    """Draw the paths of all masses, older parts fainter."""
+def _draw_traces(axes: Axes, picture: Picture, pen: Pen, shown: slice, traced: Sequence[int]) -> None:
+    """Draw the paths of all masses and of chosen nodes, older parts fainter."""
     free = [s for s in pen.heavy if s.nodes[0] not in pen.sliding]
     moving = [s for s in free if np.max(np.ptp(picture.points[s.nodes[0]], axis=0)) > 1e-3 * picture.extent]
     chosen = moving if len(moving) <= _TRACES else moving[-1:]
     for shape in chosen:
         draw_trace(axes, picture.points[shape.nodes[0]][shown], pen.colour(shape))
+    for number, node in enumerate(traced):
+        draw_trace(axes, picture.points[node][shown], COLOURS[(4 + number) % len(COLOURS)])
 
 
 _TRACES = 4
 """With more moving masses than this, only the last one's path is drawn."""
 
 
-def _draw_apart(result: Result, picture: Picture, moments: Sequence[int]) -> Figure:
-    """Draw times side by side, or one below the other for a line that goes across."""
+def _draw_apart(result: Result, picture: Picture, moments: Sequence[int], traced: Sequence[int]) -> Figure:
+    """Draw times side by side, or one below the other for a line that goes across; paths would cover the line."""
     lows, highs = _bounds(picture)
     width, height = highs - lows
     count = len(moments)
@@ -126,7 +179,13 @@ def _draw_apart(result: Result, picture: Picture, moments: Sequence[int]) -> Fig
 
 
 def animate(
-    result: Result, file: str | os.PathLike[str], seconds: float | None = None, frames_per_second: int = 25
+    result: Result,
+    file: str | os.PathLike[str],
+    seconds: float | None = None,
+    frames_per_second: int = 25,
+    *,
+    view: View | None = None,
+    trace: str | Sequence[str] = (),
 ) -> Path:
     """Save the motion as an animated picture.
 
@@ -140,6 +199,8 @@ def animate(
         How long it plays; as long as the run took in its own time when not given, but at most twenty seconds.
     frames_per_second
         Frames in a second.
+    view, trace
+        See `plot_mechanism`.
 
     Returns
     -------
@@ -149,25 +210,34 @@ def animate(
     Raises
     ------
     UsageError
-        If matplotlib is missing or the file cannot be saved.
+        If matplotlib is missing, there is no such view or connector, or the file cannot be saved.
     """
     check_picture(file, (".gif",))
     from matplotlib.animation import FuncAnimation, PillowWriter
 
-    picture = make_picture(result)
     lasting = min(float(result.time[-1] - result.time[0]), 20.0) if seconds is None else seconds
     count = max(2, round(lasting * frames_per_second))
     wanted = np.linspace(result.time[0], result.time[-1], count)
     moments = [int(np.argmin(np.abs(result.time - time))) for time in wanted]
-    figure, axes, pen = _page(picture, None)
-    lows, highs = _bounds(picture)
+    traced = find_connectors(result, trace)
+    if check_view(result, view):
+        seen = make_space_picture(result, as_camera(view), traced)
+        figure, (axes,) = space_panels(seen, [" "])
+    else:
+        picture = make_picture(result, traced.values())
+        figure, axes, pen = _page(picture, None)
+        lows, highs = _bounds(picture)
 
     def show(number: int) -> list[object]:
         axes.clear()
-        _frame(axes, lows, highs)
-        if not picture.direction:
-            _draw_traces(axes, picture, pen, slice(0, moments[number] + 1))
-        pen.draw(axes, moments[number], alpha=1.0, depth=3)
+        if result.assembly.mechanism.space.name == "space":
+            frame_space(axes, seen)
+            draw_space(axes, seen, moments[number])
+        else:
+            _frame(axes, lows, highs)
+            if not picture.direction:
+                _draw_traces(axes, picture, pen, slice(0, moments[number] + 1), list(traced.values()))
+            pen.draw(axes, moments[number], alpha=1.0, depth=3)
         axes.set_title(f"{_name(result)}, t = {wanted[number]:.2f} s", loc="left", fontsize=11, color=INK)
         return []
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import UnsupportedError
+from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.mechanics.build import Mechanism
 from atwood.model.connectors import Groove
@@ -17,7 +17,7 @@ from atwood.model.local import LocalPart
 from atwood.result.result import Result
 from atwood.view.columns import spread_columns
 
-__all__ = ["Kind", "Picture", "Shape", "make_picture"]
+__all__ = ["Kind", "Picture", "Shape", "find_connectors", "make_picture"]
 
 FloatArray = NDArray[np.float64]
 Kind = Literal["ground", "rod", "link", "spring", "damper", "rope", "mass", "pulley", "rail", "pivot"]
@@ -76,25 +76,48 @@ class Picture:
         return float(np.max(np.ptp(everything, axis=0))) or 1.0
 
 
-def make_picture(result: Result) -> Picture:
-    """Return where everything is on the page along a run.
+def find_connectors(result: Result, paths: str | Sequence[str]) -> dict[str, int]:
+    """Return the nodes of connectors.
 
     Parameters
     ----------
     result
         The run.
+    paths
+        Paths of connectors, such as ``"rod2.b"``, or of parts that have a single one.
 
     Raises
     ------
-    UnsupportedError
-        If the scene is spatial.
+    UsageError
+        If there is no such connector.
+    """
+    found = {}
+    nodes = result.assembly.mechanism.graph.node_of
+    known = {f"{part}.{name}": node for (part, name), node in nodes.items()}
+    for path in [paths] if isinstance(paths, str) else paths:
+        below = [one for one in known if one == path or one.rpartition(".")[0] == path]
+        if len(below) > 1:
+            raise UsageError("it has several connectors", where=path, advice=f"Choose one: {', '.join(below)}.")
+        if not below:
+            raise UsageError("there is no such connector", where=path, advice=suggestion(path, known))
+        found[path] = known[below[0]]
+    return found
+
+
+def make_picture(result: Result, also: Iterable[int] = ()) -> Picture:
+    """Return where everything is on the page along a run of a scene in a plane or on a line.
+
+    Parameters
+    ----------
+    result
+        The run.
+    also
+        Nodes that are wanted though nothing is drawn there.
     """
     mechanism = result.assembly.mechanism
-    if mechanism.space.name == "space":
-        raise UnsupportedError("a spatial scene cannot be drawn yet", advice="Plot its quantities over time.")
     shapes = _shapes(mechanism)
     points = _node_points(result)
-    used = {node for shape in shapes for node in shape.nodes}
+    used = {node for shape in shapes for node in shape.nodes} | set(also)
     points = {node: values for node, values in points.items() if node in used}
     direction = ""
     radii: dict[int, float] = {}
