@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import atwood_library as lib
-from atwood import Scene, compare, report, simulate
+from atwood import Scene, compare, report, simulate, sweep
 from atwood.solve.start import find_start
 from atwood.solve.turning import turning_of
 
@@ -88,6 +88,28 @@ def top(**settings: float) -> Scene:
     scene.connect(ball.b, body.frame)
     scene.start.update({"body.spin.x": 2.0, "body.spin.y": 0.0, "body.spin.z": 5.0})
     return scene
+
+
+@pytest.mark.parametrize("solver", ["ida", "ida-sundae", "explicit"])
+def test_every_method_agrees_with_taylor_series(solver: str) -> None:
+    paths = ("body.position.x", "body.x_axis.y", "body.spin.z", "body.kinetic_energy", "ball.force.x")
+    exact = simulate(top(), rtol=1e-13, outputs=11, solver="taylor")
+    other = simulate(top(), rtol=1e-10, outputs=11, solver=solver)
+    for path in paths:
+        assert np.allclose(other.array(path), exact.array(path), atol=1e-6)
+
+
+def test_sweeps_with_orientations_are_those_of_single_runs() -> None:
+    masses, paths = [0.5, 1.0, 2.0], ["body.position.x", "body.x_axis.y", "body.spin.z", "ball.force.x"]
+    settings = {"rtol": 1e-9, "outputs": 5, "solver": "explicit"}
+    swept = sweep(top(), {"body.mass": masses}, quantities=paths, **settings)
+    assert swept.statistics.batched == len(masses)
+    for k, mass in enumerate(masses):
+        scene = top()
+        scene.set("body.mass", mass)
+        alone = simulate(scene, **settings)
+        for path in paths:
+            assert np.allclose(swept[path][k], alone.array(path), atol=1e-9)
 
 
 def test_orientations_are_compared_by_their_axes() -> None:

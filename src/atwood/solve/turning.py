@@ -13,6 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.expr import Program
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.program import RatesProgram
 from atwood.kernels import BoundKernel
@@ -30,51 +31,52 @@ class Turning:
     ----------
     program
         The rates as a program.
-    kernel, many
-        The same, ready to run on one state, and on many; None if the rates are the speeds.
+    kernel
+        Gives the same, ready to run on one state or, vectorized, on many.
     """
 
-    def __init__(
-        self, program: RatesProgram, kernel: BoundKernel | None = None, many: Callable[[], BoundKernel] | None = None
-    ) -> None:
-        self.program, self.kernel, self.many = program, kernel, many
+    def __init__(self, program: RatesProgram, kernel: Callable[[Program, bool], BoundKernel]) -> None:
+        self.program, self._kernel = program, kernel
         self._charts = [np.asarray(chart.coordinates, dtype=np.intp) for chart in program.charts]
 
     @property
     def is_plain(self) -> bool:
         """Whether the rates are the speeds."""
-        return self.kernel is None
+        return self.program.program is None
 
     def rates(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return the derivatives of the coordinates."""
-        return u if self.kernel is None else np.asarray(self.kernel([t], q, u)[0], dtype=float)
+        program = self.program.program
+        return u if program is None else np.asarray(self._kernel(program, False)([t], q, u)[0], dtype=float)
 
     def tangent(self, t: float, q: FloatArray) -> FloatArray:
         """Return B, of shape (coordinates, speeds)."""
-        if self.kernel is None:
+        made = self.program
+        if made.program is None:
             return np.eye(len(q))
-        matrix = np.zeros((self.program.coordinates, self.program.speeds))
-        matrix[self.program.rows, self.program.columns] = self.kernel([t], q, np.zeros(self.program.speeds))[1]
+        matrix = np.zeros((made.coordinates, made.speeds))
+        matrix[made.rows, made.columns] = self._kernel(made.program, False)([t], q, np.zeros(made.speeds))[1]
         return matrix
 
     def moved(self, t: float, q: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return coordinates after a small displacement along the speeds; exact to its first order."""
-        if self.kernel is None:
+        if self.is_plain:
             return q + displacement
         return self.normalized(q + self.tangent(t, q) @ displacement)
 
     def moved_each(self, t: FloatArray, q: FloatArray, displacements: FloatArray) -> FloatArray:
         """Do the same for many states, of shape (states,) and (number, states)."""
-        if self.many is None:
+        made = self.program
+        if made.program is None:
             return q + displacements
-        entries = self.many()(t[None, :], q, np.zeros_like(displacements))[1]
-        matrix = np.zeros((len(t), self.program.coordinates, self.program.speeds))
-        matrix[:, self.program.rows, self.program.columns] = entries.T
+        entries = self._kernel(made.program, True)(t[None, :], q, np.zeros_like(displacements))[1]
+        matrix = np.zeros((len(t), made.coordinates, made.speeds))
+        matrix[:, made.rows, made.columns] = entries.T
         return self.normalized(q + np.einsum("sij,js->is", matrix, displacements))
 
     def difference(self, t: float, q: FloatArray, other: FloatArray) -> FloatArray:
         """Return the displacement that leads from one place to another near by, exact to its first order."""
-        if self.kernel is None:
+        if self.is_plain:
             return other - q
         target = other.copy()
         for chart, kind in zip(self._charts, (one.kind for one in self.program.charts), strict=True):
@@ -161,8 +163,4 @@ def _orientations() -> tuple[tuple[float, ...], ...]:
 
 def turning_of(assembly: Assembly, form: FormName) -> Turning:
     """Return how the coordinates of a scene move in either form."""
-    made = assembly.rates(form)
-    program = made.program
-    if program is None:
-        return Turning(made)
-    return Turning(made, assembly.kernel(program), lambda: assembly.kernel(program, vectorized=True))
+    return Turning(assembly.rates(form), assembly.kernel)

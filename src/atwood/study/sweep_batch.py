@@ -48,8 +48,6 @@ def why_not_batched(order: Order) -> str:
     if assembly.form != "reduced":
         return "the dae form keeps constraints"
     equations = assembly.reduced
-    if equations.charts:
-        return "bodies turn in space"
     if equations.constraints or not equations.coordinates:
         is_free = not equations.constraints
         return "nothing is free to move" if is_free else "constraints are left among its coordinates"
