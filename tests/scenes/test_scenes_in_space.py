@@ -79,7 +79,8 @@ def test_as_few_states_as_by_hand(name: str) -> None:
 @pytest.mark.parametrize("name", SIZES)
 def test_both_forms_agree_at_every_quantity(name: str) -> None:
     span = min(0.5, float(SCENES[name]().t_end))
-    reduced, dae = (simulate(SCENES[name](), form=form, rtol=1e-10, t_end=span, outputs=6) for form in FORMS)
+    rtol = 1e-12 if name in ("gyroscope", "lagrange-top") else 1e-10
+    reduced, dae = (simulate(SCENES[name](), form=form, rtol=rtol, t_end=span, outputs=6) for form in FORMS)
     unique = {path for path in set(reduced.paths) & set(dae.paths) if not _is_shared(name, path)}
     assert all(path.endswith(("phi_rate", "theta_rate", "psi_rate")) for path in set(reduced.paths) ^ set(dae.paths))
     tolerance = ROUGH.get(name, 1e-7)
