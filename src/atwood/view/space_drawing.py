@@ -42,7 +42,7 @@ def draw_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
     model = picture.model
     draw_floor(axes, picture, moment)
     for trail in picture.trails:
-        draw_sphere(axes, picture, trail)
+        draw_sphere(axes, picture.camera, trail)
     stage = Stage(picture.camera, model.unit)
     for piece in model.pieces:
         pose = model.reading.poses[piece.body]
@@ -60,7 +60,7 @@ def draw_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
     for trail in picture.trails:
         _draw_trail(stage, trail, moment)
     stage.paint(axes, 3.0)
-    draw_corner_axes(axes, picture)
+    draw_corner_axes(axes, picture.camera, picture.bounds)
 
 
 def _draw_trail(stage: Stage, trail: Trail, moment: int) -> None:
