@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import atwood
-from atwood import ResultError, Scene, UsageError
+from atwood import Component, Frame, ResultError, Scalar, Scene, UsageError, Vector, connector, constraint, dot
 from atwood.pipeline import simulate
 from atwood.result.result import Result
 from atwood.view.camera import as_camera
@@ -205,6 +205,31 @@ def test_all_joints_and_ties(mixed: Result) -> None:
 def test_a_massless_rod_is_a_rod(results: dict[str, Result]) -> None:
     (tie,) = read_scene(results["spherical-pendulum"]).ties
     assert tie.kind == "rod"
+
+
+class Blade(Component):
+    """It holds the velocity of one frame along an axis of another, and no place."""
+
+    a: Frame = connector(Frame, "Where it stands.")
+    b: Frame = connector(Frame, "What moves.")
+
+    @constraint(reaction="side_force", unit="N", sign=1.0, doc="Force along the axis.")
+    def edge(self) -> Scalar:
+        """Return the velocity along the axis."""
+        return dot(self.b.velocity - self.a.velocity, self.a.to_world(Vector(1.0, 0.0, 0.0)))
+
+
+def test_what_holds_velocities_is_no_rod() -> None:
+    scene = Scene(space="space", gravity=0.0)
+    ground, blade = scene.add("ground", Ground()), scene.add("blade", Blade())
+    body = scene.add("body", RigidBody(mass=1.0, moments=(0.1, 0.1, 0.2)))
+    scene.connect(ground.frame, blade.a)
+    scene.connect(blade.b, body.frame)
+    scene.start.update({"body.position.x": 1.0, "body.velocity.x": 0.0, "body.velocity.y": 1.0})
+    result = simulate(scene, t_end=0.1, rtol=1e-6, outputs=5)
+    reading = read_scene(result)
+    assert (reading.ties, reading.joinings, len(reading.lumps)) == ((), (), 1)
+    assert len(plot_mechanism(result, times=[0.1]).axes) == 1
 
 
 def test_a_gyroscope_has_rings(models: dict[str, SpaceModel]) -> None:
