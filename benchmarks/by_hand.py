@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import shutil
 import subprocess
 import tempfile
@@ -34,16 +35,33 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="atwood-benchmarks-")
 
 
-def load(name: str, flags: str, defines: Mapping[str, object] | None = None) -> ctypes.CDLL | None:
-    """Compile a file and load it; None without a compiler."""
+def load(
+    name: str, flags: str, defines: Mapping[str, object] | None = None, libraries: Sequence[Path] = ()
+) -> ctypes.CDLL | None:
+    """Compile a file and load it; None without a compiler.
+
+    Parameters
+    ----------
+    name
+        The file without its ending.
+    flags
+        How to compile.
+    defines
+        Macros; None defines one without a value.
+    libraries
+        Shared libraries that it calls.
+    """
     found = compiler()
     if found is None:
         return None
-    made = dict(defines or {})
-    target = Path(_folder().name) / ("-".join([name, *map(str, made.values())]).replace(" ", "_") + ".so")
-    command = [found, *flags.split(), "-std=gnu11", "-Wall", "-Wextra", "-shared", "-fPIC"]
-    command += [f"-D{key}={value}" for key, value in made.items()]
-    subprocess.run([*command, str(HERE / f"{name}.c"), "-o", str(target), "-lm"], check=True)
+    made = [f"-D{key}" if value is None else f"-D{key}={value}" for key, value in (defines or {}).items()]
+    text = re.sub(r"[^A-Za-z0-9]+", "_", "".join([name, *made, flags]))
+    target = Path(_folder().name) / f"{text}.so"
+    if not target.exists():
+        command = [found, *flags.split(), "-std=gnu11", "-Wall", "-Wextra", "-shared", "-fPIC", *made]
+        command += [str(HERE / f"{name}.c"), "-o", str(target), *map(str, libraries)]
+        command += [f"-Wl,-rpath,{folder}" for folder in sorted({str(path.parent) for path in libraries})]
+        subprocess.run([*command, "-lm"], check=True)
     return ctypes.CDLL(str(target))
 
 

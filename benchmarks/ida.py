@@ -1,119 +1,120 @@
-"""Time per step of IDA: Atwood's equations, C by hand in the same driver, and scikit-sundae with Python callbacks.
+"""Time per step of IDA: Atwood, a whole program by hand in C against the same library, and Python callbacks.
 
-All solve the stabilised DAE form with the same start, tolerances and shared library.  Atwood and the C by hand also
-have the same driver and options, so they take the same steps but for rounding.
+All solve the stabilised DAE form with the same start and tolerances, and IDA is told the same.  A step is timed inside
+the integration, and a run from making IDA's memory to freeing it.  Atwood and the C by hand then take the same steps
+but for rounding; beyond 90 unknowns Atwood chooses a sparse linear solver, and the C by hand stays dense.  Python
+callbacks are Atwood's driver with the same problem without its compiled functions: plain Python called through ctypes.
+The row of scikit-sundae is the reference driver, with its own options.
 """
 
 from __future__ import annotations
 
-import ctypes
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import by_hand
-import numpy as np
+from atwood_runs import Prepared, ida_session, prepare
+from by_hand_runs import IdaRun, tuned
+from mechanisms import Mechanism, chain, double_pendulum, pendulum
 from timing import best_of, options, print_table, ratio, save
 
-from atwood import Model, simulate
-from atwood.kernels.llvm_ida_text import sundials_layout
-from atwood.solve import ida_native
-from atwood.solve.driver import ImplicitProblem, NativeCallbacks, SolverOptions, Statistics, Status
-from atwood.solve.problem import Plan, pack_state
-from atwood_library.scenes import Chain, DoublePendulum, SimplePendulum
+from atwood.solve import ida_native, ida_sundae
+from atwood.solve.driver import Status
+
+GOAL, GOAL_PYTHON = 1.2, 8.0
+"""Atwood / C at most, and Python callbacks / Atwood at least."""
+
+Measure = Callable[[], tuple[float, float, int]]
+"""A run: its seconds, those of the integration alone, and steps."""
 
 
-def scenes(quick: bool) -> list[tuple[str, Model, int, float]]:
-    """Return name, scene, number of links and end of each case."""
-    found: list[tuple[str, Model, int, float]] = [("pendulum", SimplePendulum(), 1, 10.0)]
-    if not quick:
-        found.append(("double pendulum", DoublePendulum(), 2, 10.0))
-        found.append(("chain of 10", Chain(links=10, mass=0.1), 10, 1.0))
-    return found
+def mechanisms(quick: bool) -> list[Mechanism]:
+    """Return what is timed."""
+    found = [pendulum()]
+    return found if quick else [*found, double_pendulum(), chain(10), chain(40)]
 
 
-def hand_problem(plan: Plan, links: int, flags: str) -> ImplicitProblem | None:
-    """Return the problem with the functions by hand instead of the compiled ones; None without a compiler."""
-    layout = sundials_layout()
-    defines = {
-        "LINKS": links,
-        "VECTOR_DATA": layout.vector_data,
-        "DENSE_DATA": layout.dense_data,
-        "SPARSE_DATA": layout.sparse_data,
-        "SPARSE_VALUES": layout.sparse_values,
-        "SPARSE_POINTERS": layout.sparse_pointers,
-        "INDEX": "int" if layout.index_bytes == 4 else "int64_t",
-    }
-    library = by_hand.load("ggl_chain", flags, defines)
-    if library is None:
-        return None
-    made = plan.problem()
-    rows, columns = np.zeros((2, 36 * links), dtype=np.int32)
-    count = library.prepare(ctypes.c_void_p(rows.ctypes.data), ctypes.c_void_p(columns.ctypes.data))
-    pattern = (rows[:count].astype(np.intp), columns[:count].astype(np.intp))
-    if not all(np.array_equal(a, b) for a, b in zip(pattern, made.pattern, strict=True)):
-        raise SystemExit("the Jacobian by hand has other entries than Atwood's")
-    values = plan.assembly.parameter_values
-    if links == 2:
-        values = values[[0, 2, 1, 3, 4]]
-    values = np.array(values)
+def atwood_measure(prepared: Prepared, rtol: float, python: bool = False) -> Measure:
+    """Return a run with Atwood's driver."""
+    open_session, t_end = ida_session(prepared, rtol, python), prepared.mechanism.t_end
 
-    def address(name: str) -> int:
-        return ctypes.cast(library[name], ctypes.c_void_p).value or 0
+    def run() -> tuple[float, float, int]:
+        began = time.perf_counter()
+        session = open_session()
+        status = session.advance(t_end).status
+        session.close()
+        spent = time.perf_counter() - began
+        if status is not Status.REACHED:
+            raise SystemExit("a run did not reach its end")
+        return spent, session.statistics.seconds, session.statistics.steps
 
-    def native(linear_solver: Any) -> NativeCallbacks:
-        jacobian = "ida_sparse" if linear_solver == "sparse" else "ida_dense"
-        return NativeCallbacks(address("ida_residual"), address(jacobian), values.ctypes.data, keep=(library, values))
-
-    return replace(made, native=native)
+    return run
 
 
-def measures_of(scene: Model, links: int, t_end: float, rtol: float, flags: str) -> dict[str, Callable[[], Statistics]]:
-    """Return what runs each of the three."""
-    arguments: dict[str, Any] = {"form": "dae", "t_end": t_end, "rtol": rtol, "outputs": 2, "samples": 1}
-    first = simulate(scene, solver="ida", **arguments)
-    plan = first.run.segments[0].plan
-    segment = first.run.segments[0]
-    q, u = segment.coordinates[:, 0], segment.speeds[:, 0]
-    y, yp = pack_state(plan, 0.0, q, u)
-    settings = SolverOptions(relative_tolerance=rtol, absolute_tolerances=plan.tolerances(rtol), horizon=t_end)
+def sundae_measure(prepared: Prepared, rtol: float) -> Measure:
+    """Return a run through scikit-sundae."""
+    problem, settings, t_end = prepared.plan.problem(), prepared.settings(rtol), prepared.mechanism.t_end
 
-    def session(problem: ImplicitProblem) -> Callable[[], Statistics]:
-        def run() -> Statistics:
-            with ida_native.open_session(problem, settings, 0.0, y, yp, None, ida_native.IdaTuning()) as made:
-                if made.advance(t_end).status is not Status.REACHED:
-                    raise SystemExit("a run did not reach its end")
-                return made.statistics
+    def run() -> tuple[float, float, int]:
+        began = time.perf_counter()
+        session = ida_sundae.open_session(problem, settings, 0.0, prepared.y, prepared.yp)
+        status = session.advance(t_end).status
+        spent = time.perf_counter() - began
+        if status is not Status.REACHED:
+            raise SystemExit("a run did not reach its end")
+        return spent, session.statistics.seconds, session.statistics.steps
 
-        return run
-
-    found = {"atwood": session(plan.problem())}
-    hand = hand_problem(plan, links, flags)
-    if hand is not None:
-        found["hand"] = session(hand)
-    found["simulate"] = lambda: simulate(scene, solver="ida", **arguments).statistics
-    found["sundae"] = lambda: simulate(scene, solver="ida-sundae", **arguments).statistics
-    return found
+    return run
 
 
-def measure(name: str, scene: Model, links: int, t_end: float, rtol: float, chosen: Any) -> dict[str, Any]:
-    """Time one scene at one tolerance."""
-    runs = measures_of(scene, links, t_end, rtol, chosen.cflags)
+def hand_measure(prepared: Prepared, rtol: float, flags: str) -> Measure:
+    """Return a run by hand, after its answer has been compared with Atwood's."""
+    run = IdaRun(
+        prepared.mechanism,
+        (prepared.y, prepared.yp),
+        rtol,
+        prepared.plan.tolerances(rtol),
+        flags,
+        tuning=tuned(6 * prepared.mechanism.links),
+    )
+    mechanism = prepared.mechanism
+    with ida_session(prepared, rtol)() as session:
+        ours = prepared.at_end(session.advance(mechanism.t_end).y)
+    tight = IdaRun(mechanism, (prepared.y, prepared.yp), 1e-10, prepared.plan.tolerances(1e-10), flags)()[1]
+    own, by_c = mechanism.error(ours, tight), mechanism.error(run()[1], tight)
+    if by_c > 100.0 * own + 1e-9 or (rtol <= 1e-6 and mechanism.links == 1 and by_c > 1e-3):
+        raise SystemExit(f"{mechanism.name}: the C by hand has an error of {by_c:.1e}, Atwood {own:.1e}")
+
+    def measure() -> tuple[float, float, int]:
+        return run()[0], run.seconds, run.steps
+
+    return measure
+
+
+def measure(mechanism: Mechanism, rtol: float, chosen: Any) -> dict[str, Any]:
+    """Time one mechanism at one tolerance."""
+    prepared = prepare(mechanism, "dae")
+    runs: dict[str, Measure] = {"atwood": atwood_measure(prepared, rtol)}
+    if by_hand.compiler():
+        runs["hand"] = hand_measure(prepared, rtol, chosen.cflags)
+    if mechanism.links == 1:
+        runs["python"] = atwood_measure(prepared, rtol, python=True)
+        runs["sundae"] = sundae_measure(prepared, rtol)
     steps: dict[str, int] = {}
+    alone: dict[str, float] = {}
 
-    def timed(key: str, run: Callable[[], Statistics]) -> Callable[[], float]:
-        def once() -> float:
-            statistics = run()
-            steps[key] = statistics.steps
-            return statistics.seconds
+    def timed(key: str) -> float:
+        whole, seconds, steps[key] = runs[key]()
+        alone[key] = min(alone.get(key, seconds), seconds)
+        return whole
 
-        return once
-
-    fast = {key: timed(key, run) for key, run in runs.items() if key != "sundae"}
-    slow = {"sundae": timed("sundae", runs["sundae"])}
-    seconds = best_of(fast, 3 * chosen.repeat) | best_of(slow | {"atwood again": fast["atwood"]}, min(chosen.repeat, 3))
-    seconds["atwood"] = min(seconds["atwood"], seconds.pop("atwood again"))
-    return {"case": name, "rtol": rtol, "seconds": seconds, "steps": steps}
+    repeat = chosen.repeat * (5 if mechanism.links < 40 else 1)
+    fast = {key: partial(timed, key) for key in runs if key in ("atwood", "hand")}
+    slow = {key: partial(timed, key) for key in runs if key not in fast}
+    seconds = best_of(fast, repeat) | best_of(slow, min(chosen.repeat, 3))
+    return {"case": mechanism.name, "rtol": rtol, "seconds": seconds, "alone": alone, "steps": steps}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -125,33 +126,25 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if by_hand.compiler() is None:
         print("no C compiler: nothing by hand to compare with")
     found = [
-        measure(name, scene, links, t_end, rtol, chosen)
-        for name, scene, links, t_end in scenes(chosen.quick)
+        measure(mechanism, rtol, chosen)
+        for mechanism in mechanisms(chosen.quick)
         for rtol in ((1e-6,) if chosen.quick else (1e-4, 1e-6, 1e-8))
     ]
     table = []
     for row in found:
-        seconds, steps = row["seconds"], row["steps"]
-        each = {key: 1e6 * seconds[key] / steps[key] for key in seconds}
-        table.append(
-            [
-                row["case"],
-                f"{row['rtol']:g}",
-                ratio(each["atwood"], each.get("hand")),
-                ratio(seconds["sundae"], seconds["simulate"]),
-                each["atwood"],
-                each.get("hand"),
-                each["sundae"],
-                steps["atwood"],
-                steps.get("hand"),
-                steps["sundae"],
-                1e3 * seconds["simulate"],
-            ]
-        )
-    head = ["scene, dae ggl", "rtol", "Atwood / C", "sundae / Atwood", "Atwood us/step", "C us/step", "sundae us/step"]
-    head += ["Atwood steps", "C steps", "sundae steps", "Atwood run ms"]
-    print_table(f"IDA; C with {chosen.cflags}", head, table)
-    save(chosen.json, found)
+        seconds, alone, steps = row["seconds"], row["alone"], row["steps"]
+        each = {key: 1e6 * alone[key] / steps[key] for key in alone}
+        ours = each["atwood"]
+        table.append([row["case"], f"{row['rtol']:g}", ratio(ours, each.get("hand")), ratio(each.get("python"), ours)])
+        table[-1] += [ratio(seconds["atwood"], seconds.get("hand")), ratio(seconds.get("sundae"), seconds["atwood"])]
+        table[-1] += [each.get(key) for key in ("atwood", "hand", "python", "sundae")]
+        table[-1] += [steps.get(key) for key in ("atwood", "hand", "sundae")]
+        table[-1] += [1e6 * seconds[key] if key in seconds else None for key in ("atwood", "hand")]
+    head = ["dae ggl", "rtol", f"Atwood / C (<= {GOAL:g})", f"Python / Atwood (>= {GOAL_PYTHON:g})"]
+    head += ["a run: Atwood / C", "sundae / Atwood", "Atwood us/step", "C us/step", "Python us/step", "sundae us/step"]
+    head += ["Atwood steps", "C steps", "sundae steps", "Atwood run us", "C run us"]
+    print_table(f"IDA, a step; C with {chosen.cflags}", head, table)
+    save(chosen.json, {"ida": found})
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -14,7 +15,8 @@ from timing import best_of, options, print_table, ratio, save
 
 ROOT = Path(__file__).resolve().parents[1]
 CHAIN = "from atwood_library.scenes import Chain\n\nscene = Chain(links=40, mass=1.0 / 40)\n"
-IMPORTS = ("", "numpy", "atwood", "atwood_library.scenes", "scipy.integrate", "sksundae")
+IMPORTS = ("", "numpy", "atwood", "atwood_library.scenes", "scipy.integrate", "sksundae", "networkx", "sympy")
+PEERS = ("mujoco", "pinocchio", "exudyn", "heyoka", "casadi")
 
 
 def process(arguments: Sequence[str], cache: str = "") -> float:
@@ -53,14 +55,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
             process(["-m", "atwood", "run", *command], warm)  # fill the cache, and write byte code
             measures[f"cold {name}"] = lambda command=command: cold(command)
             measures[f"warm {name}"] = lambda command=command: process(["-m", "atwood", "run", *command], warm)
-        for name in IMPORTS[: 3 if chosen.quick else None]:
+        installed = [name for name in PEERS if importlib.util.find_spec(name) is not None]
+        for name in IMPORTS[:3] if chosen.quick else [*IMPORTS, *installed]:
             measures[f"import {name}"] = lambda name=name: process(["-c", f"import {name}" if name else "pass"])
         best = best_of(measures, repeat)
     rows = [
-        [name, ratio(best[f"cold {name}"], best[f"warm {name}"]), best[f"cold {name}"], best[f"warm {name}"]]
+        [
+            name,
+            ratio(best[f"cold {name}"], best[f"warm {name}"]),
+            best[f"cold {name}"],
+            best[f"warm {name}"],
+            "0.8, 0.5" if name.startswith("double") else "2, -",
+        ]
         for name in runs
     ]
-    print_table("atwood run, whole process", ["scene", "cold / warm", "cold s", "warm s"], rows)
+    print_table("atwood run, whole process", ["scene", "cold / warm", "cold s", "warm s", "goals s"], rows)
     empty = best["import "]
     rows = [
         [name[7:] or "(nothing)", ratio(seconds - empty, empty), seconds - empty, seconds]
@@ -68,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if name.startswith("import ")
     ]
     print_table("Imports", ["module", "/ empty process", "s more", "s in all"], rows)
-    save(chosen.json, best)
+    save(chosen.json, {"startup": best})
 
 
 if __name__ == "__main__":

@@ -53,6 +53,8 @@ def print_table(title: str, head: Sequence[str], rows: Sequence[Sequence[Any]]) 
 def at_error(points: Sequence[tuple[float, float]], target: float) -> float | None:
     """Return the cost of an error, interpolated between logarithms on the curve of measured points.
 
+    It is the cost from which on *all* tighter tolerances are good enough: a single lucky one does not count.
+
     Parameters
     ----------
     points
@@ -63,17 +65,18 @@ def at_error(points: Sequence[tuple[float, float]], target: float) -> float | No
     Returns
     -------
     float or None
-        The cost of the loosest point where that is good enough already; None where no point is good enough.
+        The cost of the loosest point where all are good enough; None where the tightest is not.
     """
-    previous: tuple[float, float] | None = None
-    for error, cost in points:
-        if error <= target:
-            if previous is None or error <= 0.0:
-                return cost
-            share = math.log(previous[0] / target) / math.log(previous[0] / error)
-            return math.exp((1.0 - share) * math.log(previous[1]) + share * math.log(cost))
-        previous = error, cost
-    return None
+    bad = [i for i, (error, _) in enumerate(points) if not error <= target]
+    first = bad[-1] + 1 if bad else 0
+    if first == len(points):
+        return None
+    error, cost = points[first]
+    if first == 0 or error <= 0.0 or not math.isfinite(points[first - 1][0]):
+        return cost
+    worse, cheaper = points[first - 1]
+    share = math.log(worse / target) / math.log(worse / error)
+    return math.exp((1.0 - share) * math.log(cheaper) + share * math.log(cost))
 
 
 def peer(name: str) -> ModuleType | None:
@@ -85,7 +88,9 @@ def peer(name: str) -> ModuleType | None:
         return None
 
 
-def options(description: str | None, arguments: Sequence[str] | None, *, plot: bool = False) -> argparse.Namespace:
+def options(
+    description: str | None, arguments: Sequence[str] | None, *, plot: bool = False, scenes: Sequence[str] = ()
+) -> argparse.Namespace:
     """Read the options that all scripts have."""
     parser = argparse.ArgumentParser(description=(description or "").split("\n")[0])
     parser.add_argument("--quick", action="store_true", help="the smallest cases only, hardly repeated: does it run?")
@@ -93,7 +98,9 @@ def options(description: str | None, arguments: Sequence[str] | None, *, plot: b
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was measured to a file")
     parser.add_argument("--cflags", default="-O3 -march=native", help="how the C by hand is compiled")
     if plot:
-        parser.add_argument("--plot", type=Path, metavar="FILE", help="draw work-precision diagrams")
+        parser.add_argument("--plot", type=Path, metavar="FOLDER", help="draw work-precision diagrams there")
+    if scenes:
+        parser.add_argument("--scenes", nargs="+", choices=scenes, default=scenes, help="which ones; all")
     chosen = parser.parse_args(arguments)
     if chosen.quick:
         chosen.repeat = 1
@@ -101,7 +108,9 @@ def options(description: str | None, arguments: Sequence[str] | None, *, plot: b
 
 
 def save(path: Path | None, results: object) -> None:
-    """Write results as JSON, if a file was asked for."""
+    """Write results as JSON, if a file was asked for; what it has of other scenes or scripts is kept."""
     if path is not None:
+        if isinstance(results, dict) and path.exists():
+            results = json.loads(path.read_text(encoding="utf-8")) | results
         path.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
         print(f"\nwritten: {path}")

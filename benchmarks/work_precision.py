@@ -1,185 +1,197 @@
 """Milliseconds for an error: the double pendulum over 10 s, chains of 10 and 40 links over 1 s.
 
-The error is the largest of the angles (double pendulum) or of the tip's position (chains) at the end, against
-a solution at a much tighter tolerance.  Times are those of the integration alone.
+The error is the largest of the angles (double pendulum) or of the tip's position (chains) at the end, against an
+extrapolation in 128 bits.  What is timed is the integration: for Atwood and the C by hand from making the solver's
+memory to the state at the end, everything compiled; for the others the call that integrates.  "Atwood simulate" is the
+whole public call on an assembled scene: start, run, 400 samples, result.
 """
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+import atwood_runs as atwood
+import by_hand_runs as hand
 import numpy as np
-import peers
-from timing import at_error, best_of, options, peer, print_table, ratio, save
+import peer_runs as other
+from drawing import draw
+from mechanisms import FloatArray, Mechanism, chain, double_pendulum
+from timing import at_error, options, peer, print_table, ratio, save
 
-from atwood import AtwoodError, Model, assemble, simulate
-from atwood_library.scenes import Chain, DoublePendulum
+from atwood.errors import AtwoodError
+from atwood.solve.options import SOLVERS
 
-TARGETS = (1e-3, 1e-6, 1e-9)
+TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 
-EARLIER: dict[str, dict[str, tuple[float | None, ...]]] = {
-    "double pendulum": {
-        "C by hand, order 8(5,3)": (0.069, 0.150, 0.32),
-        "heyoka (Taylor)": (0.119, 0.176, 0.176),
-        "Pinocchio, RK4 in C++ / with SciPy": (3.7, 7.4, 28.0),
-        "Exudyn": (3.7, 11.5, 37.0),
-        "MuJoCo RK4": (9.2, 24.0, 170.0),
-        "C by hand with IDA, stabilised DAE": (3.8, 17.5, None),
-        "sympy (Kane) with SciPy": (36.0, 74.0, 237.0),
-    },
-    "chain of 10": {
-        "C by hand, order 8(5,3)": (0.072, 0.18, 0.33),
-        "heyoka (Taylor)": (0.51, 0.51, 0.68),
-        "Pinocchio, RK4 in C++ / with SciPy": (10.0, 18.0, 43.0),
-        "Exudyn": (6.7, 28.0, 79.0),
-        "MuJoCo RK4": (3.8, 9.8, 36.0),
-        "C by hand with IDA, stabilised DAE": (2.0, 7.0, None),
-        "sympy (Kane) with SciPy": (27.0, 51.0, 87.0),
-    },
-    "chain of 40": {
-        "C by hand, order 8(5,3)": (0.84, 1.6, 2.1),
-        "heyoka (Taylor)": (5.1, 5.1, 18.0),
-        "Pinocchio, RK4 in C++ / with SciPy": (40.0, 81.0, 81.0),
-        "Exudyn": (395.0, 395.0, 1712.0),
-        "MuJoCo RK4": (26.0, 138.0, None),
-        "C by hand with IDA, stabilised DAE": (18.0, 81.0, 169.0),
-    },
-}
-"""Milliseconds at `TARGETS`, measured on one quiet core before the project began."""
+C, C_IDA = "C by hand, order 8(5,3)", "C by hand, IDA ggl"
+EXPLICIT, TAYLOR = "Atwood explicit", "Atwood taylor"
+IDA, HEYOKA = "Atwood IDA ggl", "heyoka"
 
-WAYS = {
-    "Atwood explicit": ("reduced", "explicit", 1e-14),
-    "Atwood IDA reduced": ("reduced", "ida", 1e-12),
-    "Atwood IDA dae ggl": ("dae", "ida", 1e-12),
-}
+JUDGED = [(EXPLICIT, C, 1.5), (TAYLOR, C, 1.5), (EXPLICIT, HEYOKA, 1.0), (TAYLOR, HEYOKA, 1.0), (IDA, C_IDA, 1.2)]
+"""Who is compared with whom, and what the ratio should be at most."""
 
-Run = Callable[[], tuple[float, Any]]
+SLOW = 0.7
+"""Seconds that all repetitions of one run may take."""
+
+Run = Callable[[], tuple[float, FloatArray]]
+Make = Callable[[float], Run]
 
 
-def turned(difference: Any) -> Any:
-    """Return differences of angles without whole turns."""
-    return (difference + np.pi) % (2.0 * np.pi) - np.pi
+def powers(first: float, last: float, step: float = 1.0) -> list[float]:
+    """Return powers of ten, from 10^-first to 10^-last."""
+    return [float(10.0**-k) for k in np.arange(first, last + 0.5 * step, step)]
 
 
-def atwood_run(assembly: Any, solver: str, rtol: float, t_end: float, paths: Sequence[str]) -> tuple[float, Any]:
-    """Return seconds and the quantities at the end."""
-    result = simulate(assembly, solver=solver, rtol=rtol, t_end=t_end, outputs=2, samples=1)
-    return result.statistics.seconds, np.array([result.array(path)[-1] for path in paths])
+def ways(mechanism: Mechanism, flags: str, quick: bool) -> dict[str, tuple[list[float], Make]]:
+    """Return the tolerances of each way to solve a mechanism, from loose to tight, and what makes its runs."""
+    reduced, dae = atwood.prepare(mechanism, "reduced"), atwood.prepare(mechanism, "dae")
+    fine, coarse = powers(1.5, 14, 0.5), powers(2, 12)
+    found: dict[str, tuple[list[float], Make]] = {}
+    if hand.by_hand.compiler():
+        absolute = dae.plan.tolerances(1.0)
+        links = slice(4 * mechanism.links, None)
+
+        def ida_by_hand(rtol: float, tuning: hand.Tuning, band: bool) -> Run:
+            allowed = absolute * rtol
+            allowed[links] = absolute[links]
+            start = (dae.y, dae.yp)
+            return hand.IdaRun(mechanism, start, rtol, allowed, flags, tuning=tuning, band=band)
+
+        told = hand.tuned(6 * mechanism.links)
+        found[C] = fine, lambda rtol: hand.explicit_run(mechanism, rtol, flags)  # type: ignore[dict-item, return-value]
+        found[C_IDA] = coarse, partial(ida_by_hand, tuning=hand.PLAIN, band=False)
+        found[f"{C_IDA}, Atwood's options"] = coarse, partial(ida_by_hand, tuning=told, band=False)
+        if mechanism.links > 2:
+            found[f"{C_IDA}, band solver"] = coarse, partial(ida_by_hand, tuning=hand.PLAIN, band=True)
+            found[f"{C_IDA}, Atwood's options, band solver"] = coarse, partial(ida_by_hand, tuning=told, band=True)
+    found[EXPLICIT] = fine, partial(atwood.explicit_run, reduced)
+    if "taylor" in SOLVERS:
+        found[TAYLOR] = [*fine, 1e-15], partial(atwood.taylor_run, reduced)
+    found[IDA] = coarse, partial(atwood.ida_run, dae)
+    found["Atwood IDA reduced"] = coarse, partial(atwood.ida_run, reduced)
+    found["Atwood simulate, explicit"] = powers(2, 14), partial(atwood.whole_run, reduced, "explicit")
+    return found if quick else found | others(mechanism)
 
 
-def scipy_run(rates: Any, rtol: float) -> tuple[float, Any]:
-    """Return seconds and the angles at the end, by SciPy."""
-    from scipy.integrate import solve_ivp
+def others(mechanism: Mechanism) -> dict[str, tuple[list[float], Make]]:
+    """Return the ways of other packages that are installed."""
+    found: dict[str, tuple[list[float], Make]] = {}
+    steps = powers(1.5, 5 if mechanism.links < 40 else 4.5, 0.5)
 
-    start = [np.pi / 2.0, np.pi / 2.0, 0.0, 0.0]
-    began = time.perf_counter()
-    made = solve_ivp(rates, (0.0, 10.0), start, method="DOP853", rtol=rtol, atol=rtol)
-    return time.perf_counter() - began, made.y[:2, -1]
+    def fixed(make: Callable[[int], Run]) -> Make:
+        return lambda share: make(round(1.0 / share))
+
+    if heyoka := peer("heyoka"):
+        found[HEYOKA] = powers(2, 17), partial(other.heyoka_run, heyoka, mechanism)
+    if pinocchio := peer("pinocchio"):
+        found["Pinocchio aba, SciPy DOP853"] = powers(2, 13), partial(other.pinocchio_run, pinocchio, mechanism)
+        rk4 = partial(other.pinocchio_rk4_run, pinocchio, mechanism)
+        found["Pinocchio aba, RK4 in Python"] = steps, fixed(rk4)
+    if exudyn := peer("exudyn"):
+        found["Exudyn, RK67"] = [h for h in steps if h > 2e-5], fixed(partial(other.exudyn_run, exudyn, mechanism))
+    if mujoco := peer("mujoco"):
+        found["MuJoCo RK4"] = steps, fixed(partial(other.mujoco_run, mujoco, mechanism))
+    if mechanism.links <= 10 and peer("sympy"):
+        found["sympy Kane, SciPy DOP853"] = powers(2, 13), partial(other.kane_run, mechanism)
+    return found
 
 
-def curves(name: str, scene: Model, t_end: float, paths: Sequence[str], chosen: Any) -> dict[str, Any]:
-    """Return the work-precision points of every way to solve a scene."""
-    angles = name == "double pendulum"
-    assemblies = {form: assemble(scene, form=form) for form in ("reduced", "dae")}
-    [(_, best), (_, second)] = (
-        atwood_run(assemblies["reduced"], "explicit", rtol, t_end, paths) for rtol in (1e-14, 3e-14)
-    )
+def reference(mechanism: Mechanism) -> tuple[FloatArray, str]:
+    """Return the end, and where it comes from."""
+    found = hand.reference(mechanism)
+    if found is not None:
+        return found, "extrapolation in 128 bits"
+    reduced = atwood.prepare(mechanism, "reduced")
+    return atwood.explicit_run(reduced, 1e-14)()[1], "Atwood explicit at 1e-14"
 
-    def error_of(values: Any) -> float:
-        difference = values - best
-        return float(np.max(np.abs(turned(difference) if angles else difference)))
 
-    tolerances = [10.0**-k for k in ((3, 6) if chosen.quick else range(2, 14))]
-    runs: dict[str, list[tuple[float, Run]]] = {}
-    for way, (form, solver, least) in WAYS.items():
-        runs[way] = [
-            (rtol, partial(atwood_run, assemblies[form], solver, rtol, t_end, paths))
-            for rtol in tolerances
-            if rtol >= least * 0.99
-        ]
-    if angles and not chosen.quick and peer("sympy"):
-        rates = peers.kane_double_pendulum()
-        runs["sympy Kane, SciPy DOP853"] = [(rtol, partial(scipy_run, rates, rtol)) for rtol in tolerances[:11:2]]
-    points: dict[str, list[tuple[float, float, float]]] = {way: [] for way in runs}
-    for rtol in tolerances:
-        errors: dict[str, float] = {}
-        measures: dict[str, Callable[[], float]] = {}
-        for way, listed in runs.items():
-            run = dict(listed).get(rtol)
-            if run is None:
-                continue
+def check(name: str, way: str, errors: Sequence[float]) -> None:
+    """Refuse to time a way whose errors do not fall with its tolerance."""
+    finite = [error for error in errors if np.isfinite(error)]
+    if len(finite) < 2 or not min(finite) <= 0.05 * max(finite):
+        raise SystemExit(f"{name}, {way}: the errors do not fall with the tolerance: {errors}")
+
+
+def measure(mechanism: Mechanism, chosen: Any) -> dict[str, Any]:
+    """Return the work-precision points of every way to solve a mechanism."""
+    expected, source = reference(mechanism)
+    runs: dict[tuple[str, float], Run] = {}
+    errors: dict[tuple[str, float], float] = {}
+    best: dict[tuple[str, float], float] = {}
+    prepared: dict[str, float] = {}
+    for way, (settings, make) in ways(mechanism, chosen.cflags, chosen.quick).items():
+        began, used = time.perf_counter(), 0.0
+        for setting in settings[:: 6 if chosen.quick else 1]:
+            if used > 8.0:
+                break  # tighter ones would only take longer
             try:
+                run = make(setting)
                 spent, values = run()
-            except AtwoodError as error:
-                print(f"{name}, {way}, rtol {rtol:g}: {error.message}")
+            except (AtwoodError, ArithmeticError) as error:
+                print(f"{mechanism.name}, {way}, {setting:g}: {error}", file=sys.stderr)
                 continue
-            errors[way] = error_of(values)
-            measures[way] = partial(lambda run: run()[0], run) if spent < 0.5 else partial(float, spent)
-        spent_best = best_of(measures, chosen.repeat)
-        for way, error in errors.items():
-            points[way].append((rtol, error, 1e3 * spent_best[way]))
-    return {"points": points, "reference": error_of(second)}
+            key, used = (way, setting), used + spent
+            runs[key], best[key] = run, spent
+            errors[key] = mechanism.error(values, expected)
+        prepared[way] = time.perf_counter() - began - used
+        check(mechanism.name, way, [error for (name, _), error in errors.items() if name == way])
+    repeat_all(runs, best, chosen.repeat)
+    points: dict[str, list[tuple[float, float, float]]] = {way: [] for way, _ in runs}
+    for way, setting in runs:
+        points[way].append((setting, errors[way, setting], 1e3 * best[way, setting]))
+    return {"points": points, "reference": source, "prepared": prepared}
 
 
-def show(name: str, found: dict[str, Any]) -> None:
-    """Print the milliseconds at each error, with the ratio to the first way."""
+def repeat_all(runs: dict[tuple[str, float], Run], best: dict[tuple[str, float], float], repeat: int) -> None:
+    """Measure everything in turn, again and again, short runs more often."""
+    spent = dict.fromkeys(runs, 0.0)
+    for _ in range(repeat):
+        for key, run in runs.items():
+            for _ in range(max(1, min(20, int(2e-3 / best[key])))):
+                if spent[key] + best[key] > SLOW:
+                    break
+                seconds = run()[0]
+                spent[key] += seconds
+                best[key] = min(best[key], seconds)
+
+
+def show(name: str, found: dict[str, Any]) -> dict[str, list[float | None]]:
+    """Print the milliseconds at each error, with the ratio to the C by hand; return them."""
     at = {
         way: [at_error([(e, ms) for _, e, ms in points], target) for target in TARGETS]
         for way, points in found["points"].items()
     }
-    earlier = EARLIER[name]
-    reference = earlier["C by hand, order 8(5,3)"]
-    by_ida = earlier["C by hand with IDA, stabilised DAE"]
+    first = at.get(C, at[EXPLICIT])
     rows: list[list[Any]] = []
     for way, values in at.items():
-        ours = at["Atwood explicit"]
-        rows.append([way, *(ratio(v, o) for v, o in zip(values, ours, strict=True)), *values])
-    head = ["measured now", *(f"x at {t:g}" for t in TARGETS), *(f"ms at {t:g}" for t in TARGETS)]
-    print_table(f"{name}: milliseconds at an error, and as many times Atwood explicit", head, rows)
-    print(f"The reference is good to about {found['reference']:.1e}.")
-    rows = [[way, *values] for way, values in earlier.items()]
-    rows.append(["Atwood explicit now / C order 8(5,3) then", *map(ratio, at["Atwood explicit"], reference)])
-    rows.append(["Atwood IDA dae ggl now / C with IDA then", *map(ratio, at["Atwood IDA dae ggl"], by_ida)])
-    head = ["measured on one quiet core before the project began", *(f"ms at {t:g}" for t in TARGETS)]
-    print_table(f"{name}: earlier figures (a slower core: see README before dividing)", head, rows)
-
-
-def draw(path: Any, results: dict[str, Any]) -> None:
-    """Draw time against error."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, len(results), figsize=(5.0 * len(results), 4.5), squeeze=False)
-    for axis, (name, found) in zip(axes[0], results.items(), strict=True):
-        for way, points in found["points"].items():
-            axis.loglog([e for _, e, _ in points], [ms for _, _, ms in points], "o-", label=way)
-        axis.set(title=name, xlabel="error at the end", ylabel="ms")
-        axis.invert_xaxis()
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    figure.tight_layout()
-    figure.savefig(path)
-    print(f"\nwritten: {path}")
+        rows.append([way, *(ratio(v, o) for v, o in zip(values, first, strict=True)), *values])
+    head = ["", *(f"x at {t:g}" for t in TARGETS), *(f"ms at {t:g}" for t in TARGETS)]
+    print_table(f"{name}: as many times {C if C in at else EXPLICIT}, and milliseconds, at an error", head, rows)
+    rows = [
+        [f"{one} / {two}", *(ratio(v, o) for v, o in zip(at[one], at[two], strict=True)), f"{most:g}"]
+        for one, two, most in JUDGED
+        if one in at and two in at
+    ]
+    print_table(f"{name}: ratios that have a goal", ["", *(f"at {t:g}" for t in TARGETS), "goal"], rows)
+    print(f"The reference: {found['reference']}.")
+    return at
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print."""
-    chosen = options(__doc__, arguments, plot=True)
-    todo: list[tuple[str, Model, float, list[str]]] = [
-        ("double pendulum", DoublePendulum(), 10.0, ["rod1.angle", "rod2.angle"])
-    ]
-    for n in () if chosen.quick else (10, 40):
-        tip = [f"bob[{n - 1}].position.{axis}" for axis in "xz"]
-        todo.append((f"chain of {n}", Chain(links=n, mass=1.0 / n), 1.0, tip))
-    results = {}
-    for name, scene, t_end, paths in todo:
-        results[name] = curves(name, scene, t_end, paths, chosen)
-        show(name, results[name])
+    chosen = options(__doc__, arguments, plot=True, scenes=("double", "10", "40"))
+    todo = {"double": double_pendulum, "10": partial(chain, 10), "40": partial(chain, 40)}
+    results: dict[str, Any] = {}
+    for key in ("double",) if chosen.quick else chosen.scenes:
+        mechanism = todo[key]()
+        found = measure(mechanism, chosen)
+        found["milliseconds"] = show(mechanism.name, found)
+        found["errors"] = TARGETS
+        results[mechanism.name] = found
     if chosen.plot:
         draw(chosen.plot, results)
     save(chosen.json, results)

@@ -6,17 +6,15 @@
  * for the first rod w_0 = 0 and g cos q_1 more on the right.  Across the rod
  *     l_i q_i'' = w_i s_i T_{i+1} - w_{i-1} s_{i-1} T_{i-1},   for the first rod - g sin q_1 more.
  * Inputs t, q, u; parameters l (LINKS), 1/l (LINKS), w (LINKS), g. */
-#include <math.h>
+#include "real.h"
 
-int accelerations(const double *const *in, const double *p, double *scratch, double *const *out)
+static inline void accelerate(const real *q, const real *u, const real *p, real *a)
 {
-    const double *q = in[1], *u = in[2], *l = p, *over = p + LINKS, *w = p + 2 * LINKS, g = p[3 * LINKS];
-    double *a = out[0];
-    double ws[LINKS], wc[LINKS], slope[LINKS], T[LINKS + 1];
-    double before = 0.0, carried = g * cos(q[0]), wb = 0.0;
-    (void)scratch;
+    const real *l = p, *over = p + LINKS, *w = p + 2 * LINKS, g = p[3 * LINKS];
+    real ws[LINKS], wc[LINKS], slope[LINKS], T[LINKS + 1];
+    real before = 0.0, carried = g * cos(q[0]), wb = 0.0;
     for (int i = 0; i < LINKS; i++) { /* eliminate from the wall outwards: T_i = T_i + slope_i T_{i+1} */
-        double d, f;
+        real d, f;
         if (i < LINKS - 1) {
             d = q[i + 1] - q[i];
             ws[i] = w[i] * sin(d);
@@ -36,5 +34,6 @@ int accelerations(const double *const *in, const double *p, double *scratch, dou
     a[0] = (ws[0] * T[1] - g * sin(q[0])) * over[0];
     for (int i = 1; i < LINKS; i++)
         a[i] = (ws[i] * T[i + 1] - ws[i - 1] * T[i - 1]) * over[i];
-    return 0;
 }
+
+#include "as_kernel.h"

@@ -2,7 +2,9 @@
  *     M l1 a'' + m2 l2 (b'' cos d + b'^2 sin d) + M g sin a = 0      (times l1)
  *     l2 b'' + l1 (a'' cos d - a'^2 sin d) + g sin b = 0             (times m2 l2)
  * Inputs t, y = (a, b, a', b'), y' (, cj), or t, q, u; parameters l1, m1, l2, m2, g. */
-#include <math.h>
+#include "real.h"
+
+#define LINKS 2
 
 int residual(const double *const *in, const double *p, double *scratch, double *const *out)
 {
@@ -43,16 +45,15 @@ int jacobian(const double *const *in, const double *p, double *scratch, double *
 }
 
 /* Two unknowns, by Cramer's rule, with one division. */
-int accelerations(const double *const *in, const double *p, double *scratch, double *const *out)
+static inline void accelerate(const real *q, const real *u, const real *p, real *a)
 {
-    const double *q = in[1], *u = in[2];
-    const double l1 = p[0], l2 = p[2], m2 = p[3], M = p[1] + p[3], g = p[4];
-    const double d = q[0] - q[1], s = sin(d), c = cos(d);
-    const double r1 = m2 * l2 * u[1] * u[1] * s + M * g * sin(q[0]); /* M l1 a'' + m2 l2 c b'' = -r1 */
-    const double r2 = l1 * u[0] * u[0] * s - g * sin(q[1]);          /* l1 c a'' + l2 b'' = r2 */
-    const double f = 1.0 / (l1 * l2 * (M - m2 * c * c));
-    (void)scratch;
-    out[0][0] = -(r1 + m2 * c * r2) * l2 * f;
-    out[0][1] = (M * r2 + c * r1) * l1 * f;
-    return 0;
+    const real l1 = p[0], l2 = p[2], m2 = p[3], M = p[1] + p[3], g = p[4];
+    const real d = q[0] - q[1], s = sin(d), c = cos(d);
+    const real r1 = m2 * l2 * u[1] * u[1] * s + M * g * sin(q[0]); /* M l1 a'' + m2 l2 c b'' = -r1 */
+    const real r2 = l1 * u[0] * u[0] * s - g * sin(q[1]);          /* l1 c a'' + l2 b'' = r2 */
+    const real f = 1.0 / (l1 * l2 * (M - m2 * c * c));
+    a[0] = -(r1 + m2 * c * r2) * l2 * f;
+    a[1] = (M * r2 + c * r1) * l1 * f;
 }
+
+#include "as_kernel.h"

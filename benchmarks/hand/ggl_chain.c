@@ -1,13 +1,21 @@
-/* A chain of LINKS point masses on massless rods with all coordinates kept, stabilised (Gear, Gupta, Leimkuhler), as
- * SUNDIALS IDA calls it.  With r_i = p_i - p_{i-1}, n_i = r_i / l_i:
+/* A chain of LINKS point masses on massless rods with all coordinates kept, stabilised (Gear, Gupta, Leimkuhler).
+ * With r_i = p_i - p_{i-1}, n_i = r_i / l_i:
  *     p_i' - v_i + mu_i n_i - mu_{i+1} n_{i+1} = 0
  *     m_i (v_i' + g) - la_i n_i + la_{i+1} n_{i+1} = 0
  *     (r_i.r_i / l_i - l_i) / 2 = 0,   n_i . (v_i - v_{i-1}) = 0
- * y = (p, v, la, mu); LINKS = 1 is the pendulum.  Parameters l (LINKS), m (LINKS), g. */
+ * y = (p, v, la, mu), all of each together unless BAND is defined; LINKS = 1 is the pendulum.
+ * Parameters l (LINKS), m (LINKS), g. */
+#ifdef BAND /* link after link, so that the Jacobian is a band */
+#define P(i, k) (6 * (i) + (k))
+#define V(i, k) (6 * (i) + 2 + (k))
+#define L(i) (6 * (i) + 4)
+#define U(i) (6 * (i) + 5)
+#else
 #define P(i, k) (2 * (i) + (k))
 #define V(i, k) (2 * LINKS + 2 * (i) + (k))
 #define L(i) (4 * LINKS + (i))
 #define U(i) (5 * LINKS + (i))
+#endif
 #define SIZE (6 * LINKS)
 
 static inline void equations(const double *y, const double *yp, const double *p, double *F)
@@ -67,13 +75,6 @@ static inline void equations(const double *y, const double *yp, const double *p,
         }                                                                             \
     }
 
-static inline void full(double cj, const double *y, const double *p, double *J)
-{
-#define PUT(row, column, value) J[(row) + SIZE * (column)] = value;
-    JACOBIAN
-#undef PUT
-}
-
 enum { MOST = 36 * LINKS };
 static int rows[MOST], columns[MOST], places[MOST], count;
 
@@ -117,40 +118,3 @@ int jacobian(const double *const *in, const double *p, double *scratch, double *
     listed(in[3][0], in[1], p, out[0]);
     return 0;
 }
-
-/* As IDA calls them.  Where its structures have their arrays is given in bytes when this is compiled. */
-#ifdef VECTOR_DATA
-#include <stdint.h>
-#define CONTENT(object) (*(char **)(object))
-#define ARRAY(object, offset, type) (*(type **)(CONTENT(object) + (offset)))
-
-int ida_residual(double t, void *y, void *yp, void *out, void *p)
-{
-    (void)t;
-    equations(ARRAY(y, VECTOR_DATA, double), ARRAY(yp, VECTOR_DATA, double), p, ARRAY(out, VECTOR_DATA, double));
-    return 0;
-}
-
-int ida_dense(double t, double cj, void *y, void *yp, void *r, void *J, void *p, void *a, void *b, void *c)
-{
-    (void)t, (void)yp, (void)r, (void)a, (void)b, (void)c;
-    full(cj, ARRAY(y, VECTOR_DATA, double), p, ARRAY(J, DENSE_DATA, double));
-    return 0;
-}
-
-int ida_sparse(double t, double cj, void *y, void *yp, void *r, void *J, void *p, void *a, void *b, void *c)
-{
-    INDEX *row = ARRAY(J, SPARSE_VALUES, INDEX), *start = ARRAY(J, SPARSE_POINTERS, INDEX);
-    (void)t, (void)yp, (void)r, (void)a, (void)b, (void)c;
-    for (int i = 0; i <= SIZE; i++)
-        start[i] = 0;
-    for (int i = 0; i < count; i++) {
-        row[places[i]] = rows[i];
-        start[columns[i] + 1]++;
-    }
-    for (int i = 0; i < SIZE; i++)
-        start[i + 1] += start[i];
-    listed(cj, ARRAY(y, VECTOR_DATA, double), p, ARRAY(J, SPARSE_DATA, double));
-    return 0;
-}
-#endif

@@ -1,7 +1,9 @@
 /* A bob m on a massless rod l, hanging straight down at angle 0:
  *     q' = u,   m l^2 u' + m g l sin q = 0.
  * Inputs t, y = (q, u), y' (, cj); parameters l, m, g. */
-#include <math.h>
+#include "real.h"
+
+#define LINKS 1
 
 int residual(const double *const *in, const double *p, double *scratch, double *const *out)
 {
@@ -26,9 +28,10 @@ int jacobian(const double *const *in, const double *p, double *scratch, double *
     return 0;
 }
 
-int accelerations(const double *const *in, const double *p, double *scratch, double *const *out)
+static inline void accelerate(const real *q, const real *u, const real *p, real *a)
 {
-    (void)scratch;
-    out[0][0] = -p[2] / p[0] * sin(in[1][0]);
-    return 0;
+    (void)u;
+    a[0] = -p[2] / p[0] * sin(q[0]);
 }
+
+#include "as_kernel.h"

@@ -189,11 +189,11 @@ def simulate(
     solver
         ``"ida"``: SUNDIALS IDA with the equations as machine code. ``"ida-sundae"``: the same method through
         scikit-sundae with the equations as Python, the reference. ``"explicit"``: a Runge-Kutta method of order 8(5,3),
-        for the reduced form without closed loops; for smooth scenes far the fastest. ``"auto"``: ``"ida"`` where it
-        can be had, else ``"ida-sundae"``.
+        and ``"taylor"``: Taylor series, for the reduced form without closed loops. ``"auto"``: IDA for what is
+        constrained or stiff, or turns out so; else an explicit method. `Result.solver` says which, and why.
     samples
         The run is sampled at least so often, whatever is shown of it: for the work that is put in, and for angles to
-        count their turns. Fewer make a run with few outputs a little faster.
+        count their turns. More are taken where functions of time change faster, unless this is 1.
     progress
         Called with the time reached, s.
 

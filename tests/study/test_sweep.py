@@ -2,6 +2,8 @@
 
 import csv
 import json
+import subprocess
+import sys
 import threading
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
@@ -30,10 +32,8 @@ from atwood_library.scenes import SCENES, Chain, DoublePendulum, FourBar
 
 def one_by_one(monkeypatch: pytest.MonkeyPatch, *arguments: Any, **options: Any) -> Any:
     """Return a sweep all of whose runs are made by themselves."""
-    from sys import modules
-
     with monkeypatch.context() as patch:
-        patch.setattr(modules["atwood.study.sweep"], "why_not_batched", lambda order: "a test wants it so")
+        patch.setattr(sys.modules["atwood.study.sweep"], "why_not_batched", lambda order: "a test wants it so")
         found = sweep(*arguments, **options)
     assert found.statistics.batched == 0
     return found
@@ -126,6 +126,21 @@ def test_processes_change_nothing() -> None:
     for path in alone.paths:
         assert_array_equal(alone[path], sent[path])
     assert (sent.status, sent.statistics.batched) == (alone.status, len(alone))
+
+
+@pytest.mark.parametrize("solver", ["explicit", "taylor", "ida"])
+def test_threads_of_a_fresh_process(solver: str) -> None:
+    """Code that two threads ask for at the same time for the first time is made once, and stays."""
+    code = f"""
+import sys
+sys.path[:0] = {[entry for entry in sys.path if entry]!r}
+from atwood import sweep
+from atwood_library.scenes import DoublePendulum
+found = sweep(DoublePendulum(), {{"mass1": [1.0, 1.5, 2.0, 2.5]}}, t_end=0.2, threads=4, solver={solver!r})
+print(set(found.status))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout.strip()) == (0, "{'finished'}"), done.stderr
 
 
 # -- combining -----------------------------------------------------------------------------------------------------

@@ -105,6 +105,10 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after so many seconds.")
 @click.option("--max-step", type=click.FloatRange(min=0.0, min_open=True), help="The largest step, s.")
 @click.option("--plot", type=_FILE, help="Save a plot; the suffix says how (.png, .svg, .pdf).")
+@click.option("--draw", type=_FILE, help="Save a picture of the mechanism (.png, .svg, .pdf), or its motion (.gif).")
+@click.option(
+    "--view", metavar="AZ,EL", help="From where a scene in space is drawn: azimuth and elevation, degrees.  [30,20]"
+)
 @click.option("--save", type=_FILE, help="Save all trajectories (.nc, .npz or .csv).")
 @click.option("--progress/--no-progress", default=True, help="Show progress where there is a terminal.")
 @reporting_errors

@@ -14,7 +14,7 @@ import click
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, warn
 from atwood.cli.scenes import prepare
-from atwood.errors import AtwoodError
+from atwood.errors import AtwoodError, UsageError
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
@@ -40,13 +40,15 @@ class RunRequest:
     max_seconds: float | None = None
     max_step: float | None = None
     plot: Path | None = None
+    draw: Path | None = None
+    view: str | None = None
     save: Path | None = None
     progress: bool = True
     as_json: bool = False
 
 
 def run_scene(request: RunRequest) -> None:
-    """Run a scene, and show, save and plot what came of it.
+    """Run a scene, and show, save, plot and draw what came of it.
 
     Parameters
     ----------
@@ -58,6 +60,10 @@ def run_scene(request: RunRequest) -> None:
     from atwood.pipeline import assemble, simulate
 
     assembly = assemble(scene, form=request.form, level=request.level, name=name)
+    if request.view is not None:
+        from atwood.view.camera import check_view
+
+        check_view(assembly.mechanism.space.name, request.view)
     t_start, t_end = assembly.flat.t_start, assembly.flat.t_end if request.t_end is None else request.t_end
     try:
         with progress_bar(request.progress, name, t_start, t_end) as progress:
@@ -88,17 +94,20 @@ def run_scene(request: RunRequest) -> None:
 
 
 def _keep(result: Result, request: RunRequest) -> None:
-    """Save and plot a run, if that was asked for."""
+    """Save, plot and draw a run, if that was asked for."""
     if request.save is not None:
         result.save(request.save)
     if request.plot is not None:
         result.plot(file=request.plot)
+    if request.draw is not None:
+        _draw(result, request.draw, request.view)
 
 
 def _keep_what_came_before(error: AtwoodError, request: RunRequest) -> None:
-    """Save and plot what came before an error, if that was asked for, and say so."""
+    """Save, plot and draw what came before an error, if that was asked for, and say so."""
     made = getattr(error, "run", None)
-    if made is None or (request.save is None and request.plot is None):
+    files = [str(file) for file in (request.save, request.plot, request.draw) if file is not None]
+    if made is None or not files:
         return
     from atwood.result.result import Result
 
@@ -108,8 +117,7 @@ def _keep_what_came_before(error: AtwoodError, request: RunRequest) -> None:
     except AtwoodError as other:  # the first error says more
         warn(f"What came before could not be kept: {other}")
         return
-    files = " and ".join(str(file) for file in (request.save, request.plot) if file is not None)
-    warn(f"What came before, up to t = {result.time[-1]:.6g} s, is in {files}.")
+    warn(f"What came before, up to t = {result.time[-1]:.6g} s, is in {' and '.join(files)}.")
 
 
 def _check_files(request: RunRequest) -> None:
@@ -122,6 +130,25 @@ def _check_files(request: RunRequest) -> None:
         from atwood.view.canvas import check_picture
 
         check_picture(request.plot)
+    if request.view is not None and request.draw is None:
+        raise UsageError("there is nothing to draw", where="--view", advice="Say where to with --draw FILE.")
+    if request.draw is not None:
+        from atwood.view.camera import as_camera
+        from atwood.view.canvas import ANIMATED, SUFFIXES, check_picture
+
+        check_picture(request.draw, (*SUFFIXES, *ANIMATED))
+        as_camera(request.view)
+
+
+def _draw(result: Result, file: Path, view: str | None) -> None:
+    """Draw the mechanism at a few times, or moving; the suffix says which."""
+    from atwood.view import animate, plot_mechanism
+    from atwood.view.canvas import ANIMATED
+
+    if file.suffix.lower() in ANIMATED:
+        animate(result, file, view=view)
+    else:
+        plot_mechanism(result, file, view=view)
 
 
 def run_data(result: Result, request: RunRequest) -> dict[str, Any]:

@@ -55,7 +55,7 @@ def print_summary(result: Result, request: RunRequest) -> None:
         out.print(
             f"{count_of(hidden, 'more quantity', 'more quantities')}: --json or --save FILE shows all", style="dim"
         )
-    for option, file in (("saved", request.save), ("plotted", request.plot)):
+    for option, file in (("saved", request.save), ("plotted", request.plot), ("drawn", request.draw)):
         if file is not None:
             out.print(f"{option}: {file}", style="dim", soft_wrap=True)
 

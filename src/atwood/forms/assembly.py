@@ -28,7 +28,8 @@ from atwood.forms.source import Source, no_start_quantity
 from atwood.kernels import BoundKernel, CompiledProgram, compile_program
 from atwood.mechanics.build import Mechanism, build_equations
 from atwood.mechanics.equations import Equations
-from atwood.mechanics.observables import Observable, Reaction, energies, list_reactions, observe
+from atwood.mechanics.observables import Observable, Reaction, energies, list_reactions
+from atwood.mechanics.reading import observe
 from atwood.model.flatten import FlatScene, flatten
 from atwood.topology.forest import grow_forest
 
@@ -302,16 +303,19 @@ class Assembly:
         return self.shared.get("reactions", lambda: list_reactions(self.mechanism))
 
     @property
-    def observables(self) -> dict[str, Observable]:
+    def observables(self) -> Mapping[str, Observable]:
         """Every quantity of every component, by path, in terms of this form's coordinates."""
-        return self.shared.get("observables", lambda: observe(self.mechanism, self.equations, self.reactions))
+        return self.shared.get("observables", lambda: self._observe(self.equations))
 
     @property
-    def start_observables(self) -> dict[str, Observable]:
+    def start_observables(self) -> Mapping[str, Observable]:
         """Every quantity in terms of generalized coordinates, in which the start is solved."""
         if self.form == "reduced":
             return self.observables
-        return self.shared.get("start", lambda: observe(self.mechanism, self.reduced, self.reactions))
+        return self.shared.get("start", lambda: self._observe(self.reduced))
+
+    def _observe(self, equations: Equations) -> Mapping[str, Observable]:
+        return observe(self.mechanism, equations, self.reactions, self.shared.lock)
 
     def find_observables(self, paths: Sequence[str]) -> list[Observable]:
         """Return observables by path.

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from atwood.errors import AtwoodError
 from atwood.expr import Expression, Scalar, substitute
 from atwood.mechanics.arms import arm_of
 from atwood.mechanics.build import Mechanism, resolve_signals
@@ -13,7 +12,7 @@ from atwood.mechanics.equations import Equations
 from atwood.mechanics.forces import in_joint_coordinates, local_map
 from atwood.mechanics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.orientation import NodeTurn, node_axes, spin_in_world
-from atwood.model.component import Binding, bind
+from atwood.model.component import Binding
 from atwood.model.connectors import Frame, Motion
 from atwood.model.laws import BodyInertia
 from atwood.model.local import LocalPart
@@ -21,7 +20,7 @@ from atwood.model.rotation import from_axes, to_axes
 from atwood.model.space import FIXED_AXES
 from atwood.model.vector import Vector, dot
 
-__all__ = ["Observable", "Reaction", "energies", "list_reactions", "observe"]
+__all__ = ["Observable", "Reaction", "add_up", "energies", "list_reactions", "make_binding", "part_energies", "take"]
 
 
 @dataclass(frozen=True)
@@ -119,47 +118,7 @@ def list_reactions(mechanism: Mechanism) -> tuple[Reaction, ...]:
     return tuple(found)
 
 
-def observe(mechanism: Mechanism, equations: Equations, reactions: Sequence[Reaction]) -> dict[str, Observable]:
-    """Return every observable of every component, by path.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism.
-    equations
-        Its equations in one form.
-    reactions
-        What `list_reactions` gave.
-    """
-    found: dict[str, Observable] = {}
-    signals = resolve_signals(mechanism, equations.site, equations.kinematics)
-    parts = {path: part_energies(mechanism, equations, path, signals) for path in mechanism.locals_}
-    for path, local in mechanism.locals_.items():
-        own = {r.path[len(path) + 1 :]: r.symbol for r in reactions if r.key[0] == path}
-        bound = bind(local.part.component, _binding(mechanism, equations, local, own, parts, signals))
-        for law in local.part.component.laws("observable"):
-            if not law.holds_in(mechanism.space.name):
-                continue
-            try:
-                value = getattr(bound, law.name)()
-            except (AtwoodError, ArithmeticError):
-                continue  # it asks for an orientation that nothing determines, or that never leaves a pole
-            options = law.options
-            rate = f"{path}.{options.rate}" if options.rate else ""
-            _take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic, rate)
-        kinetic, potential = parts[path]
-        has_inertia = bool(local.part.component.laws("inertia"))
-        if has_inertia:
-            _take(mechanism, found, f"{path}.kinetic_energy", kinetic, "J", "Kinetic energy.", False)
-        if has_inertia or local.potentials:
-            _take(mechanism, found, f"{path}.potential_energy", potential, "J", "Potential energy.", False)
-    for reaction in reactions:
-        found[reaction.path] = Observable(reaction.path, reaction.unit, reaction.doc, False, reaction.symbol)
-    # A rate that has no value, as of an angle that never leaves a pole, tells no turns.
-    return {path: one if one.rate in found else replace(one, rate="") for path, one in found.items()}
-
-
-def _take(
+def take(
     mechanism: Mechanism,
     found: dict[str, Observable],
     path: str,
@@ -169,6 +128,7 @@ def _take(
     periodic: bool,
     rate: str = "",
 ) -> None:
+    """Add a quantity to those found, component by component if it is a vector."""
     graph = mechanism.table.graph
     if isinstance(value, Vector):
         for axis in mechanism.space.reported_axes:
@@ -180,27 +140,30 @@ def _take(
         found[path] = Observable(path, unit, doc, periodic and not expression.is_symbol, expression, rate)
 
 
-def bindings_of(
-    mechanism: Mechanism,
-    equations: Equations,
-    local: LocalPart,
-    reactions: Sequence[Reaction],
-    signals: Mapping[Expression, Expression],
-) -> Binding:
-    """Return what the laws of a part read when they may read everything, energies around it excepted."""
-    path = local.part.path
-    own = {r.path[len(path) + 1 :]: r.symbol for r in reactions if r.key[0] == path}
-    return _binding(mechanism, equations, local, own, {}, signals)
-
-
-def _binding(
+def make_binding(
     mechanism: Mechanism,
     equations: Equations,
     local: LocalPart,
     reactions: Mapping[str, Expression],
-    parts: Mapping[str, tuple[Expression, Expression]],
+    known: Mapping[str, Expression],
+    energies: Mapping[str, Expression],
     signals: Mapping[Expression, Expression],
 ) -> Binding:
+    """Return what the laws of a part read when they may read everything.
+
+    Parameters
+    ----------
+    mechanism, equations
+        The mechanism.
+    local
+        The part.
+    reactions, known
+        Its reactions and its joint coordinates, by name.
+    energies
+        Those of the model around it.
+    signals
+        What linked inputs stand for.
+    """
     path, site, kinematics, space = local.part.path, equations.site, equations.kinematics, mechanism.space
     motions = {}
     for name, one in local.part.component.connectors().items():
@@ -217,14 +180,6 @@ def _binding(
     values = dict(local.binding.values)
     for name, symbol in local.signal_symbols.items():
         values[name] = signals[symbol]
-    known = {
-        symbol.name[len(path) + 1 :]: value
-        for symbol, value in kinematics.placements.joint_coordinates.items()
-        if symbol.name.startswith(f"{path}.") and "." not in symbol.name[len(path) + 1 :]
-    }
-    owner = local.part.component._parent
-    inside = f"{owner.path}." if owner is not None and owner.path else ""
-    around = [energy for other, energy in parts.items() if other.startswith(inside)]
     return Binding(
         values=values,
         motions=motions,
@@ -234,7 +189,7 @@ def _binding(
         sides=local.binding.sides,
         known=known,
         reactions=reactions,
-        energies={"kinetic": _sum([k for k, _ in around]), "potential": _sum([v for _, v in around])} if around else {},
+        energies=energies,
     )
 
 
@@ -306,10 +261,11 @@ def energies(mechanism: Mechanism, equations: Equations) -> tuple[Expression, Ex
     """Return kinetic and potential energy of the scene."""
     signals = resolve_signals(mechanism, equations.site, equations.kinematics)
     parts = [part_energies(mechanism, equations, path, signals) for path in mechanism.locals_]
-    return _sum([k for k, _ in parts]), _sum([v for _, v in parts])
+    return add_up([k for k, _ in parts]), add_up([v for _, v in parts])
 
 
-def _sum(values: Sequence[Expression]) -> Expression:
+def add_up(values: Sequence[Expression]) -> Expression:
+    """Return a sum."""
     total = values[0]
     for value in values[1:]:
         total = total + value

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from atwood.expr import Expression
-from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.build import Mechanism
 from atwood.mechanics.equations import Equations
-from atwood.mechanics.observables import Reaction, bindings_of
+from atwood.mechanics.observables import Reaction
+from atwood.mechanics.reading import Reader
 from atwood.model.component import bind
 
 __all__ = ["Watch", "list_watches"]
@@ -51,14 +52,14 @@ def list_watches(
 ) -> tuple[Watch, ...]:
     """Return what is watched in the present modes; what is constant can never cross zero and is left out."""
     found = []
-    signals = resolve_signals(mechanism, equations.site, equations.kinematics)
+    reader = Reader(mechanism, equations, reactions)
     for path, local in mechanism.locals_.items():
         component = local.part.component
         mode = modes.get(path, "")
         laws = [law for law in component.laws("event") if law.acts_in(mode)]
         if not laws:
             continue
-        bound = bind(component, bindings_of(mechanism, equations, local, reactions, signals))
+        bound = bind(component, reader.binding(local))
         for law in laws:
             value = mechanism.table.graph.convert(getattr(bound, law.name)())
             if value.is_constant or value in mechanism.table.values:

@@ -28,7 +28,7 @@ Matrix: TypeAlias = Any
 """An array of shape (rows, columns), or for large scenes a `scipy.sparse.csr_array`."""
 
 LARGEST_FULL = 240
-"""Matrices with more rows or columns are kept by their entries; below, arrays are as fast and need no further imports."""
+"""Matrices with more rows or columns are kept by their entries; below, arrays are as fast and need no more imports."""
 
 _DENSE = 0.1
 """Share of entries above which nothing is gained by leaving out zeros."""

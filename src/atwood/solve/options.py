@@ -42,7 +42,8 @@ class RunOptions:
     max_order, max_step
         Limits for the method.
     samples
-        A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it.
+        A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it; more
+        often if functions of time change faster, unless this is 1.
     solver
         A key of `SOLVERS`, or ``"auto"``; see `atwood.solve.choice`.
     """
@@ -59,8 +60,18 @@ class RunOptions:
     samples: int = 400
 
 
-def sample_times(t: float, options: RunOptions) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return all sample times with the start, and which of them are outputs."""
+def sample_times(t: float, options: RunOptions, at_least: int = 0) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return all sample times with the start, and which of them are outputs.
+
+    Parameters
+    ----------
+    t
+        Time of the start, s.
+    options
+        How the run is made.
+    at_least
+        As many samples are taken anyway.
+    """
     if isinstance(options.outputs, (int, np.integer)):
         if options.outputs < 2:
             raise UsageError("there must be at least two outputs, the start and the end")
@@ -71,7 +82,7 @@ def sample_times(t: float, options: RunOptions) -> tuple[FloatArray, NDArray[np.
             raise UsageError("output times must be finite and rise")
         if asked[0] < t or asked[-1] > options.t_end:
             raise UsageError(f"output times must lie between {t:g} and {options.t_end:g}")
-    filling = np.linspace(t, options.t_end, options.samples + 1)
+    filling = np.linspace(t, options.t_end, max(options.samples, at_least) + 1)
     near = 1e-9 * (options.t_end - t)
     next_asked = np.minimum(np.searchsorted(asked, filling), len(asked) - 1)
     distance = np.minimum(np.abs(asked[next_asked] - filling), np.abs(asked[np.maximum(next_asked - 1, 0)] - filling))

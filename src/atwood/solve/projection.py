@@ -7,18 +7,27 @@ constraints nearly depend on each other.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.solve.driver import FloatArray
+from atwood.solve.matrices import is_best_full
 from atwood.solve.problem import Plan
+
+if TYPE_CHECKING:
+    from atwood.solve.sparse_batch import Normal
 
 __all__ = ["Projected", "misses_of", "project_safely", "project_states"]
 
 _MET = 1e-11
 """Relative to the scene's sizes: a constraint that is missed by less is met."""
+
+_LEAST = 1e-17
+"""What is less is less than rounding, although it may go on to shrink."""
 
 _STEPS = 12
 
@@ -48,16 +57,38 @@ class Projected:
 
 @dataclass(frozen=True, eq=False)
 class _Constraints:
-    """Constraints at many states, each in units of how much it changes with a displacement of the size that counts."""
+    """Constraints at many states, each in units of how much it changes with a displacement of the size that counts.
+
+    The slope is of shape (states, constraints, coordinates), or (entries, states) with normal equations.
+    """
 
     value: FloatArray
     slope: FloatArray
     drift: FloatArray
+    kept: list[int]
+    normal: Normal | None
 
     def rate(self, speeds: FloatArray) -> FloatArray:
         """Return the constraints on velocity for speeds in units of the scales, shape (states, number)."""
+        if self.normal is not None:
+            return self.normal.whole.times(self.slope, speeds.T).T + self.drift
         moved: FloatArray = np.einsum("smn,sn->sm", self.slope, speeds)
         return moved + self.drift
+
+    def step(self, right: FloatArray, rows: Sequence[int] | None = None) -> FloatArray:
+        """Return the shortest displacements that change independent constraints by so much.
+
+        Parameters
+        ----------
+        right
+            By how much, for all constraints; shape (states, number).
+        rows
+            Of positions, which of them hold positions; the independent ones if not given.
+        """
+        if self.normal is not None:
+            return self.normal.least_norm(self.slope, right[:, self.kept].T).T
+        chosen = self.kept if rows is None else list(rows)
+        return _least_norm(self.slope[:, chosen], right[:, chosen])
 
 
 def project_states(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
@@ -70,8 +101,7 @@ def project_states(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> P
     t, q, u
         States near the constraints, of shape (states,) and (number, states).
     """
-    program = plan.balance.program
-    chunk = max(1, _CHUNK // max(1, program.constraints * program.speeds))
+    chunk = _chunk(plan)
     parts = [
         _project(plan, t[i : i + chunk], q[:, i : i + chunk], u[:, i : i + chunk]) for i in range(0, len(t), chunk)
     ]
@@ -94,14 +124,36 @@ def misses_of(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatA
     t, q, u
         States, of shape (states,) and (number, states).
     """
-    program = plan.balance.program
-    chunk = max(1, _CHUNK // max(1, program.constraints * program.speeds))
+    chunk = _chunk(plan)
     found = np.zeros((2, len(t)))
     for i in range(0, len(t), chunk):
         part = slice(i, i + chunk)
         now = _constraints(plan, t[part], q[:, part], u[:, part])
         found[:, part] = _largest(now, (u[:, part] / plan.sizes[:, None]).T)
     return found
+
+
+def _chunk(plan: Plan) -> int:
+    """Return how many states to work on at once."""
+    program = plan.balance.program
+    normal = _normal(plan)
+    volume = program.constraints * program.speeds if normal is None else normal.volume + program.program.size
+    return max(1, _CHUNK // max(1, volume))
+
+
+def _normal(plan: Plan) -> Normal | None:
+    """Return the normal equations of the independent constraints by their entries; None where arrays are better."""
+    program = plan.balance.program
+    plain = plan.balance.turning.is_plain and len(program.holonomic) == program.constraints
+    if not plain or is_best_full((program.constraints, program.speeds), len(program.slope_rows)):
+        return None
+    from atwood.solve.sparse_batch import Normal, Pattern
+
+    def make() -> Normal:
+        pattern = Pattern(program.slope_rows, program.slope_columns, (program.constraints, program.speeds))
+        return Normal(pattern, plan.finding.kept)
+
+    return plan.assembly.shared.get(("normal equations", plan.assembly.form, plan.finding.kept), make)
 
 
 def _largest(now: _Constraints, speeds: FloatArray) -> FloatArray:
@@ -112,17 +164,24 @@ def _constraints(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> _Co
     p, count = plan.balance.program, len(t)
     kernel = plan.assembly.kernel(p.program, vectorized=True)
     _, _, value, _, _, slope, drift = kernel(t[None, :], q, u)
+    kept, normal = list(plan.finding.kept), _normal(plan)
+    if normal is not None:
+        pattern = normal.whole
+        slope = slope * plan.sizes[pattern.columns, None]
+        rows = pattern.largest(slope).T
+        rows[rows == 0.0] = 1.0
+        return _Constraints(value.T / rows, slope / rows.T[pattern.rows], drift.T / rows, kept, normal)
     full = np.zeros((count, p.constraints, p.speeds))
     full[:, p.slope_rows, p.slope_columns] = slope.T
     full *= plan.sizes
     rows = np.max(np.abs(full), axis=2)
     rows[rows == 0.0] = 1.0
-    return _Constraints(value.T / rows, full / rows[:, :, None], drift.T / rows)
+    return _Constraints(value.T / rows, full / rows[:, :, None], drift.T / rows, kept, None)
 
 
 def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
-    sizes, kept = plan.sizes[:, None], list(plan.finding.kept)
-    turning, holding = plan.balance.turning, plan.balance.holding(kept)
+    sizes = plan.sizes[:, None]
+    turning, holding = plan.balance.turning, plan.balance.holding(list(plan.finding.kept))
     q, speeds = turning.normalized(q.copy()), (u / sizes).T
     now = _constraints(plan, t, q, u)
     held = _largest(now, speeds)
@@ -130,15 +189,15 @@ def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Project
     active = np.ones(len(t), dtype=bool)
     for _ in range(_STEPS):
         miss = np.max(np.abs(now.value), axis=1)
-        active &= (miss > 0.0) & ((miss >= _MET) | (miss < 0.5 * last))
+        active &= (miss > _LEAST) & ((miss >= _MET) | (miss < 0.5 * last))
         if not active.any():
             break
         last = miss
-        step = _least_norm(now.slope[:, holding], now.value[:, holding])
+        step = now.step(now.value, holding)
         q = turning.moved_each(t, q, -sizes * np.where(active[:, None], step, 0.0).T)
         now = _constraints(plan, t, q, u)
     for _ in range(2):  # the second pass takes out the rounding of the first
-        speeds = speeds - _least_norm(now.slope[:, kept], now.rate(speeds)[:, kept])
+        speeds = speeds - now.step(now.rate(speeds))
     left = _largest(now, speeds) * np.array([[1.0], [plan.scales.time]])
     doubtful = active | ~np.all(left <= 10.0 * _MET, axis=0)
     return Projected(q, sizes * speeds.T, held, doubtful)

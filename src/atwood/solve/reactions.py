@@ -15,6 +15,7 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
 from atwood.mechanics.release import release_program
 from atwood.solve.balance import balance_of
+from atwood.solve.matrices import is_best_full
 from atwood.solve.rank import find_rank
 from atwood.solve.scales import motion_scales, scene_length
 from atwood.solve.turning import turning_of
@@ -58,6 +59,10 @@ def accelerations_and_multipliers(
     program = assembly.balance(form)
     n, m, samples = program.speeds, program.constraints, len(t)
     mass, bias, _, _, gamma, slope, drift = assembly.kernel(program.program, vectorized=True)(t[None, :], q, u)
+    if not is_best_full((n, n), len(mass)):
+        from atwood.solve.sparse_states import solve_states
+
+        return *solve_states(program, t, (mass, bias, gamma, slope), kept), np.asarray(drift)
     found_a, found_l = np.zeros((n, samples)), np.zeros((m, samples))
     size = n + len(kept)
     step = max(1, _CHUNK // max(1, size * size))

@@ -13,6 +13,7 @@ from atwood.forms.assembly import Assembly
 from atwood.solve.breaks import find_breaks
 from atwood.solve.choice import Choice, check_solver, choose, describe_choices
 from atwood.solve.driver import Statistics
+from atwood.solve.inputs import samples_needed
 from atwood.solve.missing import missing_at
 from atwood.solve.modes import EventProbe, Happening, enter_mode
 from atwood.solve.options import RunOptions, sample_times
@@ -101,7 +102,8 @@ def run(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reass
             f"the end, t = {options.t_end:g}, is not after the start, t = {t:g}", advice="Give a later t_end."
         )
     check_solver(options.solver)
-    times, shown = sample_times(t, options)
+    wanted = samples_needed(assembly, t, options.t_end) if options.samples > 1 else 0
+    times, shown = sample_times(t, options, wanted)
     _check_prescribed(assembly, times)
     return _Walk(assembly, start, options, reassemble, times, shown).go()
 

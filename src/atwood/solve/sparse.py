@@ -29,7 +29,7 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
-_SHARE = 1e-13
+_SHARE = 1e-10
 """What is added to the normal equations, relative to their largest diagonal entry."""
 
 _PASSES = 12
@@ -171,11 +171,11 @@ def free_columns(matrix: Any) -> NDArray[np.bool_]:
     if not left.shape[0]:
         found[rest] = True
         return found
-    solver = _factorised(left @ left.T.tocsr(), _SHARE)
+    solver = _factorised(left @ left.T.tocsr(), 1e-13)
     for start in range(0, len(rest), _BLOCK):
         columns = left[:, start : start + _BLOCK].toarray()
         inside = np.einsum("ij,ij->j", columns, solver.solve(columns))
-        found[rest[start : start + _BLOCK]] = 1.0 - inside > 1e-9
+        found[rest[start : start + _BLOCK]] = 1.0 - inside > 1e-6
     return found
 
 

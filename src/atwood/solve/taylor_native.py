@@ -10,7 +10,6 @@ import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
 from dataclasses import replace
-from functools import cache
 from itertools import accumulate
 from math import inf, log2
 
@@ -21,6 +20,7 @@ from atwood.errors import UsageError
 from atwood.expr.taylor import TaylorPrograms
 from atwood.kernels.llvm_build import Built, build_code, default_options
 from atwood.kernels.llvm_module import CodeOptions, Part
+from atwood.kernels.once import once
 from atwood.solve.driver import FloatArray, SolverOptions
 from atwood.solve.event_watch import State
 from atwood.solve.explicit_loops import WIDTH
@@ -224,13 +224,13 @@ class CompiledStepper:
 _T, _STEPS = NUMBERS.index("t"), COUNTS.index("steps")
 
 
-@cache
+@once
 def _code() -> Built:
     """Return the code of the steps."""
     return build_code([], CodeOptions(level=2), more=step_code(), exports=FUNCTIONS)
 
 
-@cache
+@once
 def _functions() -> tuple[Callable[..., int], ...]:
     """Return the functions `evaluate`, `run`, `interpolate` and `sample`."""
     addresses = _code().code.addresses

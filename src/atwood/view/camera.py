@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from atwood.errors import UsageError
 
-__all__ = ["DEFAULT_VIEW", "Camera", "View", "as_camera"]
+__all__ = ["DEFAULT_VIEW", "Camera", "View", "as_camera", "check_view"]
 
 FloatArray = NDArray[np.float64]
 
@@ -104,3 +104,25 @@ def as_camera(view: View | None) -> Camera:
         advice = "It lies between -90, straight from below, and 90, straight from above; first comes the azimuth."
         raise UsageError(f"the elevation of {elevation:g} degrees does not exist", where="view", advice=advice)
     return Camera(azimuth, elevation)
+
+
+def check_view(space: str, view: View | None) -> bool:
+    """Return whether a scene is in space, or raise an error where a view is given and it is not.
+
+    Parameters
+    ----------
+    space
+        What it lives in.
+    view
+        From where it is to be seen.
+
+    Raises
+    ------
+    UsageError
+        If the scene has one side only.
+    """
+    if space != "space" and view is not None:
+        where = {"plane": "in a plane", "line": "on a line"}[space]
+        advice = "Leave the view away; only scenes in space have other sides."
+        raise UsageError(f"a scene {where} is always seen from the front", where="view", advice=advice)
+    return space == "space"

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "GREY", "INK", "check_picture", "new_figure", "polish", "save_figure"]
+__all__ = ["ANIMATED", "COLOURS", "GREY", "INK", "SUFFIXES", "check_picture", "new_figure", "polish", "save_figure"]
 
 COLOURS = ("#2a6fbb", "#d1495b", "#2e9e6b", "#c98a1b", "#7b5ea7", "#3aa6b9", "#8a6d5a", "#d46ba3")
 """Told apart by most readers, and in print."""
@@ -22,6 +22,8 @@ COLOURS = ("#2a6fbb", "#d1495b", "#2e9e6b", "#c98a1b", "#7b5ea7", "#3aa6b9", "#8
 INK, GREY = "#22303c", "#8d99a6"
 
 SUFFIXES = (".png", ".svg", ".pdf")
+
+ANIMATED = (".gif",)
 
 
 def check_picture(file: str | os.PathLike[str], suffixes: tuple[str, ...] = SUFFIXES) -> None:

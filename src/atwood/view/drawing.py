@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from atwood.errors import UsageError
 from atwood.result.files import write_atomically
 from atwood.result.result import Result
-from atwood.view.camera import View, as_camera
-from atwood.view.canvas import COLOURS, INK, check_picture, new_figure, save_figure
+from atwood.view.camera import View, as_camera, check_view
+from atwood.view.canvas import ANIMATED, COLOURS, INK, check_picture, new_figure, save_figure
 from atwood.view.geometry import Picture, find_connectors, make_picture
 from atwood.view.space_drawing import draw_space, frame_space, space_panels
 from atwood.view.space_picture import SpacePicture, make_space_picture
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["animate", "check_view", "plot_mechanism"]
+__all__ = ["animate", "plot_mechanism"]
 
 FloatArray = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def plot_mechanism(
     """
     traced = find_connectors(result, trace)
     moments = _moments(result, times)
-    if check_view(result, view):
+    if check_view(result.assembly.mechanism.space.name, view):
         figure = _draw_space(result, make_space_picture(result, as_camera(view), traced), moments)
     else:
         picture = make_picture(result, traced.values())
@@ -81,29 +81,6 @@ def plot_mechanism(
     if file is not None:
         save_figure(figure, file)
     return figure
-
-
-def check_view(result: Result, view: View | None) -> bool:
-    """Return whether a run's scene is in space, or raise an error where a view is given and it is not.
-
-    Parameters
-    ----------
-    result
-        The run.
-    view
-        From where it is to be seen.
-
-    Raises
-    ------
-    UsageError
-        If the scene has one side only.
-    """
-    space = result.assembly.mechanism.space.name
-    if space != "space" and view is not None:
-        where = {"plane": "in a plane", "line": "on a line"}[space]
-        advice = "Leave the view away; only scenes in space have other sides."
-        raise UsageError(f"a scene {where} is always seen from the front", where="view", advice=advice)
-    return space == "space"
 
 
 def _moments(result: Result, times: Sequence[float] | None) -> list[int]:
@@ -212,7 +189,7 @@ def animate(
     UsageError
         If matplotlib is missing, there is no such view or connector, or the file cannot be saved.
     """
-    check_picture(file, (".gif",))
+    check_picture(file, ANIMATED)
     from matplotlib.animation import FuncAnimation, PillowWriter
 
     lasting = min(float(result.time[-1] - result.time[0]), 20.0) if seconds is None else seconds
@@ -220,9 +197,10 @@ def animate(
     wanted = np.linspace(result.time[0], result.time[-1], count)
     moments = [int(np.argmin(np.abs(result.time - time))) for time in wanted]
     traced = find_connectors(result, trace)
-    if check_view(result, view):
+    if check_view(result.assembly.mechanism.space.name, view):
         seen = make_space_picture(result, as_camera(view), traced)
         figure, (axes,) = space_panels(seen, [" "])
+        axes.set_position((0.02, 0.02, 0.96, 0.9))
     else:
         picture = make_picture(result, traced.values())
         figure, axes, pen = _page(picture, None)

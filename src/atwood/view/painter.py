@@ -230,7 +230,7 @@ class Stage:
             for shift, size, share in ((0.0, 1.0, 0.0), (1.0, 0.55, 0.25), (1.0, 0.28, 0.5)):
                 middle = ball.middle + shift * ball.radius * np.array([-0.28, 0.32])
                 shapes.append(middle + size * ball.radius * _CIRCLE)
-                depths.append(np.array([ball.depth + 0.6 * ball.radius]))
+                depths.append(np.array([ball.depth + 0.95 * ball.radius]))
                 tone = lighter(ball.tone, share)[None]
                 tones.append(tone)
                 edges.append(tone if shift else to_rgb(INK)[None])
@@ -238,7 +238,7 @@ class Stage:
             order = np.argsort(np.concatenate(depths), kind="stable")
             face, edge = np.concatenate(tones)[order], np.concatenate(edges)[order]
             painted = [shapes[i] for i in order]
-            axes.add_collection(PolyCollection(painted, facecolors=face, edgecolors=edge, linewidths=0.5, zorder=layer))
+            axes.add_collection(PolyCollection(painted, facecolors=face, edgecolors=edge, linewidths=0.8, zorder=layer))
         if self._lines:
             ends = np.concatenate([one.ends for one in self._lines])
             away = np.concatenate([one.depths for one in self._lines])

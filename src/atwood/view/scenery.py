@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.view.camera import Camera
 from atwood.view.canvas import GREY
 from atwood.view.space_model import AXIS_COLOURS
 from atwood.view.space_picture import SpacePicture, Trail
@@ -69,15 +70,15 @@ def _from_above(picture: SpacePicture, moment: int) -> list[FloatArray]:
     return found
 
 
-def draw_sphere(axes: Axes, picture: SpacePicture, trail: Trail) -> None:
+def draw_sphere(axes: Axes, camera: Camera, trail: Trail) -> None:
     """Draw the sphere on which the end of an axis moves, or half of it, with a net of meridians and parallels.
 
     Parameters
     ----------
     axes
         Where.
-    picture
-        The scene.
+    camera
+        The eye.
     trail
         The path; nothing is drawn where it has no sphere.
     """
@@ -86,7 +87,7 @@ def draw_sphere(axes: Axes, picture: SpacePicture, trail: Trail) -> None:
 
     if trail.center is None:
         return
-    camera, (low, high) = picture.camera, trail.heights
+    low, high = trail.heights
     outline = Polygon(trail.outline(camera), facecolor="#f7f9fb", edgecolor="#ccd4dc", linewidth=0.9, zorder=1.0)
     axes.add_patch(outline)
     middle = camera.project(trail.center)
@@ -107,21 +108,23 @@ def draw_sphere(axes: Axes, picture: SpacePicture, trail: Trail) -> None:
         axes.add_collection(LineCollection(list(pieces), colors=list(tones), linewidths=0.7, zorder=1.1))
 
 
-def draw_corner_axes(axes: Axes, picture: SpacePicture) -> None:
+def draw_corner_axes(axes: Axes, camera: Camera, bounds: tuple[FloatArray, FloatArray]) -> None:
     """Draw the directions of the world's axes in the lower left corner.
 
     Parameters
     ----------
     axes
         Where.
-    picture
-        The scene.
+    camera
+        The eye.
+    bounds
+        Corners of the page, m.
     """
-    lows, highs = picture.bounds
+    lows, highs = bounds
     size = 0.07 * float(np.max(highs - lows))
-    arms = picture.camera.axes[:2].T
+    arms = camera.axes[:2].T
     start = lows + 1.25 * size * np.clip(-arms.min(axis=0), 0.15, 1.0)
-    for number in np.argsort(picture.camera.axes[2]):
+    for number in np.argsort(camera.axes[2]):
         arm = arms[number]
         end = start + size * arm
         axes.plot([start[0], end[0]], [start[1], end[1]], color=AXIS_COLOURS[number], linewidth=1.6, zorder=4)

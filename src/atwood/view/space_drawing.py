@@ -42,7 +42,7 @@ def draw_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
     model = picture.model
     draw_floor(axes, picture, moment)
     for trail in picture.trails:
-        draw_sphere(axes, picture, trail)
+        draw_sphere(axes, picture.camera, trail)
     stage = Stage(picture.camera, model.unit)
     for piece in model.pieces:
         pose = model.reading.poses[piece.body]
@@ -60,7 +60,7 @@ def draw_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
     for trail in picture.trails:
         _draw_trail(stage, trail, moment)
     stage.paint(axes, 3.0)
-    draw_corner_axes(axes, picture)
+    draw_corner_axes(axes, picture.camera, picture.bounds)
 
 
 def _draw_trail(stage: Stage, trail: Trail, moment: int) -> None:
@@ -169,7 +169,7 @@ def space_panels(picture: SpacePicture, titles: Sequence[str], name: str = "") -
     lows, highs = picture.bounds
     width, height = highs - lows
     count = len(titles)
-    columns = count if height > 1.6 * width or count <= 2 else 2 if count <= 4 else 3
+    columns = count if height > 1.6 * width or count <= 3 else 2 if count == 4 else 3
     rows = -(-count // columns)
     scale = min(9.0 / (columns * width), 8.0 / (rows * height)) if count > 1 else min(7.0 / width, 7.0 / height)
     figure = new_figure(max(3.2, columns * scale * width), rows * (scale * height + 0.3) + (0.3 if name else 0.0))

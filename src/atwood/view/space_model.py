@@ -99,10 +99,15 @@ def _extent(reading: Reading, shapes: tuple[BodyShape, ...], pieces: Sequence[Pi
     return float(np.max(np.ptp(np.concatenate(points), axis=0), initial=0.0)) or 1.0
 
 
+def _pairs(reading: Reading) -> list[tuple[int, int]]:
+    """Return the pairs of bodies that a joint or something else holds together."""
+    ends = [one.nodes for one in reading.joinings] + [(one.nodes[0], one.nodes[-1]) for one in reading.ties]
+    return [(reading.body_of[a], reading.body_of[b]) for a, b in ends]
+
+
 def _depths(reading: Reading) -> dict[int, int]:
     """Return how many joints each body is away from the world."""
-    ends = [one.nodes for one in reading.joinings] + [(one.nodes[0], one.nodes[-1]) for one in reading.ties]
-    pairs = [(reading.body_of[a], reading.body_of[b]) for a, b in ends]
+    pairs = _pairs(reading)
     found, front = {0: 0}, [0]
     while front:
         reached = []
@@ -114,6 +119,16 @@ def _depths(reading: Reading) -> dict[int, int]:
                         found[other] = found[body] + 1
                         reached.append(other)
         front = reached
+    return found
+
+
+def _together(reading: Reading, body: int) -> set[int]:
+    """Return the bodies that hang together with a body, not through the world."""
+    pairs = [pair for pair in _pairs(reading) if 0 not in pair]
+    found, grows = {body}, True
+    while grows:
+        more = {one for pair in pairs if found & set(pair) for one in pair} - found
+        found, grows = found | more, bool(more)
     return found
 
 
@@ -143,14 +158,14 @@ def _add_triad(bench: Bench, shape: BodyShape) -> None:
     body, lump = shape.lump.body, shape.lump
     origin = bench.reading.offsets[lump.node]
     for axis, colour in zip(lump.axes.T, AXIS_COLOURS, strict=True):
-        bench.line(body, np.array([origin, origin + _outside(shape, origin, axis) * axis]), 2.0, colour)
+        bench.line(body, np.array([origin, origin + _outside(shape, origin, axis, 0.38) * axis]), 2.0, colour)
 
 
-def _outside(shape: BodyShape, origin: FloatArray, axis: FloatArray) -> float:
-    """Return how far an axis has to go from a point of a body to stand out of it, m."""
+def _outside(shape: BodyShape, origin: FloatArray, axis: FloatArray, share: float) -> float:
+    """Return how far an axis has to go from a point of a body to stand out of it, at least a share of its size, m."""
     along = (shape.center - origin) @ axis
     half = 0.5 * float(np.abs(shape.axes.T @ axis) @ shape.sides)
-    return max(1.2 * float(along + half), 0.6 * float(np.max(shape.sides)))
+    return max(1.2 * float(along + half), share * float(np.max(shape.sides)))
 
 
 def _add_bars(bench: Bench) -> None:
@@ -284,12 +299,11 @@ def _add_masses(bench: Bench) -> tuple[tuple[int, str], ...]:
 def _add_feet(bench: Bench) -> None:
     """Draw what is fixed in the world: a foot below it, or a bracket above it where the mechanism hangs down."""
     reading, unit = bench.reading, bench.unit
-    moving = [reading.place(node)[:, 2].mean() for node in reading.used if reading.body_of[node] != 0]
-    moving += [reading.poses[s.lump.body].place(s.center)[:, 2].mean() for s in bench.shapes]
-    middle = float(np.mean(moving)) if moving else 0.0
     for node, places in bench.feet.items():
+        middle = _held_height(bench, node)
         for place in places or [reading.offsets[node]]:
-            up = -1.0 if reading.is_heavy and place[2] > middle + unit else 1.0
+            hangs = reading.is_heavy and middle is not None and place[2] > middle + unit
+            up = -1.0 if hangs else 1.0
             frame = np.diag([1.0, up, up])
             cone = revolved([(0.0, -3.4 * unit), (2.6 * unit, -3.4 * unit), (0.0, 0.0)], around=24)
             plate = box((9.0 * unit, 9.0 * unit, 0.9 * unit))
@@ -297,16 +311,32 @@ def _add_feet(bench: Bench) -> None:
             bench.surface(0, plate.placed(place - np.array([0.0, 0.0, 3.8 * unit * up]), frame), "#aeb8c2")
 
 
+def _held_height(bench: Bench, node: int) -> float | None:
+    """Return the mean height of everything that a node of the world holds, m; None where it holds nothing."""
+    reading = bench.reading
+    ends = [one.nodes for one in reading.joinings] + [(one.nodes[0], one.nodes[-1]) for one in reading.ties]
+    beside = {reading.body_of[b if a == node else a] for a, b in ends if node in (a, b)} - {0}
+    held = {body for one in beside for body in _together(reading, one)}
+    heights = [reading.place(other)[:, 2].mean() for other in reading.used if reading.body_of[other] in held]
+    heights += [
+        reading.poses[shape.lump.body].place(shape.center)[:, 2].mean()
+        for shape in bench.shapes
+        if shape.lump.body in held
+    ]
+    return float(np.mean(heights)) if heights else None
+
+
 def _add_tips(bench: Bench) -> None:
     """Find points whose paths are worth seeing: of axes of bodies that turn about a point, of free ends of bars."""
     reading = bench.reading
+    loaded = {shape.lump.body for shape in bench.shapes if shape.kind == "point"}  # whose mass leaves a path already
     for shape in bench.shapes:
         body = shape.lump.body
         if shape.kind == "point" or body in bench.clad or bench.children(body):
             continue
         joinings = bench.joinings(body)
         if shape.is_long:
-            if len(joinings) == 1:
+            if len(joinings) == 1 and body not in loaded:
                 held = next(reading.offsets[n] for n in joinings[0].nodes if reading.body_of[n] == body)
                 bench.tips.append(Tip(body, max(shape.ends, key=lambda end: float(np.linalg.norm(end - held)))))
             continue
@@ -322,6 +352,6 @@ def _add_tips(bench: Bench) -> None:
         axis = shape.axes[:, 2] if shape.kind == "round" else shape.lump.axes[:, 2]
         if (shape.center - fixed[0]) @ axis < -bench.unit:
             axis = -axis
-        end = fixed[0] + _outside(shape, fixed[0], axis) * axis
+        end = fixed[0] + _outside(shape, fixed[0], axis, 0.6) * axis
         bench.line(body, np.array([fixed[0], end]), 2.0, AXIS_COLOURS[2])
         bench.tips.append(Tip(body, end, fixed[0]))

@@ -1,0 +1,291 @@
+"""Sparse linear algebra for many states at once: one pattern, and numbers for every state.
+
+What a mechanism's matrices are made of stays where it is while it moves. So the order of elimination and the places
+of what it adds are found once, and every operation is done for all states together. Arrays have one row for each
+entry, and one column for each state.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Elimination", "Normal", "Pattern", "solve_borders"]
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+
+_SHARE = 1e-13
+"""What is added to the diagonal of normal equations, relative to its largest entry."""
+
+
+def _sums(values: FloatArray, starts: IndexArray, count: int) -> FloatArray:
+    """Return the sums of consecutive rows; `starts` says where each of `count` groups begins, none is empty."""
+    if not count:
+        return np.zeros((0, values.shape[1]))
+    found: FloatArray = np.add.reduceat(values, starts, axis=0)
+    return found
+
+
+class Pattern:
+    """Where a matrix of some rows and columns has entries.
+
+    Parameters
+    ----------
+    rows, columns
+        Of each entry.
+    shape
+        Number of rows and of columns.
+    """
+
+    def __init__(self, rows: IndexArray, columns: IndexArray, shape: tuple[int, int]) -> None:
+        self.rows, self.columns, self.shape = rows, columns, shape
+        self._by_row = np.argsort(rows, kind="stable")
+        self._used, self._starts = np.unique(rows[self._by_row], return_index=True)
+        self._by_column = np.argsort(columns, kind="stable")
+        self._met, self._begins = np.unique(columns[self._by_column], return_index=True)
+
+    def largest(self, entries: FloatArray) -> FloatArray:
+        """Return the largest absolute value in each row, shape (rows, states)."""
+        found = np.zeros((self.shape[0], entries.shape[1]))
+        if len(self._used):
+            found[self._used] = np.maximum.reduceat(np.abs(entries[self._by_row]), self._starts, axis=0)
+        return found
+
+    def times(self, entries: FloatArray, x: FloatArray) -> FloatArray:
+        """Return the product with a vector for each state, shape (rows, states)."""
+        found = np.zeros((self.shape[0], entries.shape[1]))
+        order = self._by_row
+        found[self._used] = _sums(entries[order] * x[self.columns[order]], self._starts, len(self._used))
+        return found
+
+    def times_across(self, entries: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the product of the transposed matrix with a vector for each state, shape (columns, states)."""
+        found = np.zeros((self.shape[1], entries.shape[1]))
+        order = self._by_column
+        found[self._met] = _sums(entries[order] * y[self.rows[order]], self._begins, len(self._met))
+        return found
+
+    def chosen(self, kept: Sequence[int]) -> tuple[Pattern, IndexArray]:
+        """Return the pattern of some rows, and which entries these have."""
+        number = np.full(self.shape[0], -1)
+        number[list(kept)] = np.arange(len(kept))
+        which = np.flatnonzero(number[self.rows] >= 0)
+        return Pattern(number[self.rows[which]], self.columns[which], (len(kept), self.shape[1])), which
+
+
+@dataclass(frozen=True)
+class _Step:
+    """One step of an elimination: the pivot, the entries below it, and which products change which entries."""
+
+    pivot: int
+    others: IndexArray
+    below: IndexArray
+    first: IndexArray
+    second: IndexArray
+    changed: IndexArray
+
+
+class Elimination:
+    """Symmetric elimination ``A = L D L^T`` in an order that adds few entries.
+
+    Parameters
+    ----------
+    size
+        Number of unknowns.
+    places
+        Where the matrix has entries off its diagonal.
+    late
+        Unknowns that go last.
+    """
+
+    def __init__(self, size: int, places: Iterable[tuple[int, int]], late: Iterable[int] = ()) -> None:
+        around: list[set[int]] = [set() for _ in range(size)]
+        for i, j in places:
+            if i != j:
+                around[i].add(j)
+                around[j].add(i)
+        self.size = size
+        self.order: list[int] = []
+        self.number: dict[tuple[int, int], int] = {(i, i): i for i in range(size)}
+        for i, others in enumerate(around):
+            for j in others:
+                if i < j:
+                    self._place(i, j)
+        last = set(late)
+        heap = [(i in last, len(around[i]), i) for i in range(size)]
+        heapq.heapify(heap)
+        gone = [False] * size
+        self.steps: list[_Step] = []
+        while heap:
+            _, degree, p = heapq.heappop(heap)
+            if gone[p] or degree != len(around[p]):
+                continue
+            gone[p] = True
+            self._eliminate(p, around)
+            for j in around[p]:
+                heapq.heappush(heap, (j in last, len(around[j]), j))
+
+    def _place(self, i: int, j: int) -> int:
+        return self.number.setdefault((i, j) if i < j else (j, i), len(self.number))
+
+    def _eliminate(self, p: int, around: list[set[int]]) -> None:
+        others = sorted(around[p])
+        for j in others:
+            around[j].discard(p)
+        below = [self._place(p, j) for j in others]
+        first, second, changed = [], [], []
+        for a, j in enumerate(others):
+            around[j].update(others[a + 1 :])
+            for b in range(a, len(others)):
+                around[others[b]].add(j)
+                first.append(a)
+                second.append(b)
+                changed.append(self._place(j, others[b]))
+            around[j].discard(j)
+        arrays = (np.array(one, dtype=np.intp) for one in (others, below, first, second, changed))
+        self.steps.append(_Step(p, *arrays))
+
+    def factorise(self, entries: FloatArray) -> FloatArray:
+        """Return the factors, from entries by their `number`; where a pivot is zero nothing finite comes out.
+
+        Parameters
+        ----------
+        entries
+            The matrix, shape (len(number), states); overwritten.
+        """
+        with np.errstate(all="ignore"):
+            for step in self.steps:
+                if len(step.others):
+                    values = entries[step.below]
+                    shares = values / entries[step.pivot]
+                    entries[step.changed] -= shares[step.first] * values[step.second]
+                    entries[step.below] = shares
+        return entries
+
+    def solve(self, factors: FloatArray, right: FloatArray) -> FloatArray:
+        """Return the solution for each state, shape (size, states)."""
+        found = right.copy()
+        with np.errstate(all="ignore"):
+            for step in self.steps:
+                if len(step.others):
+                    found[step.others] -= factors[step.below] * found[step.pivot]
+            found /= factors[: self.size]
+            for step in reversed(self.steps):
+                if len(step.others):
+                    found[step.pivot] -= np.einsum("is,is->s", factors[step.below], found[step.others])
+        return found
+
+
+class Normal:
+    """Least-norm solutions of ``A x = r`` by the normal equations ``A A^T y = r``, ``x = A^T y``.
+
+    Parameters
+    ----------
+    whole
+        Where a matrix has entries.
+    kept
+        The rows of it that are A.
+    """
+
+    def __init__(self, whole: Pattern, kept: Sequence[int]) -> None:
+        self.whole = whole
+        self.pattern, self._which = whole.chosen(kept)
+        pattern = self.pattern
+        by_column: dict[int, list[tuple[int, int]]] = {}
+        for entry, (row, column) in enumerate(zip(pattern.rows.tolist(), pattern.columns.tolist(), strict=True)):
+            by_column.setdefault(column, []).append((row, entry))
+        pairs = [(i, j, e, f) for column in by_column.values() for i, e in column for j, f in column if i <= j]
+        self.elimination = Elimination(pattern.shape[0], ((i, j) for i, j, _, _ in pairs))
+        number = self.elimination.number
+        targets = np.array([number[i, j] for i, j, _, _ in pairs], dtype=np.intp)
+        order = np.argsort(targets, kind="stable")
+        self._first = np.array([e for _, _, e, _ in pairs], dtype=np.intp)[order]
+        self._second = np.array([f for _, _, _, f in pairs], dtype=np.intp)[order]
+        self._targets, self._starts = np.unique(targets[order], return_index=True)
+
+    @property
+    def volume(self) -> int:
+        """How many numbers are worked on for each state."""
+        return len(self._first) + 2 * len(self.elimination.number)
+
+    def _factorise(self, entries: FloatArray) -> FloatArray:
+        """Return the factors of the normal equations."""
+        n = self.elimination.size
+        square = np.zeros((len(self.elimination.number), entries.shape[1]))
+        square[self._targets] = _sums(entries[self._first] * entries[self._second], self._starts, len(self._targets))
+        square[:n] += _SHARE * np.max(square[:n], axis=0, initial=0.0)
+        return self.elimination.factorise(square)
+
+    def least_norm(self, entries: FloatArray, right: FloatArray) -> FloatArray:
+        """Return the shortest solution for each state, shape (columns, states).
+
+        Parameters
+        ----------
+        entries
+            Of the whole matrix, shape (entries, states).
+        right
+            What A x is to be, shape (kept rows, states).
+        """
+        entries = entries[self._which]
+        factors = self._factorise(entries)
+        found = self.pattern.times_across(entries, self.elimination.solve(factors, right))
+        missing = right - self.pattern.times(entries, found)
+        return found + self.pattern.times_across(entries, self.elimination.solve(factors, missing))
+
+
+def solve_borders(
+    mass: tuple[Pattern, FloatArray], slope: tuple[Pattern, FloatArray], bias: FloatArray, gamma: FloatArray
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Solve ``M a + bias = G^T lambda``, ``G a + gamma = 0`` for many states, the masses first.
+
+    Parameters
+    ----------
+    mass, slope
+        M and G, with their entries for each state.
+    bias, gamma
+        Shape (number, states).
+
+    Returns
+    -------
+    accelerations, multipliers
+        Shape (number, states).
+    good
+        For which states the solution fulfils its equations; where something has no mass of its own it may not.
+    """
+    n, m = len(bias), len(gamma)
+    (at, masses), (held, slopes) = mass, slope
+    places = list(zip(at.rows.tolist(), at.columns.tolist(), strict=True))
+    borders = [(c, n + r) for r, c in zip(held.rows.tolist(), held.columns.tolist(), strict=True)]
+    elimination = Elimination(n + m, [*places, *borders], range(n, n + m))
+    entries = np.zeros((len(elimination.number), bias.shape[1]))
+    upper = np.flatnonzero(at.rows <= at.columns)
+    entries[[elimination.number[places[k]] for k in upper.tolist()]] = masses[upper]
+    entries[[elimination.number[one] for one in borders]] = -slopes
+    factors = elimination.factorise(entries)
+    right = np.concatenate([-bias, gamma])
+    found = np.zeros((n + m, bias.shape[1]))
+    sizes = np.zeros((n + m, bias.shape[1]))
+    for _ in range(2):
+        a, multipliers = found[:n], found[n:]
+        missing = np.concatenate(
+            [
+                right[:n] - at.times(masses, a) + held.times_across(slopes, multipliers),
+                right[n:] + held.times(slopes, a),
+            ]
+        )
+        found = found + elimination.solve(factors, missing)
+    a, multipliers = found[:n], found[n:]
+    sizes[:n] = at.times(np.abs(masses), np.abs(a)) + held.times_across(np.abs(slopes), np.abs(multipliers))
+    sizes[n:] = held.times(np.abs(slopes), np.abs(a))
+    left = np.concatenate(
+        [right[:n] - at.times(masses, a) + held.times_across(slopes, multipliers), right[n:] + held.times(slopes, a)]
+    )
+    scale = np.max(sizes, axis=0, initial=0.0) + np.max(np.abs(right), axis=0, initial=0.0)
+    with np.errstate(invalid="ignore"):
+        good = np.all(np.abs(left) <= 1e-10 * np.maximum(scale, 1e-300), axis=0)
+    return a, multipliers, good
