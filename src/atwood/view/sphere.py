@@ -71,13 +71,7 @@ def plot_on_sphere(
     outline = globe.outline(camera)
     bounds = outline.min(axis=0) - 0.08, outline.max(axis=0) + 0.08
     width, height = bounds[1] - bounds[0]
-    columns = min(_COLUMNS, len(trails))
-    rows, size = -(-len(trails) // columns), max(3.0, 5.4 - 0.6 * columns)
-    lines = 1 + max(name.count("\n") for name in named)
-    figure = new_figure(columns * size, rows * (size * height / width + 0.22 + 0.2 * lines))
-    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
-    for axes in panels[len(trails) :]:
-        axes.set_visible(False)
+    figure, panels = _panels(len(trails), width / height, 1 + max(name.count("\n") for name in named))
     for axes, name, trail in zip(panels, named, trails, strict=False):
         draw_sphere(axes, camera, globe)
         _draw_path(axes, camera, trail)
@@ -90,6 +84,21 @@ def plot_on_sphere(
     if file is not None:
         save_figure(figure, file)
     return figure
+
+
+def _panels(count: int, wide: float, lines: int) -> tuple[Figure, list[Axes]]:
+    """Return a figure of panels that are so many times wider than high, with room for lines of text above each."""
+    columns = min(_COLUMNS, count)
+    rows, size, above = -(-count // columns), max(3.0, 5.4 - 0.6 * columns), 0.18 + 0.17 * lines  # inches
+    high = size / wide
+    figure = new_figure(columns * size, rows * (high + above))
+    figure.set_layout_engine(None)
+    top = 1.0 - above / (rows * (high + above))
+    figure.subplots_adjust(left=0.005, right=0.995, bottom=0.005, top=top, wspace=0.03, hspace=above / high)
+    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    return figure, panels[:count]
 
 
 def _trail(result: Result, path: str, colour: str) -> Trail:
