@@ -142,7 +142,7 @@ def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
 
 
 def _key(parts: Sequence[Part], options: CodeOptions, more: str) -> str:
-    programs = [(part.name, part.program.digest, part.positions) for part in parts]
+    programs = [(part.name, part.program.digest, part.positions, part.lanes, part.packed) for part in parts]
     return make_key([_GENERATOR, _sources(), programs, options, more, target_description()])
 
 

@@ -92,11 +92,18 @@ class Part:
         What it computes.
     positions
         Where all results go in the arrays of their groups, if not one after the other.
+    lanes
+        So many neighbouring places of the groups in `packed` are stored at once, those without a result as zero, where
+        one function computes all: whoever reads them at once need not wait until each has arrived in memory.
+    packed
+        The output groups for which this is wanted; their arrays are aligned and padded to it.
     """
 
     name: str
     program: Program
     positions: tuple[int, ...] | None = None
+    lanes: int = 1
+    packed: tuple[int, ...] = ()
 
 
 def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "") -> ModuleText:
@@ -126,7 +133,8 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
             layout = lay_out(body, options.longest_chunk)
             scratch = max(scratch, layout.scratch)
             try:
-                parts.extend(_write_function(function, body, layout, options, needs))
+                whole = part if function == name and len(layout.chunks) == 1 else None
+                parts.extend(_write_function(function, body, layout, options, needs, whole))
             except UnsupportedError as error:
                 raise UnsupportedError(error.message, where=program.name) from None
         parts.append(_write_prologue(name))
@@ -146,8 +154,10 @@ def _contracted(text: str) -> str:
     return text
 
 
-def _write_function(name: str, body: Body, layout: Layout, options: CodeOptions, needs: Needs) -> list[str]:
-    """Write the chunks of a body, and the function that calls them."""
+def _write_function(
+    name: str, body: Body, layout: Layout, options: CodeOptions, needs: Needs, whole: Part | None = None
+) -> list[str]:
+    """Write the chunks of a body, and the function that calls them; `whole` says how the only chunk stores results."""
     places = {node.index: (pointer, k) for pointer, nodes in body.given for k, node in enumerate(nodes)}
     places |= {index: ("scratch", slot) for index, slot in layout.slots.items()}
     targets: dict[int, list[tuple[str, int]]] = {}
@@ -155,13 +165,14 @@ def _write_function(name: str, body: Body, layout: Layout, options: CodeOptions,
     for node, pointer, position in body.results:
         targets.setdefault(node.index, []).append((pointer, position))
         results[node.index] = node
+    held = frozenset(f"out{group}" for group in whole.packed) if whole is not None else frozenset()
     solver = Solver(layout.regions)
     parts: list[str] = []
     for number, chunk in enumerate(layout.chunks):
-        writer = Writer(places, options.sincos, needs)
+        writer = Writer(places, options.sincos, needs, held)
         solver.start_chunk()
         for unit in chunk:
-            _write_unit(writer, solver, unit)
+            write_unit(writer, solver, unit)
             for node in unit:
                 if node.index in layout.slots:
                     writer.store(writer.value(node), "scratch", layout.slots[node.index])
@@ -170,6 +181,8 @@ def _write_function(name: str, body: Body, layout: Layout, options: CodeOptions,
         if number == len(layout.chunks) - 1:
             for node in results.values():
                 _write_result(writer, node, targets[node.index])
+        if whole is not None:
+            _pack(writer, whole.lanes)
         if len(layout.chunks) == 1:
             return [_as_function(name, writer)]
         parts.append(_as_chunk(f"{name}.{number}", writer))
@@ -177,7 +190,7 @@ def _write_function(name: str, body: Body, layout: Layout, options: CodeOptions,
     return parts
 
 
-def _write_unit(writer: Writer, solver: Solver, unit: Unit) -> None:
+def write_unit(writer: Writer, solver: Solver, unit: Unit) -> None:
     node = unit[0]
     if node.operation == "solve":
         solver.write(writer, node, unit[1:])
@@ -195,21 +208,35 @@ def _write_result(writer: Writer, node: Expression, targets: Sequence[tuple[str,
     writer.check(value)
 
 
+def _pack(writer: Writer, lanes: int) -> None:
+    """Store what was held back, neighbouring results at once."""
+    kind = f"<{lanes} x double>"
+    vectors: dict[tuple[str, int], dict[int, str]] = {}
+    for value, pointer, position in writer.kept:
+        vectors.setdefault((pointer, position // lanes), {})[position % lanes] = value
+    for (pointer, block), values in vectors.items():
+        vector = "zeroinitializer"
+        for lane, value in sorted(values.items()):
+            vector = writer.put(f"insertelement {kind} {vector}, double {value}, i32 {lane}")
+        address = writer.address(pointer, block * lanes)
+        writer.lines.append(f"  store {kind} {vector}, ptr {address}, align {8 * lanes}")
+
+
 def _as_chunk(name: str, writer: Writer) -> str:
     """Return a chunk as a function of its own, which returns the sum of its results."""
     checked = writer.checked()
-    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *_opening(writer)]
+    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *opening(writer)]
     return "\n".join([*start, *writer.lines, f"  ret double {checked}", "}"])
 
 
 def _as_function(name: str, writer: Writer) -> str:
     """Return the only chunk of a body as the whole function."""
     checked = writer.checked()
-    start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *_opening(writer)]
+    start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *opening(writer)]
     return "\n".join([*start, *writer.lines, *_ending(checked)])
 
 
-def _opening(writer: Writer) -> list[str]:
+def opening(writer: Writer) -> list[str]:
     """Return the instructions that fetch the pointers that a chunk uses."""
     lines = ["  %sine = alloca double", "  %cosine = alloca double"] if writer.waves else []
     for pointer in sorted(writer.pointers):

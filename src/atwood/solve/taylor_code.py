@@ -7,7 +7,7 @@ the two compiled programs of its recurrences, so that it is compiled once and ke
 from __future__ import annotations
 
 from atwood.solve.explicit_loops import exact
-from atwood.solve.taylor_loops import LANES, ROWS, loop_code
+from atwood.solve.taylor_loops import LANES, ROWS, STRIDE, loop_code
 from atwood.solve.taylor_problem import HIGHEST, LOWEST, RETREAT, RETRIES, SMALLER, WATCHED
 
 __all__ = ["COUNTS", "FUNCTIONS", "NUMBERS", "POINTERS", "step_code"]
@@ -84,6 +84,9 @@ entry:
   %square.at = getelementptr ptr, ptr %order_out, i64 2
   %next.at = getelementptr ptr, ptr %order_out, i64 3
   %x.at = getelementptr ptr, ptr %order_in, i64 3
+  %has.squares = icmp sgt i64 %squares, 0
+  %square.index = mul i64 %pairs, {2 * STRIDE}
+  %square.table = getelementptr double, ptr %table, i64 %square.index
   br label %attempt
 attempt:
   %unit = phi double [ %wanted, %entry ], [ %smaller, %again ]
@@ -112,9 +115,11 @@ order{HIGHEST}:
 def _order(k: int) -> str:
     """Return the instructions that find the coefficients of one order, and those of the unknowns of the next."""
     sums = f"""  call void @pairs{k}(ptr %table, ptr %pair_sums, i64 %pairs)
-  %square.table{k}.index = mul i64 %pairs, {2 * LANES * (HIGHEST + 1)}
-  %square.table{k} = getelementptr double, ptr %table, i64 %square.table{k}.index
-  call void @squares{k}(ptr %square.table{k}, ptr %square_sums, i64 %squares)
+  br i1 %has.squares, label %squares{k}, label %sums{k}
+squares{k}:
+  call void @squares{k}(ptr %square.table, ptr %square_sums, i64 %squares)
+  br label %sums{k}
+sums{k}:
 """
     if k + 1 >= LOWEST:
         more = f"""  %is.last{k} = icmp eq i64 %p, {k + 1}
