@@ -111,6 +111,41 @@ def test_a_run_is_plotted(tmp_path: Path) -> None:
     assert "<svg" in file.read_text(encoding="utf-8")
 
 
+@installed
+def test_a_run_is_drawn(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    files = [tmp_path / name for name in ("front.svg", "above.svg", "moving.gif", "plane.png")]
+    for file, view in zip(files[:2], ("0,0", "0,90"), strict=True):
+        done = run("run", "free-body", "--t-end", "0.5", "--outputs", "11", "--draw", str(file), "--view", view)
+        assert done.exit_code == 0, done.output
+        assert f"drawn: {file}" in done.stdout
+    assert files[0].read_text(encoding="utf-8") != files[1].read_text(encoding="utf-8")
+    assert run("run", "free-body", "--t-end", "0.1", "--outputs", "5", "--draw", str(files[2])).exit_code == 0
+    assert files[2].read_bytes().startswith(b"GIF89a")
+    assert run("run", f"{FILE}:Swing", "--draw", str(files[3])).exit_code == 0
+    assert files[3].read_bytes().startswith(b"\x89PNG")
+
+
+@installed
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["free-body", "--view", "1,2"], "--draw FILE"),
+        (["free-body", "--view", "1", "--draw", "a.png"], "azimuth and elevation in degrees"),
+        (["free-body", "--view", "0,95", "--draw", "a.png"], "elevation of 95 degrees"),
+        (["simple-pendulum", "--view", "1,2", "--draw", "a.png"], "always seen from the front"),
+        (["free-body", "--draw", "a.mp4"], ".gif"),
+    ],
+)
+def test_what_cannot_be_drawn(arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    done = run("run", *arguments)
+    assert done.exit_code == 1
+    assert said in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("solver", ["auto", "ida", "explicit", "taylor"])
 def test_what_came_before_a_failure_is_saved(solver: str, tmp_path: Path) -> None:
     file = tmp_path / "before.npz"

@@ -169,7 +169,7 @@ def space_panels(picture: SpacePicture, titles: Sequence[str], name: str = "") -
     lows, highs = picture.bounds
     width, height = highs - lows
     count = len(titles)
-    columns = count if height > 1.6 * width or count <= 2 else 2 if count <= 4 else 3
+    columns = count if height > 1.6 * width or count <= 3 else 2 if count == 4 else 3
     rows = -(-count // columns)
     scale = min(9.0 / (columns * width), 8.0 / (rows * height)) if count > 1 else min(7.0 / width, 7.0 / height)
     figure = new_figure(max(3.2, columns * scale * width), rows * (scale * height + 0.3) + (0.3 if name else 0.0))

@@ -329,13 +329,14 @@ def _held_height(bench: Bench, node: int) -> float | None:
 def _add_tips(bench: Bench) -> None:
     """Find points whose paths are worth seeing: of axes of bodies that turn about a point, of free ends of bars."""
     reading = bench.reading
+    loaded = {shape.lump.body for shape in bench.shapes if shape.kind == "point"}  # whose mass leaves a path already
     for shape in bench.shapes:
         body = shape.lump.body
         if shape.kind == "point" or body in bench.clad or bench.children(body):
             continue
         joinings = bench.joinings(body)
         if shape.is_long:
-            if len(joinings) == 1:
+            if len(joinings) == 1 and body not in loaded:
                 held = next(reading.offsets[n] for n in joinings[0].nodes if reading.body_of[n] == body)
                 bench.tips.append(Tip(body, max(shape.ends, key=lambda end: float(np.linalg.norm(end - held)))))
             continue

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.expr import depends_on, is_zero
+from atwood.expr import Expression, depends_on, is_zero
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.orientation import body_offsets
 from atwood.model.laws import BodyInertia
@@ -127,12 +127,20 @@ def _lump(reading: Reading, path: str, node: int, mass: float, center: FloatArra
     return Lump(path, reading.body_of[node], node, mass, place, turn, turn @ tensor @ turn.T)
 
 
+def _is_distance(local: LocalPart, value: Expression) -> bool:
+    """Return whether a constraint holds points apart: it reads the places of two connectors at least, and no more."""
+    several = local.connectors.values()
+    others = [symbol for one in several for symbol in (*one.velocity, *one.orientation, *one.spin)]
+    reads = [depends_on(value, list(one.position)) for one in several]
+    return sum(reads) > 1 and not depends_on(value, others)
+
+
 def _ties(path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Tie]:
     """Return what a part that only pulls or pushes between its nodes looks like."""
     ends = tuple(dict.fromkeys(nodes.values()))
     if local.joints or len(ends) < 2:
         return []
-    if local.constraints:
+    if any(_is_distance(local, one.value) for one in local.constraints):
         return [Tie(path, "rope" if local.part.component.modes else "rod", ends)]
     kinds: list[TieKind] = []
     symbols = [symbol for one in local.connectors.values() for symbol in one.position]
