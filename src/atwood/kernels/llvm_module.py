@@ -23,9 +23,12 @@ from atwood.errors import UnsupportedError
 from atwood.expr.graph import Expression
 from atwood.expr.operations import ExternalFunction
 from atwood.expr.program import Program
-from atwood.kernels.llvm_layout import Body, Layout, Unit, lay_out, main_body, prologue_body
+from atwood.kernels.llvm_layout import Body, Layout, lay_out, main_body, prologue_body
+from atwood.kernels.llvm_rolled import Tables, write_rolled, write_table_functions
 from atwood.kernels.llvm_solve import ROUTINES, Solver
 from atwood.kernels.llvm_text import LIBRARY_FUNCTIONS, Needs, Writer
+from atwood.kernels.llvm_unit import opening, write_unit
+from atwood.kernels.rolled import roll_large
 
 __all__ = ["CodeOptions", "ModuleText", "Part", "write_module"]
 
@@ -56,6 +59,7 @@ class CodeOptions:
     level: int = 1
     sincos: str = ""
     contract: bool = False
+    rolled_from: int = 6_000
 
 
 @dataclass(frozen=True)
@@ -72,12 +76,15 @@ class ModuleText:
         The functions of the C library that it calls.
     externals
         The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
+    tables
+        What its loops work on; ``use_tables`` must be called with them. None if there are no loops.
     """
 
     text: str
     scratch: int
     library: tuple[str, ...]
     externals: tuple[tuple[ExternalFunction, int], ...]
+    tables: Tables | None = None
 
 
 @dataclass(frozen=True)
@@ -125,11 +132,18 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
     """
     needs = Needs()
     parts: list[str] = []
+    tables: Tables | None = None
     scratch = 0
     for part in programs:
         name, program = part.name, part.program
         bodies = ((name, main_body(program, part.positions)), (f"{name}_values", prologue_body(program)))
         for function, body in bodies:
+            rolled = roll_large(body, options.rolled_from) if program.size >= options.rolled_from else None
+            if rolled is not None:
+                tables = tables or Tables()
+                parts.extend(write_rolled(function, rolled, options.sincos, needs, tables))
+                scratch = max(scratch, rolled.scratch)
+                continue
             layout = lay_out(body, options.longest_chunk)
             scratch = max(scratch, layout.scratch)
             try:
@@ -141,10 +155,12 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
     if options.contract:
         parts = [_contracted(text) for text in parts]
     parts.append(more)
+    if tables is not None:
+        parts.append(write_table_functions())
     if needs.elimination:
         parts.append(ROUTINES)
     parts.extend(_declarations(needs, options.sincos))
-    return ModuleText("\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals))
+    return ModuleText("\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals), tables)
 
 
 def _contracted(text: str) -> str:
@@ -190,17 +206,6 @@ def _write_function(
     return parts
 
 
-def write_unit(writer: Writer, solver: Solver, unit: Unit) -> None:
-    node = unit[0]
-    if node.operation == "solve":
-        solver.write(writer, node, unit[1:])
-    elif len(unit) == 2:
-        sine, cosine = unit if node.operation == "sin" else (unit[1], node)
-        writer.write_wave(sine, cosine)
-    else:
-        writer.write(node)
-
-
 def _write_result(writer: Writer, node: Expression, targets: Sequence[tuple[str, int]]) -> None:
     value = writer.value(node)
     for pointer, position in targets:
@@ -234,18 +239,6 @@ def _as_function(name: str, writer: Writer) -> str:
     checked = writer.checked()
     start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *opening(writer)]
     return "\n".join([*start, *writer.lines, *_ending(checked)])
-
-
-def opening(writer: Writer) -> list[str]:
-    """Return the instructions that fetch the pointers that a chunk uses."""
-    lines = ["  %sine = alloca double", "  %cosine = alloca double"] if writer.waves else []
-    for pointer in sorted(writer.pointers):
-        for prefix, table in (("in", "inputs"), ("out", "outputs")):
-            if pointer.startswith(prefix):
-                place = f"%{pointer}.place"
-                lines.append(f"  {place} = getelementptr ptr, ptr %{table}, i64 {pointer.removeprefix(prefix)}")
-                lines.append(f"  %{pointer} = load ptr, ptr {place}, !invariant.load !0")
-    return lines
 
 
 def _ending(checked: str) -> list[str]:
