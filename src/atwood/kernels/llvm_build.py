@@ -178,7 +178,8 @@ def _key(parts: Sequence[Part], options: CodeOptions, more: str) -> str:
 def _sources() -> str:
     """Return a hash of the files that write code, so that no change to them goes unnoticed."""
     total = sha256()
-    for path in sorted(Path(__file__).parent.glob("llvm_*.py")):
+    here = Path(__file__).parent
+    for path in sorted([*here.glob("llvm_*.py"), *here.glob("rolled*.py")]):
         try:
             total.update(path.read_bytes())
         except OSError:
