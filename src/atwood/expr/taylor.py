@@ -102,20 +102,8 @@ def taylor_programs(
     following = []
     for value in recurrence.series(rates):
         following.append(target.zero if value is None else step * value)
-    used = _needed(recurrence.convolutions, following)
-    pairs, squares = _arrange(used, lanes)
-    outputs = (
-        OutputGroup("left", tuple(one.left for one in pairs)),
-        OutputGroup("right", tuple(one.right for one in pairs)),
-        OutputGroup("squares", tuple(one.left for one in squares)),
-        OutputGroup("next", tuple(following)),
-    )
-    inputs = (
-        InputGroup("pairs", tuple(one.total for one in pairs)),
-        InputGroup("squares", tuple(one.total for one in squares)),
-        InputGroup("numbers", numbers),
-        InputGroup("x", tuple(symbols)),
-    )
+    pairs, squares = _arrange(_needed(recurrence.convolutions, following), lanes)
+    inputs, outputs = _groups(pairs, squares, numbers, symbols, following)
     live = {node.index for node in _traverse([e for group in outputs for e in group.expressions])}
     known = [(node, symbol) for node, symbol in recurrence.values if symbol.index in live]
     order = Program(f"{name} (Taylor coefficients)", inputs, tuple(symbol for _, symbol in known), outputs)
@@ -126,6 +114,29 @@ def taylor_programs(
         (OutputGroup("rates", tuple(rates)), OutputGroup("known", tuple(node for node, _ in known))),
     )
     return TaylorPrograms(start, order, len(pairs), len(squares))
+
+
+def _groups(
+    pairs: Sequence[Convolution],
+    squares: Sequence[Convolution],
+    numbers: Sequence[Expression],
+    symbols: Sequence[Expression],
+    following: Sequence[Expression],
+) -> tuple[tuple[InputGroup, ...], tuple[OutputGroup, ...]]:
+    """Return what the program of an order is given, and what it gives."""
+    inputs = (
+        InputGroup("pairs", tuple(one.total for one in pairs)),
+        InputGroup("squares", tuple(one.total for one in squares)),
+        InputGroup("numbers", tuple(numbers)),
+        InputGroup("x", tuple(symbols)),
+    )
+    outputs = (
+        OutputGroup("left", tuple(one.left for one in pairs)),
+        OutputGroup("right", tuple(one.right for one in pairs)),
+        OutputGroup("squares", tuple(one.left for one in squares)),
+        OutputGroup("next", tuple(following)),
+    )
+    return inputs, outputs
 
 
 def _traverse(outputs: Sequence[Expression]) -> list[Expression]:
