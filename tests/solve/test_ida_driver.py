@@ -156,7 +156,7 @@ class TestAnswers:
         assert_allclose(0.5 * (u * u + w * w) + g * z, 0.0, atol=1e-5)
         assert_allclose(force, u * u + w * w - g * z, rtol=1e-3)
 
-    @pytest.mark.parametrize("size", [5, 80])
+    @pytest.mark.parametrize("size", [5, 100])
     def test_sparse_equals_dense(self, size: int) -> None:
         """Heat in a rod: a tridiagonal matrix."""
         columns = np.repeat(np.arange(size), 3)

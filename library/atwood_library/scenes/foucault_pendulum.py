@@ -8,6 +8,7 @@ from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.parts.rod import Rod
 from atwood_library.sensors.frame_sensor import FrameSensor
+from atwood_library.sources.ramp import Ramp
 
 
 class FoucaultPendulum(Scene):
@@ -28,11 +29,13 @@ class FoucaultPendulum(Scene):
     t_end = 100.0
 
     ground: Ground = Ground()
+    clock: Ramp = Ramp(slope=rate)
     turning: RotaryDrive = RotaryDrive(axis=(0.0, 0.0, 1.0))
     rod: Rod = Rod(length=length)
     bob: PointMass = PointMass(mass=mass)
     view: FrameSensor = FrameSensor()
     connections = [
+        connect(clock.output("value"), turning.input("rotation")),
         connect(ground.frame, turning.a),
         connect(turning.b, rod.a),
         connect(rod.b, bob.point),
@@ -41,9 +44,7 @@ class FoucaultPendulum(Scene):
     ]
 
     def build(self) -> None:
-        """Turn the platform and let the bob go at rest as seen from it."""
-        rate = self.rate
-        self.set("turning.rotation", lambda t: rate * t)
+        """Let the bob go at rest as seen from the platform."""
         self.start["bob.position.x"], self.start["bob.position.y"] = self.amplitude, 0.0
         self.guess["bob.position.z"] = -((self.length**2 - self.amplitude**2) ** 0.5)
         self.start["bob.velocity.x"], self.start["bob.velocity.y"] = 0.0, self.rate * self.amplitude

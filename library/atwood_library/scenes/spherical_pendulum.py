@@ -36,7 +36,4 @@ class SphericalPendulum(Scene):
         self.start["bob.position.x"], self.start["bob.position.y"] = place[0], 0.0
         self.guess["bob.position.z"] = place[2]
         self.start["bob.velocity.y"] = self.azimuth_rate * place[0]
-        if abs(cosine) > 0.5:  # what the rod leaves free there
-            self.start["bob.velocity.x"] = 0.0
-        else:
-            self.start["bob.velocity.z"] = 0.0
+        self.guess["bob.velocity.x"], self.guess["bob.velocity.z"] = 0.0, 0.0

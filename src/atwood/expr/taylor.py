@@ -35,6 +35,10 @@ NUMBERS = ("order", "inverse", "step", "tick")
 """What the program of an order is told of it: k, 1/k, the unit of time over (k + 1), and the coefficient of time."""
 
 
+_FEW = 2
+"""So many times the lanes are few convolutions."""
+
+
 @dataclass(frozen=True)
 class TaylorPrograms:
     """The recurrences of a system ``x' = f(t, x)``.
@@ -98,20 +102,8 @@ def taylor_programs(
     following = []
     for value in recurrence.series(rates):
         following.append(target.zero if value is None else step * value)
-    used = _needed(recurrence.convolutions, following)
-    pairs, squares = _arrange(used, lanes)
-    outputs = (
-        OutputGroup("left", tuple(one.left for one in pairs)),
-        OutputGroup("right", tuple(one.right for one in pairs)),
-        OutputGroup("squares", tuple(one.left for one in squares)),
-        OutputGroup("next", tuple(following)),
-    )
-    inputs = (
-        InputGroup("pairs", tuple(one.total for one in pairs)),
-        InputGroup("squares", tuple(one.total for one in squares)),
-        InputGroup("numbers", numbers),
-        InputGroup("x", tuple(symbols)),
-    )
+    pairs, squares = _arrange(_needed(recurrence.convolutions, following), lanes)
+    inputs, outputs = _groups(pairs, squares, numbers, symbols, following)
     live = {node.index for node in _traverse([e for group in outputs for e in group.expressions])}
     known = [(node, symbol) for node, symbol in recurrence.values if symbol.index in live]
     order = Program(f"{name} (Taylor coefficients)", inputs, tuple(symbol for _, symbol in known), outputs)
@@ -122,6 +114,29 @@ def taylor_programs(
         (OutputGroup("rates", tuple(rates)), OutputGroup("known", tuple(node for node, _ in known))),
     )
     return TaylorPrograms(start, order, len(pairs), len(squares))
+
+
+def _groups(
+    pairs: Sequence[Convolution],
+    squares: Sequence[Convolution],
+    numbers: Sequence[Expression],
+    symbols: Sequence[Expression],
+    following: Sequence[Expression],
+) -> tuple[tuple[InputGroup, ...], tuple[OutputGroup, ...]]:
+    """Return what the program of an order is given, and what it gives."""
+    inputs = (
+        InputGroup("pairs", tuple(one.total for one in pairs)),
+        InputGroup("squares", tuple(one.total for one in squares)),
+        InputGroup("numbers", tuple(numbers)),
+        InputGroup("x", tuple(symbols)),
+    )
+    outputs = (
+        OutputGroup("left", tuple(one.left for one in pairs)),
+        OutputGroup("right", tuple(one.right for one in pairs)),
+        OutputGroup("squares", tuple(one.left for one in squares)),
+        OutputGroup("next", tuple(following)),
+    )
+    return inputs, outputs
 
 
 def _traverse(outputs: Sequence[Expression]) -> list[Expression]:
@@ -154,11 +169,28 @@ def _needed(convolutions: Sequence[Convolution], outputs: Sequence[Expression]) 
 
 
 def _arrange(used: Sequence[Convolution], lanes: int) -> tuple[list[Convolution], list[Convolution]]:
-    """Return the convolutions of pairs and of squares, with squares in places that pairs would leave empty."""
+    """Return the convolutions of pairs and of squares, with squares in places that pairs would leave empty.
+
+    Where there are few, those whose values are known early at an order go together, so that they need not wait for one
+    that is known late; where there are many, there is enough to do meanwhile.
+    """
     pairs = [one for one in used if one.left is not one.right]
     squares = [one for one in used if one.left is one.right]
     room, over = -len(pairs) % lanes, len(squares) % lanes
     if squares and over <= room:
         moved = over if over else 0
         pairs, squares = pairs + squares[len(squares) - moved :], squares[: len(squares) - moved]
+    if len(used) <= _FEW * lanes:
+        depths = _depths([e for one in used for e in (one.left, one.right)])
+        for group in (pairs, squares):
+            group.sort(key=lambda one: max(depths[one.left.index], depths[one.right.index]))
     return pairs, squares
+
+
+def _depths(outputs: Sequence[Expression]) -> dict[int, int]:
+    """Return how many operations are one behind the other before a value is known."""
+    found: dict[int, int] = {}
+    for node in sorted(_traverse(outputs), key=lambda node: node.index):
+        known = not node.arguments or node.is_parametric
+        found[node.index] = 0 if known else 1 + max(found[argument.index] for argument in node.arguments)
+    return found

@@ -23,9 +23,12 @@ from atwood.errors import UnsupportedError
 from atwood.expr.graph import Expression
 from atwood.expr.operations import ExternalFunction
 from atwood.expr.program import Program
-from atwood.kernels.llvm_layout import Body, Layout, Unit, lay_out, main_body, prologue_body
+from atwood.kernels.llvm_layout import Body, Layout, lay_out, main_body, prologue_body
+from atwood.kernels.llvm_rolled import Tables, write_rolled, write_table_functions
 from atwood.kernels.llvm_solve import ROUTINES, Solver
 from atwood.kernels.llvm_text import LIBRARY_FUNCTIONS, Needs, Writer
+from atwood.kernels.llvm_unit import opening, write_unit
+from atwood.kernels.rolled import roll_large
 
 __all__ = ["CodeOptions", "ModuleText", "Part", "write_module"]
 
@@ -56,6 +59,7 @@ class CodeOptions:
     level: int = 1
     sincos: str = ""
     contract: bool = False
+    rolled_from: int = 6_000
 
 
 @dataclass(frozen=True)
@@ -72,12 +76,15 @@ class ModuleText:
         The functions of the C library that it calls.
     externals
         The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
+    tables
+        What its loops work on; ``use_tables`` must be called with them. None if there are no loops.
     """
 
     text: str
     scratch: int
     library: tuple[str, ...]
     externals: tuple[tuple[ExternalFunction, int], ...]
+    tables: Tables | None = None
 
 
 @dataclass(frozen=True)
@@ -92,11 +99,18 @@ class Part:
         What it computes.
     positions
         Where all results go in the arrays of their groups, if not one after the other.
+    lanes
+        So many neighbouring places of the groups in `packed` are stored at once, those without a result as zero, where
+        one function computes all: whoever reads them at once need not wait until each has arrived in memory.
+    packed
+        The output groups for which this is wanted; their arrays are aligned and padded to it.
     """
 
     name: str
     program: Program
     positions: tuple[int, ...] | None = None
+    lanes: int = 1
+    packed: tuple[int, ...] = ()
 
 
 def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "") -> ModuleText:
@@ -118,25 +132,35 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
     """
     needs = Needs()
     parts: list[str] = []
+    tables: Tables | None = None
     scratch = 0
     for part in programs:
         name, program = part.name, part.program
         bodies = ((name, main_body(program, part.positions)), (f"{name}_values", prologue_body(program)))
         for function, body in bodies:
+            rolled = roll_large(body, options.rolled_from) if program.size >= options.rolled_from else None
+            if rolled is not None:
+                tables = tables or Tables()
+                parts.extend(write_rolled(function, rolled, options.sincos, needs, tables))
+                scratch = max(scratch, rolled.scratch)
+                continue
             layout = lay_out(body, options.longest_chunk)
             scratch = max(scratch, layout.scratch)
             try:
-                parts.extend(_write_function(function, body, layout, options, needs))
+                whole = part if function == name and len(layout.chunks) == 1 else None
+                parts.extend(_write_function(function, body, layout, options, needs, whole))
             except UnsupportedError as error:
                 raise UnsupportedError(error.message, where=program.name) from None
         parts.append(_write_prologue(name))
     if options.contract:
         parts = [_contracted(text) for text in parts]
     parts.append(more)
+    if tables is not None:
+        parts.append(write_table_functions())
     if needs.elimination:
         parts.append(ROUTINES)
     parts.extend(_declarations(needs, options.sincos))
-    return ModuleText("\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals))
+    return ModuleText("\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals), tables)
 
 
 def _contracted(text: str) -> str:
@@ -146,8 +170,10 @@ def _contracted(text: str) -> str:
     return text
 
 
-def _write_function(name: str, body: Body, layout: Layout, options: CodeOptions, needs: Needs) -> list[str]:
-    """Write the chunks of a body, and the function that calls them."""
+def _write_function(
+    name: str, body: Body, layout: Layout, options: CodeOptions, needs: Needs, whole: Part | None = None
+) -> list[str]:
+    """Write the chunks of a body, and the function that calls them; `whole` says how the only chunk stores results."""
     places = {node.index: (pointer, k) for pointer, nodes in body.given for k, node in enumerate(nodes)}
     places |= {index: ("scratch", slot) for index, slot in layout.slots.items()}
     targets: dict[int, list[tuple[str, int]]] = {}
@@ -155,13 +181,14 @@ def _write_function(name: str, body: Body, layout: Layout, options: CodeOptions,
     for node, pointer, position in body.results:
         targets.setdefault(node.index, []).append((pointer, position))
         results[node.index] = node
+    held = frozenset(f"out{group}" for group in whole.packed) if whole is not None else frozenset()
     solver = Solver(layout.regions)
     parts: list[str] = []
     for number, chunk in enumerate(layout.chunks):
-        writer = Writer(places, options.sincos, needs)
+        writer = Writer(places, options.sincos, needs, held)
         solver.start_chunk()
         for unit in chunk:
-            _write_unit(writer, solver, unit)
+            write_unit(writer, solver, unit)
             for node in unit:
                 if node.index in layout.slots:
                     writer.store(writer.value(node), "scratch", layout.slots[node.index])
@@ -170,22 +197,13 @@ def _write_function(name: str, body: Body, layout: Layout, options: CodeOptions,
         if number == len(layout.chunks) - 1:
             for node in results.values():
                 _write_result(writer, node, targets[node.index])
+        if whole is not None:
+            _pack(writer, whole.lanes)
         if len(layout.chunks) == 1:
             return [_as_function(name, writer)]
         parts.append(_as_chunk(f"{name}.{number}", writer))
     parts.append(_write_calls(name, len(layout.chunks)))
     return parts
-
-
-def _write_unit(writer: Writer, solver: Solver, unit: Unit) -> None:
-    node = unit[0]
-    if node.operation == "solve":
-        solver.write(writer, node, unit[1:])
-    elif len(unit) == 2:
-        sine, cosine = unit if node.operation == "sin" else (unit[1], node)
-        writer.write_wave(sine, cosine)
-    else:
-        writer.write(node)
 
 
 def _write_result(writer: Writer, node: Expression, targets: Sequence[tuple[str, int]]) -> None:
@@ -195,30 +213,32 @@ def _write_result(writer: Writer, node: Expression, targets: Sequence[tuple[str,
     writer.check(value)
 
 
+def _pack(writer: Writer, lanes: int) -> None:
+    """Store what was held back, neighbouring results at once."""
+    kind = f"<{lanes} x double>"
+    vectors: dict[tuple[str, int], dict[int, str]] = {}
+    for value, pointer, position in writer.kept:
+        vectors.setdefault((pointer, position // lanes), {})[position % lanes] = value
+    for (pointer, block), values in vectors.items():
+        vector = "zeroinitializer"
+        for lane, value in sorted(values.items()):
+            vector = writer.put(f"insertelement {kind} {vector}, double {value}, i32 {lane}")
+        address = writer.address(pointer, block * lanes)
+        writer.lines.append(f"  store {kind} {vector}, ptr {address}, align {8 * lanes}")
+
+
 def _as_chunk(name: str, writer: Writer) -> str:
     """Return a chunk as a function of its own, which returns the sum of its results."""
     checked = writer.checked()
-    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *_opening(writer)]
+    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *opening(writer)]
     return "\n".join([*start, *writer.lines, f"  ret double {checked}", "}"])
 
 
 def _as_function(name: str, writer: Writer) -> str:
     """Return the only chunk of a body as the whole function."""
     checked = writer.checked()
-    start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *_opening(writer)]
+    start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *opening(writer)]
     return "\n".join([*start, *writer.lines, *_ending(checked)])
-
-
-def _opening(writer: Writer) -> list[str]:
-    """Return the instructions that fetch the pointers that a chunk uses."""
-    lines = ["  %sine = alloca double", "  %cosine = alloca double"] if writer.waves else []
-    for pointer in sorted(writer.pointers):
-        for prefix, table in (("in", "inputs"), ("out", "outputs")):
-            if pointer.startswith(prefix):
-                place = f"%{pointer}.place"
-                lines.append(f"  {place} = getelementptr ptr, ptr %{table}, i64 {pointer.removeprefix(prefix)}")
-                lines.append(f"  %{pointer} = load ptr, ptr {place}, !invariant.load !0")
-    return lines
 
 
 def _ending(checked: str) -> list[str]:

@@ -80,6 +80,8 @@ class Writer:
         The C library's function for sine and cosine together, empty where it has none.
     needs
         What is called.
+    held
+        Arrays whose numbers are not written one by one.
     lines
         The instructions so far.
     values
@@ -90,16 +92,20 @@ class Writer:
         The arrays that the chunk needs.
     waves
         Whether it calls for a sine and cosine together.
+    kept
+        What goes to the arrays that are held: a value, the name of the pointer and the position.
     """
 
     places: Mapping[int, tuple[str, int]]
     sincos: str
     needs: Needs
+    held: frozenset[str] = frozenset()
     lines: list[str] = field(default_factory=list)
     values: dict[int, str] = field(default_factory=dict)
     conditions: dict[int, str] = field(default_factory=dict)
     pointers: set[str] = field(default_factory=set)
     waves: bool = False
+    kept: list[tuple[str, str, int]] = field(default_factory=list)
     _checks: list[str] = field(default_factory=list)
     _count: int = 0
 
@@ -124,6 +130,9 @@ class Writer:
 
     def store(self, value: str, pointer: str, position: int) -> None:
         """Write one number of an array."""
+        if pointer in self.held:
+            self.kept.append((value, pointer, position))
+            return
         address = self.address(pointer, position)
         self.lines.append(f"  store double {value}, ptr {address}")
 

@@ -87,14 +87,15 @@ def levels(
         Their values in terms of coordinates.
     """
     found = []
-    for (path, one, multiplier), value in zip(chosen, placed, strict=True):
-        if mechanism.space.name == "space":
+    by_parts = mechanism.space.name == "space"
+    symbols = (state.coordinates, state.rates, state.speeds, state.accelerations)
+    rates, seconds = constraint_levels([] if by_parts else placed, mechanism.time, *symbols)
+    for number, ((path, one, multiplier), value) in enumerate(zip(chosen, placed, strict=True)):
+        if by_parts:
             rate = _rate_by_slopes(site, mechanism.locals_[path], one, state.kinematics, mechanism.time)
             second = _differentiated_twice(site, mechanism.locals_[path], one, state.kinematics, mechanism.time)
         else:
-            rate, second = constraint_levels(
-                value, mechanism.time, state.coordinates, state.rates, state.speeds, state.accelerations
-            )
+            rate, second = rates[number], seconds[number]
         key = (path, one.law.name, one.index)
         found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier))
     return found

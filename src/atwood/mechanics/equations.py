@@ -238,28 +238,29 @@ def force_rows(
 
 
 def constraint_levels(
-    value: Expression,
+    values: Sequence[Expression],
     time: Expression,
     coordinates: Sequence[Expression],
     rates: Sequence[Expression],
     speeds: Sequence[Expression],
     accelerations: Sequence[Expression],
-) -> tuple[Expression, Expression]:
-    """Return the first and second time derivative of a constraint on positions.
+) -> tuple[list[Expression], list[Expression]]:
+    """Return the first and second time derivatives of constraints on positions: one sweep for all of them.
 
     Parameters
     ----------
-    value
-        Its residual, of time and coordinates.
+    values
+        Their residuals, of time and coordinates.
     time, coordinates, speeds, accelerations
         The symbols.
     rates
         Derivatives of the coordinates.
     """
     first: dict[Expression, Expression | float] = {time: 1.0, **dict(zip(coordinates, rates, strict=True))}
-    (rate,) = jvp([value], first)
-    (second,) = jvp([rate], {**first, **dict(zip(speeds, accelerations, strict=True))})
-    return rate, second
+    if not values:
+        return [], []
+    found = jvp(values, first)
+    return found, jvp(found, {**first, **dict(zip(speeds, accelerations, strict=True))})
 
 
 def put_in_place(value: Expression, mapping: Mapping[Expression, Expression]) -> Expression:

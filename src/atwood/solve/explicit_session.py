@@ -20,8 +20,8 @@ from atwood.solve.explicit_problem import ExplicitProblem, HeedingStepper, Outco
 
 __all__ = ["ExplicitSession", "open_explicit"]
 
-FIRST_CHUNK, LARGEST_CHUNK = 100, 100_000
-"""So many steps are taken before limits are looked at: at first, and at most."""
+FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
+"""So many steps are taken before limits are looked at: at first, for one unknown, and at most."""
 
 _MOMENT = 0.02
 """Steps are taken for about so long, in seconds, before limits are looked at and Ctrl-C is heard."""
@@ -109,7 +109,7 @@ class ExplicitSession:
         self._no_events = (0,) * problem.event_count
         self._starts = 0
         self._seconds = 0.0
-        self._chunk = FIRST_CHUNK
+        self._chunk = max(1, FIRST_CHUNK // problem.size)
         self.reinitialize(t, y)
 
     @staticmethod

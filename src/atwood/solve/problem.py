@@ -182,12 +182,14 @@ class Plan:
             full[present.columns * size + present.rows] = self.kernels()[1]([t], y, yp, [cj])[0]
             return full
 
-        everywhere = (np.tile(np.arange(size), size), np.repeat(np.arange(size), size))
+        pattern = (self.program.rows, self.program.columns)
+        if self.dependent_speeds:
+            pattern = (np.tile(np.arange(size), size), np.repeat(np.arange(size), size))
         return ImplicitProblem(
             size=size,
             residual=residual,
             jacobian=full_jacobian if self.dependent_speeds else jacobian,
-            pattern=everywhere if self.dependent_speeds else (self.program.rows, self.program.columns),
+            pattern=pattern,
             algebraic=self.program.algebraic,
             events=events,
             event_count=len(directions),

@@ -142,10 +142,13 @@ def sort_targets(assembly: Assembly, equations: Equations) -> tuple[Level, Level
 def _restated(assembly: Assembly, given: Mapping[str, float]) -> dict[str, float]:
     """Return start values with those that a part says in another way said so; see `Component.restate_start`."""
     found = dict(given)
-    for path, part in assembly.flat.parts.items():
-        own = {key[len(path) + 1 :]: value for key, value in given.items() if key.rpartition(".")[0] == path}
-        if not own:
-            continue
+    said: dict[str, dict[str, float]] = {}
+    for key, value in given.items():
+        path, _, name = key.rpartition(".")
+        if path in assembly.flat.parts:
+            said.setdefault(path, {})[name] = value
+    for path, own in said.items():
+        part = assembly.flat.parts[path]
         restated = part.component.restate_start(own, assembly.mechanism.space.name)
         if restated != own:
             for name in own:

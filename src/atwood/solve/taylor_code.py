@@ -7,7 +7,7 @@ the two compiled programs of its recurrences, so that it is compiled once and ke
 from __future__ import annotations
 
 from atwood.solve.explicit_loops import exact
-from atwood.solve.taylor_loops import LANES, ROWS, loop_code
+from atwood.solve.taylor_loops import LANES, ROWS, STRIDE, loop_code
 from atwood.solve.taylor_problem import HIGHEST, LOWEST, RETREAT, RETRIES, SMALLER, WATCHED
 
 __all__ = ["COUNTS", "FUNCTIONS", "NUMBERS", "POINTERS", "step_code"]
@@ -84,6 +84,9 @@ entry:
   %square.at = getelementptr ptr, ptr %order_out, i64 2
   %next.at = getelementptr ptr, ptr %order_out, i64 3
   %x.at = getelementptr ptr, ptr %order_in, i64 3
+  %has.squares = icmp sgt i64 %squares, 0
+  %square.index = mul i64 %pairs, {2 * STRIDE}
+  %square.table = getelementptr double, ptr %table, i64 %square.index
   br label %attempt
 attempt:
   %unit = phi double [ %wanted, %entry ], [ %smaller, %again ]
@@ -112,9 +115,11 @@ order{HIGHEST}:
 def _order(k: int) -> str:
     """Return the instructions that find the coefficients of one order, and those of the unknowns of the next."""
     sums = f"""  call void @pairs{k}(ptr %table, ptr %pair_sums, i64 %pairs)
-  %square.table{k}.index = mul i64 %pairs, {2 * LANES * (HIGHEST + 1)}
-  %square.table{k} = getelementptr double, ptr %table, i64 %square.table{k}.index
-  call void @squares{k}(ptr %square.table{k}, ptr %square_sums, i64 %squares)
+  br i1 %has.squares, label %squares{k}, label %sums{k}
+squares{k}:
+  call void @squares{k}(ptr %square.table, ptr %square_sums, i64 %squares)
+  br label %sums{k}
+sums{k}:
 """
     if k + 1 >= LOWEST:
         more = f"""  %is.last{k} = icmp eq i64 %p, {k + 1}
@@ -143,8 +148,12 @@ go{k}:
 {more}"""
 
 
-def _choose() -> str:
-    """Return the function of the step that the last coefficients allow, if none is given."""
+def _logarithms() -> tuple[str, str]:
+    """Return the instructions that find the largest rate at which the last coefficients grow, and its name.
+
+    A rate is the logarithm to base 2 of a coefficient over its order, good enough for a step: linear between powers of
+    two, and finite at zero.
+    """
     lines = []
     largest = exact(-1e9)
     for i in range(WATCHED):
@@ -165,6 +174,27 @@ def _choose() -> str:
   %above{i} = fcmp ogt double %rate{i}, {largest}
   %best{i} = select i1 %above{i}, double %rate{i}, double {largest}""")
         largest = f"%best{i}"
+    return "\n".join(lines), largest
+
+
+def _bound() -> str:
+    """Return the instructions that keep a step so short that no unknown changes too much for events to be seen."""
+    return """  %slope = call double @largest(ptr %arrays, i64 %m, i64 1)
+  %bend2 = call double @largest(ptr %arrays, i64 %m, i64 2)
+  %by.slope = fdiv double %reach, %slope
+  %by.bend2 = fdiv double %reach, %bend2
+  %by.bend = call double @llvm.sqrt.f64(double %by.bend2)
+  %is.steep = fcmp olt double %by.slope, %value
+  %value1 = select i1 %is.steep, double %by.slope, double %value
+  %is.bent = fcmp olt double %by.bend, %value1
+  %value2 = select i1 %is.bent, double %by.bend, double %value1
+  %h.bound = fmul double %unit, %value2
+  ret double %h.bound"""
+
+
+def _choose() -> str:
+    """Return the function of the step that the last coefficients allow, if none is given."""
+    lines, largest = _logarithms()
     return f"""define internal double @choose(ptr %session) #0 {{
 entry:
 {_opening()}
@@ -176,7 +206,7 @@ given:
   ret double %first
 found:
   call void @sizes(ptr %arrays, i64 %m)
-{chr(10).join(lines)}
+{lines}
   %share = load double, ptr %share.at
   %power = fsub double %share, {largest}
   %floor = call double @llvm.floor.f64(double %power)
@@ -195,21 +225,40 @@ found:
   %is.bound = fcmp olt double %reach, 0x7FF0000000000000
   br i1 %is.bound, label %bound, label %free
 bound:
-  %slope = call double @largest(ptr %arrays, i64 %m, i64 1)
-  %bend2 = call double @largest(ptr %arrays, i64 %m, i64 2)
-  %by.slope = fdiv double %reach, %slope
-  %by.bend2 = fdiv double %reach, %bend2
-  %by.bend = call double @llvm.sqrt.f64(double %by.bend2)
-  %is.steep = fcmp olt double %by.slope, %value
-  %value1 = select i1 %is.steep, double %by.slope, double %value
-  %is.bent = fcmp olt double %by.bend, %value1
-  %value2 = select i1 %is.bent, double %by.bend, double %value1
-  %h.bound = fmul double %unit, %value2
-  ret double %h.bound
+{_bound()}
 free:
   %h = fmul double %unit, %value
   ret double %h
 }}"""
+
+
+def _attempt() -> str:
+    """Return the instructions that try a step: values at its end, rates there, and whether these fit."""
+    return f"""attempt:
+  %wanted = phi double [ %first, %choose ], [ %shorter, %retreat ]
+  %sum = fadd double %t, %wanted
+  %ends = fcmp oge double %sum, %stop_time
+  %t_new = select i1 %ends, double %stop_time, double %sum
+  %h = fsub double %t_new, %t
+  %moves = fcmp ogt double %h, %least
+  %forward = fcmp ogt double %h, 0.0
+  %is_normal = fcmp oge double %h, {exact(1e-300)}
+  %is_rest = and i1 %ends, %forward
+  %long.enough = and i1 %moves, %is_normal
+  %usable = or i1 %long.enough, %is_rest
+  br i1 %usable, label %try, label %too_small
+try:
+  store double %t_new, ptr %t_new.at
+  %share = fdiv double %h, %unit
+  call void @move(ptr %arrays, i64 %m, i64 %p, double %share)
+  %code = call i32 @evaluate(ptr %session, ptr %new_in, ptr %new_out)
+  %ok = icmp eq i32 %code, 0
+  br i1 %ok, label %compare, label %retreat
+compare:
+  %pace = fdiv double 1.0, %unit
+  %weight = fdiv double %h, %p.number
+  %missed = call i1 @misses(ptr %arrays, i64 %m, double %pace, double %weight, double %allowed)
+  br i1 %missed, label %retreat, label %accept"""
 
 
 def _run() -> str:
@@ -244,31 +293,7 @@ choose:
   %size = call double @llvm.fabs.f64(double %t)
   %least = fmul double %size, {exact(10.0 * 2.0**-52)}
   br label %attempt
-attempt:
-  %wanted = phi double [ %first, %choose ], [ %shorter, %retreat ]
-  %sum = fadd double %t, %wanted
-  %ends = fcmp oge double %sum, %stop_time
-  %t_new = select i1 %ends, double %stop_time, double %sum
-  %h = fsub double %t_new, %t
-  %moves = fcmp ogt double %h, %least
-  %forward = fcmp ogt double %h, 0.0
-  %is_normal = fcmp oge double %h, {exact(1e-300)}
-  %is_rest = and i1 %ends, %forward
-  %long.enough = and i1 %moves, %is_normal
-  %usable = or i1 %long.enough, %is_rest
-  br i1 %usable, label %try, label %too_small
-try:
-  store double %t_new, ptr %t_new.at
-  %share = fdiv double %h, %unit
-  call void @move(ptr %arrays, i64 %m, i64 %p, double %share)
-  %code = call i32 @evaluate(ptr %session, ptr %new_in, ptr %new_out)
-  %ok = icmp eq i32 %code, 0
-  br i1 %ok, label %compare, label %retreat
-compare:
-  %pace = fdiv double 1.0, %unit
-  %weight = fdiv double %h, %p.number
-  %missed = call i1 @misses(ptr %arrays, i64 %m, double %pace, double %weight, double %allowed)
-  br i1 %missed, label %retreat, label %accept
+{_attempt()}
 retreat:
   %shorter = fmul double %h, {exact(RETREAT)}
   %failures = load i64, ptr %failures.at

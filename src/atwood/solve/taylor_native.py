@@ -34,6 +34,9 @@ __all__ = ["CompiledRecurrences", "CompiledStepper"]
 
 _UNLIMITED = 2**62
 _NO_VALUE = 3
+_PACKED = (0, 1, 2)
+"""The groups of results of the program of an order whose rows lie in blocks: left, right and squares."""
+
 _LINE = 8
 """Numbers in one line of the processor's cache: every array begins with one."""
 
@@ -50,7 +53,7 @@ class CompiledRecurrences:
     def __init__(self, programs: TaylorPrograms) -> None:
         self.programs = programs
         self.size = len(programs.start.inputs[1].symbols)
-        order = Part("order", programs.order, positions(programs.pairs, programs.squares, self.size))
+        order = Part("order", programs.order, positions(programs.pairs, programs.squares, self.size), LANES, _PACKED)
         parts = [Part("start", programs.start), order]
         self.built = build_code(parts, replace(default_options(parts), contract=True))
         self.addresses = self.built.code.addresses
