@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atwood import Result, Scene, report, simulate
+from atwood import ParameterError, Result, Scene, report, simulate
 from atwood_library.scenes import (
     SCENES,
     Bricard,
@@ -134,6 +134,12 @@ def test_lagrange_top(motion: str) -> None:
     exact = ExactTop(0.025, 0.01, 0.981, (0.0, theta, 0.0), rates)
     assert np.max(np.abs(np.cos(result["top.theta"]) - exact.cos_theta(result.time))) < 1e-9
     assert np.max(np.abs(vector(result, "top.z_axis") - exact.axis(result.time))) < 1e-9
+
+
+def test_a_top_too_slow_to_precess_steadily_is_refused() -> None:
+    with pytest.raises(ParameterError, match="spins too slowly") as caught:
+        LagrangeTop(motion="steady", spin=5.0)
+    assert "spin" in caught.value.where
 
 
 def test_a_top_that_starts_upright_runs() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import ParameterError, Scene, connect, parameter
 from atwood_library.joints.spherical import Spherical
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.rigid_body import RigidBody
@@ -48,7 +48,12 @@ class LagrangeTop(Scene):
             return c / b
         root = b * b - 4.0 * a * c
         if root < 0.0:
-            raise ValueError("the spin is too slow for a steady precession at this angle")
+            fast = 2.0 * math.sqrt(a * c) / self.axial
+            raise ParameterError(
+                "at this angle the top cannot precess steadily, since it spins too slowly",
+                where=f"{self.path or type(self).__name__}.spin",
+                advice=f"Give it at least {fast:.4g} rad/s, or another motion.",
+            )
         return 2.0 * c / (b + math.copysign(math.sqrt(root), b))
 
     def build(self) -> None:
