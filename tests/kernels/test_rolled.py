@@ -96,7 +96,7 @@ def test_random_programs(recipe, numbers):
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 def test_code_does_not_grow_with_a_chain(form):
     shapes = []
-    for links in (40, 80):
+    for links in (30, 60):
         assembly = assemble(Chain(links=links), form=form)
         made = [roll(body(p)) for p in programs(assembly) for body in (main_body, prologue_body)][: 2 * 2]
         made += [rolled(assembly.energy_program), rolled(assembly.to_maximal)]

@@ -25,7 +25,9 @@ def by_entries(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Treat the smallest scenes as the largest."""
     with monkeypatch.context() as patch:
         patch.setattr(matrices, "LARGEST_FULL", 0)
+        patch.setattr(matrices, "LARGEST_FULL_OF_MANY", 0)
         patch.setattr(matrices, "_DENSE", 2.0)
+        patch.setattr(matrices, "_DENSE_OF_MANY", 2.0)
         yield
 
 

@@ -10,7 +10,7 @@ from atwood.expr.analysis import (
     substitute,
 )
 from atwood.expr.collect import collect
-from atwood.expr.derivatives import SparseMatrix, jacobian, jvp, vjp
+from atwood.expr.derivatives import SparseMatrix, jacobian, jvp, sweeps_exceed, vjp
 from atwood.expr.functions import (
     Scalar,
     absolute,
@@ -81,6 +81,7 @@ __all__ = [
     "solve",
     "sqrt",
     "substitute",
+    "sweeps_exceed",
     "tan",
     "tanh",
     "to_sympy",

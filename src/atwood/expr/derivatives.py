@@ -326,10 +326,7 @@ def jacobian(
     graph = _graph_of(outputs, *directions)
     nodes = live(outputs)
     by_index = {node.index: node for node in nodes}
-    users: dict[int, list[int]] = {}
-    for node in nodes:
-        for argument in set(node.arguments):
-            users.setdefault(argument.index, []).append(node.index)
+    users = _users(nodes)
     rows_of: dict[int, list[int]] = {}
     for row, output in enumerate(outputs):
         if isinstance(output, Expression):
@@ -347,6 +344,39 @@ def jacobian(
             columns.append(column)
             entries.append(moved[index])
     return SparseMatrix(tuple(rows), tuple(columns), tuple(entries))
+
+
+def sweeps_exceed(
+    outputs: Sequence[Expression | float],
+    wrt: Sequence[Expression | Mapping[Expression, Expression | float]],
+    limit: int,
+) -> bool:
+    """Return whether the sweeps of a Jacobian visit more than a number of nodes: about as many are then made.
+
+    Parameters
+    ----------
+    outputs, wrt
+        As for `jacobian`.
+    limit
+        The number of nodes.
+    """
+    users = _users(live(outputs))
+    visited = 0
+    for column in wrt:
+        seeds = [column] if isinstance(column, Expression) else list(column)
+        visited += len(_reached({seed.index: seed for seed in seeds}, users))
+        if visited > limit:
+            return True
+    return False
+
+
+def _users(nodes: Sequence[Expression]) -> dict[int, list[int]]:
+    """Return which nodes use each node."""
+    users: dict[int, list[int]] = {}
+    for node in nodes:
+        for argument in set(node.arguments):
+            users.setdefault(argument.index, []).append(node.index)
+    return users
 
 
 def _reached(seeds: Mapping[int, Expression], users: Mapping[int, Sequence[int]]) -> list[int]:

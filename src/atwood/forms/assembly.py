@@ -256,8 +256,10 @@ class Assembly:
             equations = self.equations if kept is None else keep_constraints(self.equations, kept)
             name = f"{self.flat.name} ({self.form})"
             if self.form == "reduced":
-                return reduced_form(name, equations, self.parameters, self.rows, dependent, speeds)
-            return dae_form(name, equations, self.parameters, self.level, partial(self._tidy, equations))
+                found = reduced_form(name, equations, self.parameters, self.rows, dependent, speeds)
+            else:
+                found = dae_form(name, equations, self.parameters, self.level, partial(self._tidy, equations))
+            return found.with_lock(self.shared.lock)
 
         return self.shared.get(("form", None if kept is None else tuple(kept), tuple(dependent), speeds), make)
 

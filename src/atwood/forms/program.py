@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Collection, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, live, substitute
+from atwood.expr import (
+    Expression,
+    InputGroup,
+    OutputGroup,
+    Program,
+    SparseMatrix,
+    jacobian,
+    jvp,
+    live,
+    substitute,
+)
+from atwood.forms.derivative import Derivative, derive, directions, is_too_long
 from atwood.mechanics.equations import Equations
 from atwood.topology.charts import Chart
 
@@ -42,10 +55,8 @@ class FormProgram:
         Which form it is; the level is empty for the reduced form.
     residual
         Program of (t, y, yp) with F.
-    jacobian
-        Program of (t, y, yp, cj) with the entries of ``dF/dy + cj dF/dy'``.
-    rows, columns
-        Where these entries are, by column and then by row.
+    derive
+        Makes its Jacobian; see `derivative`.
     coordinates, speeds
         Number of coordinates and of speeds.
     multipliers
@@ -62,15 +73,42 @@ class FormProgram:
     form: Literal["reduced", "dae"]
     level: Level
     residual: Program
-    jacobian: Program
-    rows: NDArray[np.intp]
-    columns: NDArray[np.intp]
+    derive: Callable[[], Derivative]
     coordinates: int
     speeds: int
     multipliers: int
     extra: int
     algebraic: tuple[int, ...]
     independent: tuple[int, ...]
+
+    @cached_property
+    def derivative(self) -> Derivative:
+        """The Jacobian ``dF/dy + cj dF/dy'``, made when it is first asked for: explicit methods need none."""
+        return self.derive()
+
+    def with_lock(self, lock: AbstractContextManager[Any]) -> FormProgram:
+        """Return the same with a lock that is held while the Jacobian is made."""
+
+        def derive() -> Derivative:
+            with lock:
+                return self.derivative
+
+        return replace(self, derive=derive)
+
+    @property
+    def jacobian(self) -> Program:
+        """The program of the Jacobian: its entries, or by columns its product with a direction."""
+        return self.derivative.program
+
+    @property
+    def rows(self) -> NDArray[np.intp]:
+        """The row of each entry."""
+        return self.derivative.rows
+
+    @property
+    def columns(self) -> NDArray[np.intp]:
+        """The column of each entry."""
+        return self.derivative.columns
 
     @property
     def size(self) -> int:
@@ -106,6 +144,9 @@ class BalanceProgram:
         Number of constraints.
     holonomic
         Numbers of the constraints that hold positions.
+    mass_product
+        Where the mass matrix is full and too long to be written out: the program of (t, q, u, direction) with its
+        product with a direction; `program` then has no entries of it.
     """
 
     program: Program
@@ -116,6 +157,7 @@ class BalanceProgram:
     speeds: int
     constraints: int
     holonomic: tuple[int, ...]
+    mass_product: Program | None = None
 
 
 @dataclass(frozen=True)
@@ -264,23 +306,15 @@ def make_form_program(
     idle = tuple(graph.symbol(f"rate of {s.name}") for s in (*multipliers, *extra))
     yp = (*rates, *equations.accelerations, *idle)
     appearing = set(live(residual))
-    cj = graph.symbol("cj")
-    entries = jacobian(list(residual), [{a: 1.0, b: cj} for a, b in zip(y, yp, strict=True)])
-    t = InputGroup("t", (equations.time,))
-    groups = (t, InputGroup("y", y), InputGroup("yp", yp))
+    groups = (InputGroup("t", (equations.time,)), InputGroup("y", y), InputGroup("yp", yp))
     known = tuple(parameters)
+    # With loops, rows are chosen anew along a run, by functions that are written entry by entry.
+    by_columns = form == "reduced" and not independent
     return FormProgram(
         form,
         level,
         Program(f"{name} residual", groups, known, (OutputGroup("residual", tuple(residual)),)),
-        Program(
-            f"{name} Jacobian",
-            (*groups, InputGroup("cj", (cj,))),
-            known,
-            (OutputGroup("entries", tuple(entries.entries)),),
-        ),
-        np.asarray(entries.rows, dtype=np.intp),
-        np.asarray(entries.columns, dtype=np.intp),
+        partial(derive, f"{name} Jacobian", tuple(residual), groups, known, by_columns),
         len(equations.coordinates),
         len(equations.speeds),
         len(multipliers),
@@ -303,7 +337,15 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
         The symbols of parameters.
     """
     at_rest = dict.fromkeys(equations.accelerations, 0.0)
-    mass = jacobian(list(equations.rows), list(equations.accelerations))
+    inputs, known = state_groups(equations), tuple(parameters)
+    mass, product = SparseMatrix((), (), ()), None
+    if equations.forest.form == "reduced" and is_too_long(equations.rows, equations.accelerations):
+        along = directions(equations.accelerations)
+        moved = jvp(list(equations.rows), dict(zip(equations.accelerations, along.symbols, strict=True)))
+        groups = (*inputs, along)
+        product = Program(f"{name} mass", groups, known, (OutputGroup("product", tuple(moved)),))
+    else:
+        mass = jacobian(list(equations.rows), list(equations.accelerations))
     rates = [one.rate for one in equations.constraints]
     values = [one.value for one in equations.constraints]
     slope = jacobian(rates, list(equations.speeds))
@@ -317,9 +359,8 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
         OutputGroup("slope", tuple(slope.entries)),
         OutputGroup("drift", tuple(substitute(rates, still))),
     )
-    inputs = state_groups(equations)
     return BalanceProgram(
-        Program(f"{name} balance", inputs, tuple(parameters), outputs),
+        Program(f"{name} balance", inputs, known, outputs),
         np.asarray(mass.rows, dtype=np.intp),
         np.asarray(mass.columns, dtype=np.intp),
         np.asarray(slope.rows, dtype=np.intp),
@@ -327,6 +368,7 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
         len(equations.speeds),
         len(equations.constraints),
         tuple(i for i, one in enumerate(equations.constraints) if one.holonomic),
+        product,
     )
 
 

@@ -13,6 +13,7 @@ from atwood.expr.program import Program
 from atwood.kernels.llvm_build import Built, build_code, default_options
 from atwood.kernels.llvm_ida_text import (
     SundialsLayout,
+    columns_text,
     dense_text,
     residual_text,
     sparse_text,
@@ -43,6 +44,7 @@ def compile_ida_callbacks(
     size: int,
     sparse: bool = False,
     *,
+    by_columns: bool = False,
     cache: bool = True,
     layout: SundialsLayout | None = None,
 ) -> IdaCallbacks:
@@ -63,6 +65,9 @@ def compile_ida_callbacks(
         The length of y.
     sparse
         Whether IDA's matrix is sparse.
+    by_columns
+        Whether the Jacobian is a program of (t, y, y', cj, direction) with its product with a direction; then the
+        matrix is dense and filled column by column.
     cache
         Whether to use the cache on disk.
     layout
@@ -76,11 +81,20 @@ def compile_ida_callbacks(
     at_rows = np.asarray(rows, dtype=np.int64).ravel()
     at_columns = np.asarray(columns, dtype=np.int64).ravel()
     _check(residual, [1, size, size], size)
-    _check(jacobian, [1, size, size, 1], len(at_rows))
+    if by_columns and sparse:
+        raise UsageError("a Jacobian by columns is full, and needs a dense matrix", where=jacobian.name)
+    if by_columns:
+        _check(jacobian, [1, size, size, 1, size], size)
+    else:
+        _check(jacobian, [1, size, size, 1], len(at_rows))
     if at_columns.shape != at_rows.shape or not _inside(at_rows, size) or not _inside(at_columns, size):
         raise UsageError(f"the entries of the Jacobian are not all inside {size} x {size}", where=jacobian.name)
     layout = layout or sundials_layout()
-    positions, more = _jacobian_for(layout, at_rows, at_columns, size, sparse)
+    positions: tuple[int, ...] | None
+    if by_columns:
+        positions, more = None, columns_text(layout, size)
+    else:
+        positions, more = _jacobian_for(layout, at_rows, at_columns, size, sparse)
     parts = [Part("residual", residual), Part("jacobian", jacobian, positions)]
     built = build_code(
         parts,
@@ -90,7 +104,7 @@ def compile_ida_callbacks(
         library=("memcpy",) if sparse else (),
         cached=cache,
     )
-    return IdaCallbacks(residual, jacobian, size, len(positions), sparse, built)
+    return IdaCallbacks(residual, jacobian, size, len(at_rows), sparse, built)
 
 
 def _jacobian_for(

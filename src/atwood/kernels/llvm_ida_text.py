@@ -23,6 +23,7 @@ from atwood.errors import UnsupportedError
 __all__ = [
     "SundialsLayout",
     "array_of",
+    "columns_text",
     "dense_text",
     "layout_for",
     "residual_text",
@@ -123,6 +124,47 @@ def array_of(name: str, structure: str, offset: int) -> str:
   %{name}.place = getelementptr i8, ptr %{name}.content, i64 {offset}
   %{name} = load ptr, ptr %{name}.place
 """
+
+
+def columns_text(layout: SundialsLayout, size: int) -> str:
+    """Write the Jacobian with IDA's signature for a dense matrix, from its products with one unit vector after another."""
+    names = ("t.place", "y", "yp", "cj.place", "direction")
+    lines = [f"  %inputs = alloca [{len(names)} x ptr]", "  %outputs = alloca [1 x ptr]"]
+    lines.append(f"  %direction = alloca [{size} x double]")
+    for k, name in enumerate(names):
+        lines.append(f"  %input.{k} = getelementptr ptr, ptr %inputs, i64 {k}")
+        lines.append(f"  store ptr %{name}, ptr %input.{k}")
+    for k, name in ((1, "derived"), (2, "scratch")):
+        lines.append(f"  %{name}.place = getelementptr ptr, ptr %data, i64 {k}")
+        lines.append(f"  %{name} = load ptr, ptr %{name}.place")
+    loop = f"""  br label %clear
+clear:
+  %k = phi i64 [ 0, %start ], [ %k.next, %clear ]
+  %zero.place = getelementptr double, ptr %direction, i64 %k
+  store double 0.0, ptr %zero.place
+  %k.next = add i64 %k, 1
+  %more.zeros = icmp slt i64 %k.next, {size}
+  br i1 %more.zeros, label %clear, label %next
+next:
+  %j = phi i64 [ 0, %clear ], [ %j.next, %next ]
+  %bad = phi i32 [ 0, %clear ], [ %bad.next, %next ]
+  %one.place = getelementptr double, ptr %direction, i64 %j
+  store double 1.0, ptr %one.place
+  %column.at = mul i64 %j, {size}
+  %column = getelementptr double, ptr %entries, i64 %column.at
+  store ptr %column, ptr %outputs
+  %code = call i32 @jacobian(ptr %inputs, ptr %derived, ptr %scratch, ptr %outputs)
+  store double 0.0, ptr %one.place
+  %bad.next = or i32 %bad, %code
+  %j.next = add i64 %j, 1
+  %more = icmp slt i64 %j.next, {size}
+  br i1 %more, label %next, label %end
+end:
+  ret i32 %bad.next
+}}
+"""
+    start = _jacobian_start(layout).replace("{\n", "{\nstart:\n", 1)
+    return start + array_of("entries", "matrix", layout.dense_data) + "\n".join(lines) + "\n" + loop
 
 
 def _call_text(kernel: str, inputs: Sequence[str], output: str, derived: int) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.program import BalanceProgram
 from atwood.kernels import BoundKernel
+from atwood.solve.columns import mass_at
 from atwood.solve.matrices import (
     Matrix,
     from_entries,
@@ -61,10 +63,18 @@ class Balance:
         The same, ready to run on one state.
     turning
         How the coordinates move with the speeds.
+    mass
+        Gives the mass matrix where the program does not.
     """
 
-    def __init__(self, program: BalanceProgram, kernel: BoundKernel, turning: Turning) -> None:
-        self.program, self.kernel, self.turning = program, kernel, turning
+    def __init__(
+        self,
+        program: BalanceProgram,
+        kernel: BoundKernel,
+        turning: Turning,
+        mass: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
+    ) -> None:
+        self.program, self.kernel, self.turning, self._mass = program, kernel, turning, mass
         self._all = len(program.holonomic) == program.constraints
         self.holonomic = np.asarray(program.holonomic, dtype=np.intp)
 
@@ -77,8 +87,11 @@ class Balance:
         """Return the balance at a state."""
         p = self.program
         mass, bias, value, rate, gamma, slope, drift = self.kernel([t], q, u)
-        full = is_best_full((p.speeds, p.speeds), len(mass))
-        matrix = from_entries(p.mass_rows, p.mass_columns, mass, (p.speeds, p.speeds), full)
+        full = self._mass is not None or is_best_full((p.speeds, p.speeds), len(mass))
+        if self._mass is not None:
+            matrix = self._mass(t, q, u)
+        else:
+            matrix = from_entries(p.mass_rows, p.mass_columns, mass, (p.speeds, p.speeds), full)
         jacobian = from_entries(p.slope_rows, p.slope_columns, slope, (p.constraints, p.speeds), full)
         parts = (np.asarray(x, dtype=float) for x in (bias, value, rate, gamma))
         b, v, r, g = parts
@@ -161,7 +174,8 @@ class Balance:
 def balance_of(assembly: Assembly, form: FormName) -> Balance:
     """Return the balance of forces of a scene in the coordinates of either form."""
     program = assembly.balance(form)
-    return Balance(program, assembly.kernel(program.program), turning_of(assembly, form))
+    mass = None if program.mass_product is None else partial(mass_at, assembly, form)
+    return Balance(program, assembly.kernel(program.program), turning_of(assembly, form), mass)
 
 
 def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -> tuple[FloatArray, FloatArray]:

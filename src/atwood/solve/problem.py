@@ -16,6 +16,7 @@ from atwood.forms.dae import keep_constraints
 from atwood.forms.program import FormProgram
 from atwood.kernels import BoundKernel
 from atwood.solve.balance import Balance, balance_of, least_norm, row_scales, solve_balance
+from atwood.solve.columns import columns_of
 from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.solve.matrices import Matrix, is_full, to_array
@@ -93,7 +94,8 @@ class Plan:
         """Return residual and Jacobian at present."""
         if self._kernels is None:
             assembly, program = self.assembly, self._present
-            self._kernels = (assembly.kernel(program.residual), assembly.kernel(program.jacobian))
+            many = program.derivative.by_columns
+            self._kernels = (assembly.kernel(program.residual), assembly.kernel(program.jacobian, vectorized=many))
         return self._kernels
 
     @property
@@ -171,8 +173,11 @@ class Plan:
             values: Sequence[float] = self.kernels()[0]([t], y, yp)[0]
             return values
 
-        def jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> Sequence[float]:
-            values: Sequence[float] = self.kernels()[1]([t], y, yp, [cj])[0]
+        def jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> Sequence[float] | FloatArray:
+            kernel = self.kernels()[1]
+            if self.program.derivative.by_columns:
+                return columns_of(kernel, size, [t], y, yp, [cj]).T.ravel()
+            values: Sequence[float] = kernel([t], y, yp, [cj])[0]
             return values
 
         def full_jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> FloatArray:
@@ -236,6 +241,7 @@ class Plan:
                     program.columns,
                     program.size,
                     sparse=linear_solver == "sparse",
+                    by_columns=program.derivative.by_columns,
                 ),
             ),
         )

@@ -145,7 +145,7 @@ def _normal(plan: Plan) -> Normal | None:
     """Return the normal equations of the independent constraints by their entries; None where arrays are better."""
     program = plan.balance.program
     plain = plan.balance.turning.is_plain and len(program.holonomic) == program.constraints
-    if not plain or is_best_full((program.constraints, program.speeds), len(program.slope_rows)):
+    if not plain or is_best_full((program.constraints, program.speeds), len(program.slope_rows), many=True):
         return None
     from atwood.solve.sparse_batch import Normal, Pattern
 

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import SolveError
+from atwood.forms.accelerations import acceleration_program
 from atwood.forms.assembly import Assembly, FormName
 from atwood.mechanics.release import release_program
 from atwood.solve.balance import balance_of
+from atwood.solve.columns import masses_at
 from atwood.solve.matrices import is_best_full
 from atwood.solve.rank import find_rank
 from atwood.solve.scales import motion_scales, scene_length
@@ -59,7 +61,7 @@ def accelerations_and_multipliers(
     program = assembly.balance(form)
     n, m, samples = program.speeds, program.constraints, len(t)
     mass, bias, _, _, gamma, slope, drift = assembly.kernel(program.program, vectorized=True)(t[None, :], q, u)
-    if not is_best_full((n, n), len(mass)):
+    if program.mass_product is None and not is_best_full((n, n), len(mass), many=True):
         from atwood.solve.sparse_states import solve_states
 
         return *solve_states(program, t, (mass, bias, gamma, slope), kept), np.asarray(drift)
@@ -69,8 +71,11 @@ def accelerations_and_multipliers(
     for first in range(0, samples, step):
         part = slice(first, min(first + step, samples))
         count = part.stop - part.start
-        full_mass = np.zeros((count, n, n))
-        full_mass[:, program.mass_rows, program.mass_columns] = mass[:, part].T
+        if program.mass_product is not None:
+            full_mass = masses_at(assembly, t[part], q[:, part].T, u[:, part].T, assembly.parameter_values)
+        else:
+            full_mass = np.zeros((count, n, n))
+            full_mass[:, program.mass_rows, program.mass_columns] = mass[:, part].T
         full_slope = np.zeros((count, m, n))
         full_slope[:, program.slope_rows, program.slope_columns] = slope[:, part].T
         matrix = np.zeros((count, size, size))
@@ -155,4 +160,9 @@ class ReactionSolver:
 
     def own_accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, kept: NDArray[np.intp]) -> FloatArray:
         """Return the accelerations of the form's coordinates."""
+        if self.assembly.form == "reduced" and self.assembly.balance("reduced").mass_product is not None:
+            rates = self.assembly.shared.get("accelerations", lambda: acceleration_program(self.assembly))
+            if rates is not None:
+                found: FloatArray = self.assembly.kernel(rates.program, vectorized=True)(t[None, :], q, u)[-1]
+                return found
         return accelerations_and_multipliers(self.assembly, self.assembly.form, t, q, u, kept)[0]

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from atwood.errors import SolveError
 from atwood.forms.program import BalanceProgram
-from atwood.solve.sparse import csr_least_norm, csr_of, solve_bordered
 from atwood.solve.sparse_batch import Pattern, solve_borders
 
 __all__ = ["solve_states"]
@@ -56,6 +55,8 @@ def solve_states(
         )
         found_l[kept, part] = some
     is_redundant = len(kept) < m
+    if is_redundant or not good.all():
+        from atwood.solve.sparse import csr_least_norm, csr_of, solve_bordered
     for i in np.flatnonzero(~good | is_redundant):
         full_mass = csr_of(program.mass_rows, program.mass_columns, mass[:, i], (n, n))
         full_slope = csr_of(program.slope_rows, program.slope_columns, slope[:, i], (m, n))

@@ -20,6 +20,7 @@ from atwood.expr import depends_on
 from atwood.forms.accelerations import acceleration_program
 from atwood.solve.breaks import switches_by_clock
 from atwood.solve.choice import choose
+from atwood.solve.columns import masses_at
 from atwood.solve.driver import SolverOptions
 from atwood.solve.explicit_scene import compiled_rates, explicit_problem
 from atwood.solve.modes import find_watches
@@ -197,10 +198,13 @@ class _Batches:
     ) -> NDArray[np.bool_]:
         """Return where nothing can move without inertia, by the measure of `make_plan`."""
         program = self.balance
-        entries = self.order.assembly.compiled(program.program, vectorized=True).bind(values)(t, q.T, u.T)[0]
         n = program.speeds
-        mass = np.zeros((len(q), n, n))
-        mass[:, program.mass_rows, program.mass_columns] = entries.T
+        if program.mass_product is not None:
+            mass = masses_at(self.order.assembly, t, q, u, values)
+        else:
+            entries = self.order.assembly.compiled(program.program, vectorized=True).bind(values)(t, q.T, u.T)[0]
+            mass = np.zeros((len(q), n, n))
+            mass[:, program.mass_rows, program.mass_columns] = entries.T
         _, sizes = size_rows(self.order.assembly.reduced, lengths)
         mass *= sizes[:, :, None] * sizes[:, None, :]
         usable = np.all(np.isfinite(mass), axis=(1, 2))
