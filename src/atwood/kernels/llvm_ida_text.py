@@ -127,7 +127,7 @@ def array_of(name: str, structure: str, offset: int) -> str:
 
 
 def columns_text(layout: SundialsLayout, size: int) -> str:
-    """Write the Jacobian with IDA's signature for a dense matrix, from its products with one unit vector after another."""
+    """Write the Jacobian with IDA's signature for a dense matrix, by products with one unit vector after the other."""
     names = ("t.place", "y", "yp", "cj.place", "direction")
     lines = [f"  %inputs = alloca [{len(names)} x ptr]", "  %outputs = alloca [1 x ptr]"]
     lines.append(f"  %direction = alloca [{size} x double]")
