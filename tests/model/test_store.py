@@ -5,7 +5,7 @@ import math
 import sys
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import atwood as aw
@@ -289,6 +289,7 @@ SETTINGS = st.recursive(
     ]),
     SETTINGS,
 )  # fmt: skip
+@example(("scene", "values", "gravity"), {"bound": [[]]})
 def test_whatever_is_written_there_the_answer_is_a_scene_or_an_error_of_ours(path, value):
     with contextlib.suppress(aw.AtwoodError):
         aw.from_data(tampered(put(*path, value)))

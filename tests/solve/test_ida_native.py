@@ -583,8 +583,8 @@ class TestLife:
         some(300)
         before = resident_kilobytes()
         some(3000)
-        # One session alone takes more than ten kilobytes, its sparse factors a hundred.
-        assert resident_kilobytes() - before < 3000
+        # Kept sessions would take 30 megabytes, their sparse factors 15; the allocator's own share strays by a few.
+        assert resident_kilobytes() - before < 9000
 
     def test_a_sparse_session_goes_on_from_other_states(self) -> None:
         problem, y, yp = chain(80)

@@ -385,9 +385,10 @@ def _read_bound(written: Any, where: str) -> Any:
         return FieldReference(written)
     if isinstance(written, (int, float)) and not isinstance(written, bool):
         return written
-    if not isinstance(written, list) or not written or written[0] not in OPERATIONS:
+    operation = written[0] if isinstance(written, list) and written else None
+    if not isinstance(operation, str) or operation not in OPERATIONS:
         raise UsageError(f"the bound value {str(written)[:60]!r} cannot be read", where=where)
     operands = tuple(_read_bound(one, where) for one in written[1:])
-    if len(operands) != (1 if written[0] == "neg" else 2):
+    if len(operands) != (1 if operation == "neg" else 2):
         raise UsageError(f"the bound value {str(written)[:60]!r} has a wrong number of operands", where=where)
-    return Deferred(written[0], operands, None)
+    return Deferred(operation, operands, None)
