@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Equations
 from atwood.solve.scales import coordinate_scales, motion_scales
-from atwood.solve.start import Conditions
+from atwood.solve.start_system import Conditions
 
 __all__ = ["meet_speeds", "size_rows"]
 

@@ -16,8 +16,10 @@ from atwood.forms.shared import Slot, find_slots
 from atwood.mechanics.mechanism import extent
 from atwood.model.deferred import Deferred
 from atwood.model.flatten import flatten
-from atwood.solve.start import Level, find_start, sort_targets, start_conditions
+from atwood.solve.start import find_start
 from atwood.solve.start_rows import meet_speeds, size_rows
+from atwood.solve.start_system import start_conditions
+from atwood.solve.start_targets import Level, sort_targets
 from atwood.study.cases import Axis
 from atwood.study.sweep_runs import Order
 

@@ -1,0 +1,68 @@
+"""Speeds at the start: a linear problem, once positions are known."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.equations import Equations
+from atwood.solve.matrices import least_norm, row_scales, scaled
+from atwood.solve.scales import motion_names
+from atwood.solve.start_errors import raise_contradiction
+from atwood.solve.start_system import System, counted
+from atwood.solve.start_targets import Level, said
+
+__all__ = ["solve_speeds"]
+
+FloatArray = NDArray[np.float64]
+
+
+def solve_speeds(
+    assembly: Assembly, equations: Equations, level: Level, scales: FloatArray, t: float, q: FloatArray
+) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
+    """Return speeds that fulfil constraints and what is fixed; which nothing determines, and what repeats others.
+
+    Parameters
+    ----------
+    assembly, equations
+        The scene.
+    level
+        What is said of speeds.
+    scales
+        Size of a displacement along each speed.
+    t, q
+        Time and coordinates of the start.
+
+    Raises
+    ------
+    StartError
+        If what is fixed contradicts itself or the constraints.
+    """
+    u, is_direct = said(equations.speeds, [*level.guessed, *level.fixed], np.zeros(len(equations.speeds)))
+    if level.guessed and not is_direct:
+        rough = System(assembly, equations, level.guessed, False, of_speeds=True)
+        missing, matrix = rough.at(t, q, u)
+        u = u - scales * least_norm(scaled(matrix, scales), missing)
+    system = System(assembly, equations, level.fixed, True, of_speeds=True)
+    for _ in range(3):  # linear: the second pass takes out rounding
+        missing, matrix = system.at(t, q, u)
+        if not np.any(missing):
+            break
+        rows = row_scales(matrix, scales)
+        u = u - scales * least_norm(scaled(matrix, scales, rows), missing / rows)
+    missing, matrix = system.at(t, q, u)
+    if missing.size:
+        rows = row_scales(matrix, scales)
+        # Each equation is measured by its own terms, so that what is small beside another speed is not lost.
+        own = abs(matrix) @ np.abs(u)
+        # What is summed up within an equation rounds, even if all that comes out of it is zero.
+        fastest = float(np.max(np.abs(u / scales), initial=0.0))
+        own += 1e-6 * fastest * row_scales(matrix, scales)
+        own[system.constraints :] += [abs(x.value) for x in level.fixed]
+        share = np.abs(missing) / np.where(own > 0.0, own, 1.0)
+        if not float(np.max(share)) <= 1e-8:
+            raise_contradiction(level.fixed, share[system.constraints :], equations)
+        matrix = scaled(matrix, scales, rows)
+    names = motion_names(equations)
+    return u, *counted(names, None, level.fixed, system.constraints, matrix)

@@ -1,0 +1,177 @@
+"""The conditions of a start in numbers, and Newton's method on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.expr import Expression, OutputGroup, Program, jacobian
+from atwood.forms.assembly import Assembly
+from atwood.forms.program import state_groups
+from atwood.mechanics.equations import Equations
+from atwood.solve.matrices import (
+    Matrix,
+    from_entries,
+    independent_rows,
+    is_full,
+    least_norm,
+    row_scales,
+    scaled,
+    to_array,
+)
+from atwood.solve.start_targets import Target
+from atwood.solve.turning import turning_of
+
+__all__ = ["MET", "Conditions", "System", "counted", "newton", "start_conditions"]
+
+FloatArray = NDArray[np.float64]
+
+MET = 1e-11
+"""Relative to the scene's sizes: how well a start condition must be met."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """The conditions of a start as a program, with their derivatives; the same for all values of a structure."""
+
+    program: Program
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    shape: tuple[int, int]
+
+
+def start_conditions(
+    assembly: Assembly, equations: Equations, targets: Sequence[Target], constrained: bool, of_speeds: bool
+) -> Conditions:
+    """Return the conditions of a start.
+
+    Parameters
+    ----------
+    assembly, equations
+        The scene.
+    targets
+        What is to be met.
+    constrained
+        Whether the constraints are among the conditions, before the targets.
+    of_speeds
+        Whether they are on speeds, or on coordinates.
+    """
+
+    def make() -> Conditions:
+        constraints: list[Expression] = []
+        if constrained and of_speeds:
+            constraints = [one.rate for one in equations.constraints]
+        elif constrained:
+            constraints = [one.value for one in equations.constraints if one.value is not None]
+        unknowns = equations.speeds if of_speeds else equations.coordinates
+        expressions = [*constraints, *(one.observable.value for one in targets)]
+        entries = jacobian(expressions, list(unknowns)) if expressions else None
+        outputs = (
+            OutputGroup("values", tuple(expressions)),
+            OutputGroup("slopes", tuple(entries.entries) if entries else ()),
+        )
+        program = Program(f"{assembly.flat.name} start", state_groups(equations), assembly.parameters, outputs)
+        places = (tuple(entries.rows), tuple(entries.columns)) if entries else ((), ())
+        return Conditions(program, *places, (len(expressions), len(unknowns)))
+
+    return assembly.shared.get(("start", tuple(one.path for one in targets), constrained, of_speeds), make)
+
+
+class System:
+    """Values and derivatives of targets and constraints along the speeds: of places, or of speeds themselves."""
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        equations: Equations,
+        targets: Sequence[Target],
+        constrained: bool,
+        of_speeds: bool = False,
+    ) -> None:
+        made = start_conditions(assembly, equations, targets, constrained, of_speeds)
+        self.turning = None if of_speeds else turning_of(assembly, "reduced")
+        self.kernel = assembly.kernel(made.program)
+        self.rows, self.columns, self.shape = made.rows, made.columns, made.shape
+        self.targets, self.constraints = targets, made.shape[0] - len(targets)
+        self.speeds = len(equations.speeds)
+
+    def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, Matrix]:
+        """Return what is missing in each equation, and the derivatives."""
+        values, slopes = self.kernel([t], q, u)
+        matrix = from_entries(self.rows, self.columns, slopes, self.shape)
+        if self.turning is not None and not self.turning.is_plain:
+            matrix = to_array(matrix) @ self.turning.tangent(t, q)
+        missing = np.asarray(values, dtype=float)
+        for i, target in enumerate(self.targets, start=self.constraints):
+            missing[i] -= target.value
+            if target.observable.periodic:
+                missing[i] = np.remainder(missing[i] + np.pi, 2.0 * np.pi) - np.pi
+        return missing, matrix
+
+
+def newton(
+    system: System, scales: FloatArray, t: float, q: FloatArray, iterations: int = 60
+) -> tuple[FloatArray, FloatArray, Matrix]:
+    """Move to the nearest configuration that fulfils a system; return it with what is missing, scaled."""
+    still = np.zeros_like(scales)
+    assert system.turning is not None
+    missing, matrix = system.at(t, q, still)
+    rows = row_scales(matrix, scales)
+    for _ in range(iterations):
+        size = float(np.max(np.abs(missing / rows), initial=0.0))
+        if size < 1e-15:
+            break
+        step = scales * least_norm(scaled(matrix, scales, rows), missing / rows)
+        longest = float(np.max(np.abs(step / scales), initial=0.0))
+        step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
+        for _ in range(8):
+            trial = system.turning.moved(t, q, -step)
+            new_missing, new_matrix = system.at(t, trial, still)
+            if float(np.max(np.abs(new_missing / rows))) < size or longest < 1e-9:
+                break
+            step *= 0.5
+        if float(np.max(np.abs(new_missing / rows))) >= size and size < MET:
+            break
+        q, missing, matrix = trial, new_missing, new_matrix
+        rows = row_scales(matrix, scales)
+    # What hardly changes with any coordinate, as where links line up, is measured by the scene.
+    sizes = np.maximum(rows, 1e-4 * max(np.max(rows, initial=0.0), np.max(scales, initial=0.0)))
+    return q, missing / sizes, scaled(matrix, scales, rows)
+
+
+def counted(
+    names: Sequence[str], tangent: FloatArray | None, fixed: Sequence[Target], constraints: int, matrix: Matrix
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return which coordinates or speeds nothing determines, and which fixed values repeat others.
+
+    Parameters
+    ----------
+    names
+        Of the coordinates or speeds.
+    tangent
+        How coordinates move with the speeds; None where each has its own.
+    fixed, constraints
+        What is fixed, and how many constraints come before that.
+    matrix
+        Derivatives of both, scaled.
+    """
+    if 0 in matrix.shape:
+        return tuple(names), ()
+    kept = set(independent_rows(matrix))
+    repeated = tuple(t.path for i, t in enumerate(fixed, start=constraints) if i not in kept)
+    if len(kept) == matrix.shape[1]:
+        return (), repeated
+    if not is_full(matrix):
+        from atwood.solve.sparse import free_columns
+
+        return tuple(n for n, is_free in zip(names, free_columns(matrix), strict=True) if is_free), repeated
+    _, sizes, directions = np.linalg.svd(matrix)
+    rank = int(np.sum(sizes > 1e-9 * max(sizes[0], 1e-300))) if sizes.size else 0
+    open_directions = directions[rank:] if tangent is None else directions[rank:] @ tangent.T
+    free = tuple(
+        n for i, n in enumerate(names) if open_directions.size and np.max(np.abs(open_directions[:, i])) > 1e-6
+    )
+    return free, repeated

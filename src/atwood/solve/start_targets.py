@@ -1,0 +1,116 @@
+"""What is said of a start: which quantities are to have which values, sorted by what they are of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import StartError
+from atwood.expr import Expression, depends_on, jvp, live
+from atwood.forms.assembly import Assembly
+from atwood.forms.source import no_start_quantity
+from atwood.mechanics.equations import Equations
+from atwood.mechanics.observables import Observable
+
+__all__ = ["Level", "Target", "said", "sort_targets"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A quantity with the value that it is to have at the start."""
+
+    path: str
+    value: float
+    observable: Observable
+
+
+@dataclass(frozen=True)
+class Level:
+    """Targets of one level, position or velocity, split into what is fixed and what is guessed."""
+
+    fixed: list[Target]
+    guessed: list[Target]
+
+
+def sort_targets(assembly: Assembly, equations: Equations) -> tuple[Level, Level]:
+    """Return what is said of positions and of speeds at the start."""
+    levels = (Level([], []), Level([], []))
+    for is_fixed, given in ((True, assembly.flat.start), (False, assembly.flat.guess)):
+        for path, value in _restated(assembly, given).items():
+            number = assembly.shared.get(("start level", path), partial(_find_level, assembly, equations, path))
+            level = levels[number]
+            target = Target(path, value, assembly.start_observables[path])
+            (level.fixed if is_fixed else level.guessed).append(target)
+    return levels
+
+
+def _restated(assembly: Assembly, given: Mapping[str, float]) -> dict[str, float]:
+    """Return start values with those that a part says in another way said so; see `Component.restate_start`."""
+    found = dict(given)
+    said: dict[str, dict[str, float]] = {}
+    for key, value in given.items():
+        path, _, name = key.rpartition(".")
+        if path in assembly.flat.parts:
+            said.setdefault(path, {})[name] = value
+    for path, own in said.items():
+        part = assembly.flat.parts[path]
+        restated = part.component.restate_start(own, assembly.mechanism.space.name)
+        if restated != own:
+            for name in own:
+                del found[f"{path}.{name}"]
+            found.update({f"{path}.{name}": value for name, value in restated.items()})
+    return found
+
+
+def _find_level(assembly: Assembly, equations: Equations, path: str) -> int:
+    """Return whether a start value is of positions (0) or of speeds (1)."""
+    observables = assembly.start_observables
+    if path not in observables:
+        raise no_start_quantity(path, observables)
+    one = observables[path]
+    reads = {node for node in live([one.value]) if node.is_symbol}
+    late, speeds = assembly.shared.get("start symbols", lambda: _later_symbols(assembly, equations))
+    if not late.isdisjoint(reads):
+        raise StartError(
+            "it follows from positions and speeds and cannot be chosen at the start",
+            where=path,
+            advice="Give coordinates, positions and velocities.",
+        )
+    own = [symbol for symbol in reads if symbol in speeds]
+    if not own:
+        return 0
+    if not _is_linear(one.value, own):
+        raise StartError(
+            "it is not linear in the speeds and cannot be chosen at the start", where=path, advice="Give velocities."
+        )
+    return 1
+
+
+def _later_symbols(assembly: Assembly, equations: Equations) -> tuple[frozenset[Expression], frozenset[Expression]]:
+    """Return what is known only after positions and speeds, and the speeds."""
+    late = frozenset([*equations.accelerations, *(one.symbol for one in assembly.reactions)])
+    return late, frozenset(equations.speeds)
+
+
+def _is_linear(value: Expression, speeds: Sequence[Expression]) -> bool:
+    """Return whether an expression is linear in the speeds: its derivative along them does not depend on them."""
+    directions: dict[Expression, Expression | float] = {u: u.graph.symbol(f"direction:{u.name}") for u in speeds}
+    return value.is_symbol or not depends_on(jvp([value], directions)[0], speeds)
+
+
+def said(unknowns: Sequence[Expression], targets: Sequence[Target], otherwise: FloatArray) -> tuple[FloatArray, bool]:
+    """Return what is said of unknowns themselves, which needs no iteration, and whether that is all that is said."""
+    values, is_direct = otherwise.copy(), True
+    places = {symbol: i for i, symbol in enumerate(unknowns)} if targets else {}
+    for target in targets:
+        if target.observable.value in places:
+            values[places[target.observable.value]] = target.value
+        else:
+            is_direct = False
+    return values, is_direct
