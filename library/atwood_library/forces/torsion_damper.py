@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from atwood import Component, Frame, Scalar, connector, dissipation, observable, parameter
+from atwood import Component, Frame, Scalar, as_vector, connector, dissipation, observable, parameter
+from atwood_library.interfaces.bearings import twist_rate
 
 
 class TorsionDamper(Component):
-    """A massless torsion damper between two frames, linear in the rate of the angle between them.
+    """A massless torsion damper between two frames, linear in the rate of the angle between them about an axis.
 
-    Rayleigh function ``1/2 c w^2`` (Goldstein, section 1.5).
+    Rayleigh function ``1/2 c w^2`` (Goldstein, section 1.5). In space the rate is that of the twist about the axis, as
+    in a `TorsionSpring`; where both frames share the axis it is the relative angular velocity along it.
     """
 
     damping: float = parameter(1.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a rate of one radian a second.")
+    axis: tuple[float, float, float] = parameter(
+        (0.0, -1.0, 0.0),
+        turning=True,
+        doc="Axis in both frames; the angle is right-handed about it, so counter-clockwise in a plane unless reversed.",
+    )
     a: Frame = connector(Frame, "The frame that the angle is measured from.")
     b: Frame = connector(Frame, "The other frame.")
 
@@ -21,12 +28,12 @@ class TorsionDamper(Component):
         rate = self.rate()
         return 0.5 * self.damping * rate * rate
 
-    @observable(unit="rad/s", doc="Rate of the angle of frame b from frame a, counter-clockwise.")
+    @observable(unit="rad/s", doc="Rate of the angle of frame b from frame a about the axis.")
     def rate(self) -> Scalar:
-        """Return the rate of the angle; the rotation is about -y."""
-        return self.a.angular_velocity.y - self.b.angular_velocity.y
+        """Return the rate of the angle."""
+        return twist_rate(self.a, self.b, as_vector(self.axis), self.in_space)
 
-    @observable(unit="N*m", doc="Torque on frame b, counter-clockwise.")
+    @observable(unit="N*m", doc="Torque on frame b about the axis.")
     def torque(self) -> Scalar:
         """Return the torque on frame b."""
         return -(self.damping * self.rate())

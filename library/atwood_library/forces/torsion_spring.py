@@ -2,32 +2,71 @@
 
 from __future__ import annotations
 
-from atwood import Component, Frame, Scalar, connector, observable, parameter, potential
+import math
+
+from atwood import Component, Frame, Scalar, as_vector, connector, event, is_zero, observable, parameter, potential
+from atwood_library.interfaces.bearings import twist_about, twist_cosine, twist_rate
+
+_NEARLY_HALF_A_TURN = math.cos(0.999 * math.pi)
 
 
 class TorsionSpring(Component):
-    """A massless torsion spring between two frames, linear in the angle between them.
+    """A massless torsion spring between two frames, linear in the angle between them about an axis.
 
-    Potential energy ``1/2 c (phi - phi0)^2``. It acts on the orientations only; a `Pivot` keeps the frames together.
+    Potential energy ``1/2 c (phi - phi0)^2``. It acts on the orientations only; a joint keeps the frames together.
+
+    In space the angle is the twist about the axis. Where both frames share the axis, as on a hinge, that is the angle
+    between them; where frame b is bent away, it is what is left when the shortest turn that bends the axis is taken
+    off, and the torque on b is about ``(n_a + n_b)/(1 + n_a . n_b)``, with the axis in both frames. Orientations tell
+    it within half a turn either way, where the run stops; the spring of a `Pivot` counts turns.
     """
 
     stiffness: float = parameter(1.0, unit="N*m/rad", minimum=0.0, doc="Torque for a twist by one radian.")
     natural_angle: float = parameter(0.0, unit="rad", doc="Angle without torque.")
+    axis: tuple[float, float, float] = parameter(
+        (0.0, -1.0, 0.0),
+        turning=True,
+        doc="Axis in both frames; the angle is right-handed about it, so counter-clockwise in a plane unless reversed.",
+    )
     a: Frame = connector(Frame, "The frame that the angle is measured from.")
     b: Frame = connector(Frame, "The other frame.")
 
     @potential
     def elastic_energy(self) -> Scalar:
         """Return the elastic energy."""
-        twist = self.b.angle - self.a.angle - self.natural_angle
+        twist = self.twist() - self.natural_angle
         return 0.5 * self.stiffness * twist * twist
 
-    @observable(unit="rad", doc="Angle of frame b from frame a, counter-clockwise.", spaces=("plane",))
+    def twist(self) -> Scalar:
+        """Return the angle about the axis."""
+        if self.in_space:
+            return twist_about(self.a, self.b, as_vector(self.axis))
+        return -as_vector(self.axis).y * (self.b.angle - self.a.angle)
+
+    @event(direction=-1, target="stop", message="the twist has come to half a turn", spaces=("space",))
+    def comes_to_half_a_turn(self) -> Scalar:
+        """Return how far the cosine of the twist is from that of (nearly) half a turn."""
+        if is_zero(self.stiffness):
+            return 1.0
+        return twist_cosine(self.a, self.b, as_vector(self.axis)) - _NEARLY_HALF_A_TURN
+
+    @observable(
+        unit="rad",
+        doc="Angle of frame b from frame a about the axis.",
+        periodic=True,
+        rate="rate",
+        spaces=("plane", "space"),
+    )
     def angle(self) -> Scalar:
         """Return the angle."""
-        return self.b.angle - self.a.angle
+        return self.twist()
 
-    @observable(unit="N*m", doc="Torque on frame b, counter-clockwise.", spaces=("plane",))
+    @observable(unit="rad/s", doc="Rate of the angle.", spaces=("plane", "space"))
+    def rate(self) -> Scalar:
+        """Return the rate of the angle."""
+        return twist_rate(self.a, self.b, as_vector(self.axis), self.in_space)
+
+    @observable(unit="N*m", doc="Torque on frame b about the axis.", spaces=("plane", "space"))
     def torque(self) -> Scalar:
         """Return the torque on frame b."""
-        return -(self.stiffness * (self.b.angle - self.a.angle - self.natural_angle))
+        return -(self.stiffness * (self.twist() - self.natural_angle))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Frame, Scalar, Vector, atan2, cross, dot, normals
+from atwood import Frame, Scalar, Vector, atan2, cross, dot, normals, sqrt
 
 __all__ = [
     "angle_about",
@@ -12,6 +12,10 @@ __all__ = [
     "rate_about",
     "rate_along",
     "sideways",
+    "twist_about",
+    "twist_axis",
+    "twist_cosine",
+    "twist_rate",
     "unturned_torque",
 ]
 
@@ -78,3 +82,46 @@ def rate_along(a: Frame, b: Frame, axis: Vector) -> Scalar:
     """Return the speed of frame b along an axis of frame a, as seen from frame a, m/s."""
     seen = b.velocity - a.velocity - cross(a.angular_velocity, b.position - a.position)
     return dot(seen, a.to_world(axis))
+
+
+def twist_about(a: Frame, b: Frame, axis: Vector) -> Scalar:
+    """Return by how much frame b is twisted against frame a about an axis, rad, within half a turn either way.
+
+    The rotation from a to b is split into the turn about the axis and the shortest turn that then takes the axis of a
+    into that of b; the twist is the angle of the first. Where both frames share the axis it is the angle of a hinge.
+    Of the rotation's matrix ``R`` in axes with the third along the axis it is ``atan2(R21 - R12, R11 + R22)``; with
+    unit quaternion q it is ``2 atan2(q . axis, q0)`` (Dobrowolski, Swing-twist decomposition in Clifford algebra,
+    arXiv:1506.05481).
+    """
+    across, along = _twist_parts(a, b, axis)
+    return atan2(across, along)
+
+
+def twist_cosine(a: Frame, b: Frame, axis: Vector) -> Scalar:
+    """Return the cosine of the twist of frame b against frame a about an axis."""
+    across, along = _twist_parts(a, b, axis)
+    return along / sqrt(along * along + across * across)
+
+
+def twist_axis(a: Frame, b: Frame, axis: Vector) -> Vector:
+    """Return the vector whose product with the relative angular velocity is the rate of `twist_about`.
+
+    It is ``(n_a + n_b) / (1 + n_a . n_b)`` with the axis in both frames, which for a hinge is the axis itself: the rate
+    of the shortest turn from one axis to the other has no component along their mean.
+    """
+    along_a, along_b = a.to_world(axis), b.to_world(axis)
+    mean: Vector = (along_a + along_b) / (1.0 + dot(along_a, along_b))
+    return mean
+
+
+def twist_rate(a: Frame, b: Frame, axis: Vector, in_space: bool) -> Scalar:
+    """Return the rate of the twist of frame b against frame a about an axis, rad/s; in a plane about its normal."""
+    spin = b.angular_velocity - a.angular_velocity
+    return dot(spin, twist_axis(a, b, axis)) if in_space else axis.y * spin.y
+
+
+def _twist_parts(a: Frame, b: Frame, axis: Vector) -> tuple[Scalar, Scalar]:
+    """Return sine and cosine of the twist, times ``1 + n_a . n_b``."""
+    first, second = normals(axis)
+    a1, a2, b1, b2 = a.to_world(first), a.to_world(second), b.to_world(first), b.to_world(second)
+    return dot(b1, a2) - dot(b2, a1), dot(a1, b1) + dot(a2, b2)

@@ -12,6 +12,7 @@ from atwood.model.binding import Binding
 from atwood.model.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
 from atwood.model.fields import MISSING, Deferred, Field, ParameterSpec, SignalSpec
 from atwood.model.laws import Kind, Law
+from atwood.model.outline import Outline
 from atwood.model.quantities import Quantity
 from atwood.model.vector import Vector, dot, norm
 
@@ -205,6 +206,22 @@ class Component:
         """
         return dict(given)
 
+    def check_values(self) -> None:
+        """Refuse parameters of which each is admissible and which do not go together.
+
+        A component overrides this where a bound is another parameter, as the radius of a hole has; it is called before
+        the scene is assembled, and its parameters are then plain numbers.
+
+        Raises
+        ------
+        ParameterError
+            If they do not, with the path of the parameter and what to do.
+        """
+
+    def outline(self) -> Outline | None:
+        """Return what it looks like, for pictures; None for what has no shape of its own. Parameters are numbers."""
+        return None
+
     def reaction(self, name: str) -> Scalar:
         """Return a reaction of this component; only within an observable or an event."""
         reactions = self._binding().reactions
@@ -254,6 +271,8 @@ class Component:
     def _connector(self, spec: ConnectorSpec) -> Any:
         motions = self._bound.motions if self._bound is not None else {}
         made = tuple(spec.kind(self, name, motions.get(name)) for name in spec.names(self))
+        if not made and spec.count is None:
+            raise spec.absent(self)
         return made if spec.count is not None else made[0]
 
     def _checked(self, name: str, value: Any) -> Any:
@@ -312,7 +331,7 @@ class Component:
         """Return the connectors by name, each element of an array on its own."""
         found: dict[str, Connector] = {}
         for spec in self._connectors.values():
-            made = self._connector(spec)
+            made = self._connector(spec) if spec.names(self) else ()
             found.update({one.name: one for one in (made if isinstance(made, tuple) else (made,))})
         return found
 

@@ -6,7 +6,7 @@ to zero.  Through quantities are positive *into* the component.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
@@ -185,10 +185,13 @@ class Groove(Point):
 class ConnectorSpec:
     """The declaration of a connector in a class body; see `connector`."""
 
-    def __init__(self, kind: type[Connector], doc: str, count: str | None) -> None:
+    def __init__(
+        self, kind: type[Connector], doc: str, count: str | None, when: Mapping[str, Sequence[str]] | None = None
+    ) -> None:
         self.kind = kind
         self.doc = doc
         self.count = count
+        self.when = dict(when or {})
         self.name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
@@ -198,7 +201,9 @@ class ConnectorSpec:
         return self if instance is None else instance._connector(self)
 
     def names(self, component: Component) -> tuple[str, ...]:
-        """Return the names of the connectors it declares on a component: one, or an array of them."""
+        """Return the names of the connectors it declares on a component: one, none, or an array of them."""
+        if self.when and not any(component._value(choice) in words for choice, words in self.when.items()):
+            return ()
         if self.count is None:
             return (self.name,)
         count = component._value(self.count)
@@ -210,11 +215,27 @@ class ConnectorSpec:
             )
         return tuple(f"{self.name}[{i}]" for i in range(count))
 
+    def absent(self, component: Component) -> DeclarationError:
+        """Return the error that says that a component, as it is set, does not have this connector."""
+        asked = " or ".join(f"{choice}={word!r}" for choice, words in self.when.items() for word in words)
+        return DeclarationError(
+            f"it has no connector {self.name!r} as it is set",
+            where=component.path or type(component).__name__,
+            advice=f"It has one with {asked}.",
+        )
+
 
 _C = TypeVar("_C", bound=Connector)
 
 
-def connector(kind: type[_C], doc: str, *, count: str | None = None, init: Literal[False] = False) -> Any:
+def connector(
+    kind: type[_C],
+    doc: str,
+    *,
+    count: str | None = None,
+    when: Mapping[str, Sequence[str]] | None = None,
+    init: Literal[False] = False,
+) -> Any:
     """Declare a connector in the class body of a component.
 
     Parameters
@@ -225,10 +246,12 @@ def connector(kind: type[_C], doc: str, *, count: str | None = None, init: Liter
         One line that says where it is.
     count
         Name of the integer parameter that says how many there are; then it is a tuple of connectors.
+    when
+        For a connector that is there only if asked for: names of choice parameters, each with the values that ask.
     """
     if not doc.strip():
         raise DeclarationError("a connector needs one line that says where it is")
-    return ConnectorSpec(kind, doc, count)
+    return ConnectorSpec(kind, doc, count, when)
 
 
 @dataclass(frozen=True)

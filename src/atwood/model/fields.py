@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import copy
 import math
+import os
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from atwood.errors import AtwoodError, DeclarationError, ParameterError, suggestion
+from atwood.errors import AtwoodError, DeclarationError, ParameterError, near_matches, suggestion
 from atwood.model.deferred import Deferred
 from atwood.model.timefunction import check_function
 from atwood.model.units import Unit, parse_quantity, parse_si_unit
@@ -116,12 +117,13 @@ class ParameterSpec(Field):
         structural: bool = False,
         direction: bool = False,
         turning: bool = False,
+        text: bool = False,
     ) -> None:
         super().__init__("parameter", default, unit, doc)
         self.minimum, self.above, self.maximum = minimum, above, maximum
         self.size, self.integer, self.choices = size, integer, choices
-        self.direction, self.turning = direction, turning
-        self.structural = structural or direction or integer or bool(choices)
+        self.direction, self.turning, self.text = direction, turning, text
+        self.structural = structural or direction or integer or text or bool(choices)
 
     def check(self, value: Any, where: str) -> Any:
         """Return a value in its own type and SI unit, or refuse it.
@@ -139,10 +141,13 @@ class ParameterSpec(Field):
             return None
         if self.choices:
             if not isinstance(value, str) or value not in self.choices:
-                raise ParameterError(
-                    f"{value!r} is not one of its values", where=where, advice=f"Choose from {', '.join(self.choices)}."
-                )
+                advice = f"Choose from {', '.join(self.choices)}."
+                if isinstance(value, str) and near_matches(value, self.choices):
+                    advice = f"{suggestion(value, self.choices)} {advice}"
+                raise ParameterError(f"{value!r} is not one of its values", where=where, advice=advice)
             return value
+        if self.text:
+            return _check_text(value, where)
         if self.size is not None:
             return self._check_vector(value, where)
         return self._check_number(value, where)
@@ -215,6 +220,13 @@ class SignalSpec(Field):
         return ParameterSpec(0.0, self.unit.text, self.doc).check(value, where)
 
 
+def _check_text(value: Any, where: str) -> str:
+    text = os.fspath(value) if isinstance(value, os.PathLike) else value
+    if not isinstance(text, str) or not text.strip():
+        raise ParameterError(f"{value!r} is no text", where=where, advice="Give a word or a path in quotes.")
+    return text
+
+
 def _plain_number(value: Any) -> float | None:
     """Return anything that is one real number as a float; None for truth values and everything else."""
     if isinstance(value, (bool, bytes, bytearray)) or type(value).__name__ in ("bool", "bool_"):
@@ -241,6 +253,7 @@ def parameter(
     structural: bool = False,
     direction: bool = False,
     turning: bool = False,
+    text: bool = False,
 ) -> Any:
     """Declare a parameter in the class body of a component.
 
@@ -270,6 +283,8 @@ def parameter(
         Whether it is a direction: three numbers, not all zero, of which a unit vector is made.
     turning
         Whether it is a direction about which something turns; in a plane it can only be the plane's normal.
+    text
+        Whether it is text, as the path of a file is.
 
     Raises
     ------
@@ -291,6 +306,7 @@ def parameter(
         structural=structural,
         direction=direction or turning,
         turning=turning,
+        text=text,
     )
 
 

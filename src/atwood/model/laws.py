@@ -188,6 +188,7 @@ class EventOptions:
     message: str
     unit: str
     impact: bool
+    spaces: tuple[str, ...] = ("line", "plane", "space")
 
 
 def _mark(function: _F, law: Law) -> _F:
@@ -337,6 +338,7 @@ def event(
     modes: Sequence[str] = (),
     direction: int = 0,
     impact: bool = False,
+    spaces: Sequence[str] = ("line", "plane", "space"),
 ) -> Callable[[_F], _F]:
     """Mark a method whose zero crossing changes the mode of the component or ends the run.
 
@@ -354,8 +356,10 @@ def event(
         +1 to see crossings upwards only, -1 downwards only, 0 both.
     impact
         Whether velocities jump: they are made consistent with the new mode by a plastic impact.
+    spaces
+        The spaces in which it is watched.
     """
-    options = EventOptions(tuple(modes), direction, target, message, unit, impact)
+    options = EventOptions(tuple(modes), direction, target, message, unit, impact, tuple(spaces))
     return lambda function: _mark(function, Law("event", function.__name__, options))
 
 

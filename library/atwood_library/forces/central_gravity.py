@@ -1,0 +1,90 @@
+"""CentralGravity: the attraction by a point, or by a sphere."""
+
+from __future__ import annotations
+
+from atwood import (
+    Component,
+    Frame,
+    Point,
+    Scalar,
+    Vector,
+    as_vector,
+    connector,
+    dot,
+    norm,
+    observable,
+    parameter,
+    potential,
+    sqrt,
+)
+
+
+class CentralGravity(Component):
+    """The attraction of a mass by a point, or a sphere, of gravitational parameter ``mu = G M``.
+
+    Potential energy ``-mu m / r`` (Goldstein, section 3.7). Both ends feel the force, so that the source may itself be
+    a body that moves.
+
+    With ``attracts="body"`` it acts at `frame` on an extended body of the given inertia, to second order in its size
+    over the distance: ``-mu m/r - mu (tr J - 3 J_r)/(2 r^3)`` with the moment of inertia J_r about the line from the
+    source to the centre of mass (MacCullagh's formula; Goldstein, section 5.8). Its torque is the gravity gradient
+    ``3 mu/r^3 (e x J e)``, and its force is the derivative of the same energy, so that energy and angular momentum
+    are kept. `mass`, `center`, `moments` and `products` are those of the body that hangs there.
+    """
+
+    gravitational_parameter: float = parameter(
+        3.986004418e14, unit="m^3/s^2", minimum=0.0, doc="G M of the source; by default that of the Earth."
+    )
+    mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass that is attracted.")
+    attracts: str = parameter("point", choices=("point", "body"), doc="Whether a point mass or an extended body.")
+    center: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0), unit="m", size=3, doc="Of a body: centre of mass in the axes of its frame."
+    )
+    moments: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0),
+        unit="kg*m^2",
+        size=3,
+        minimum=0.0,
+        doc="Of a body: moments of inertia Jxx, Jyy, Jzz about the centre of mass, in the axes of its frame.",
+    )
+    products: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0), unit="kg*m^2", size=3, doc="Of a body: entries Jxy, Jxz, Jyz of the inertia tensor."
+    )
+    source: Point = connector(Point, "The centre of the source.")
+    point: Point = connector(Point, "The point mass that is attracted.", when={"attracts": ("point",)})
+    frame: Frame = connector(Frame, "The frame of the body that is attracted.", when={"attracts": ("body",)})
+
+    def separation(self) -> Vector:
+        """Return the way from the source to the centre of mass, in world axes."""
+        if self.attracts == "point":
+            return self.point.position - self.source.position
+        arm = self.frame.to_world(as_vector(self.center))
+        separation: Vector = self.frame.position + arm - self.source.position
+        return separation
+
+    @potential
+    def energy(self) -> Scalar:
+        """Return the potential energy."""
+        r = self.separation()
+        square = dot(r, r)
+        inverse = 1.0 / sqrt(square)
+        energy = -(self.gravitational_parameter * self.mass * inverse)
+        if self.attracts == "point":
+            return energy
+        j, p = as_vector(self.moments), as_vector(self.products)
+        s = self.frame.to_frame(r)
+        along = j.x * s.x * s.x + j.y * s.y * s.y + j.z * s.z * s.z
+        along = along + 2.0 * (p.x * s.x * s.y + p.y * s.x * s.z + p.z * s.y * s.z)
+        spread = (j.x + j.y + j.z) - 3.0 * along / square
+        return energy - 0.5 * self.gravitational_parameter * spread * (inverse * inverse * inverse)
+
+    @observable(unit="m", doc="Distance of the centre of mass from the source.")
+    def distance_apart(self) -> Scalar:
+        """Return the distance."""
+        return norm(self.separation())
+
+    @observable(unit="m/s^2", doc="Acceleration of free fall at the centre of mass.")
+    def pull(self) -> Scalar:
+        """Return ``mu/r^2``."""
+        r = self.separation()
+        return self.gravitational_parameter / dot(r, r)
