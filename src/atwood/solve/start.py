@@ -7,11 +7,13 @@ balance of forces.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.errors import StartError
+from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
 from atwood.solve.scales import motion_scales, scene_length
 from atwood.solve.start_positions import solve_positions
@@ -41,6 +43,9 @@ class Start:
         far as they could. A speed that is the rate of no coordinate has its own name.
     repeated
         Paths of fixed values that follow from the others.
+    rough
+        Coordinates at which bodies were placed by what is said of them, before constraints and what is fixed were
+        met; see `atwood.solve.placement`.
     """
 
     time: float
@@ -50,6 +55,7 @@ class Start:
     free_coordinates: tuple[str, ...]
     free_speeds: tuple[str, ...]
     repeated: tuple[str, ...]
+    rough: FloatArray
 
 
 def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
@@ -73,10 +79,37 @@ def find_start(assembly: Assembly) -> Start:
     StartError
         If a start value names no quantity, or they contradict each other or the constraints.
     """
+    if assembly.starting is not assembly:
+        return _taken_up(assembly, find_start(assembly.starting))
     equations, length = assembly.reduced, scene_length(assembly)
     positions, speeds = sort_targets(assembly, equations)
     scales = motion_scales(equations, length)
     t = assembly.flat.t_start
-    q, free_q, repeated_q = solve_positions(assembly, equations, positions, scales, t)
-    u, free_u, repeated_u = solve_speeds(assembly, equations, speeds, scales, t, q)
-    return Start(t, q, u, length, free_q, free_u, (*repeated_q, *repeated_u))
+    at = solve_positions(assembly, equations, positions, scales, length, t)
+    u, free_u, repeated_u = solve_speeds(assembly, equations, speeds, scales, t, at.coordinates)
+    return Start(t, at.coordinates, u, length, at.free, free_u, (*at.repeated, *repeated_u), at.rough)
+
+
+def _taken_up(assembly: Assembly, start: Start) -> Start:
+    """Return a start in the coordinates and speeds that constraints on velocities leave.
+
+    Raises
+    ------
+    StartError
+        If the equations were made for another start, which gave their constants of integration.
+    """
+    before, after = assembly.starting.reduced, assembly.reduced
+    q = dict(zip(before.coordinates, start.coordinates.tolist(), strict=True))
+    u = dict(zip(before.speeds, start.speeds.tolist(), strict=True))
+    place = {**assembly.mechanism.table.values, before.time: start.time, **q}
+    for one in after.integrals:
+        (missed,) = evaluate([one.value], place)
+        if not abs(missed) <= 1e-9 * max(start.length, 1.0, *(abs(value) for value in q.values())):
+            raise StartError(
+                f"the equations were made for another start, and a constant of integration differs by {missed:g}",
+                where=one.keys[-1][0],
+                advice="Assemble the scene anew, or give the start to `with_values`.",
+            )
+    coordinates = np.array([q[symbol] for symbol in after.coordinates])
+    speeds = np.array([u[symbol] for symbol in after.speeds])
+    return replace(start, coordinates=coordinates, speeds=speeds)

@@ -3,56 +3,218 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import StartError
-from atwood.expr import evaluate
+from atwood.errors import KernelEvaluationError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Equations
-from atwood.solve.start_system import MET, System, newton
+from atwood.solve.closing import Nearest, closest, closest_of_all, units_of_rows
+from atwood.solve.gaps import Gap, find_gaps
+from atwood.solve.start_system import MET, System
 from atwood.solve.start_targets import Level, Target
 
-__all__ = ["explain_positions", "raise_contradiction"]
+__all__ = ["Failed", "contradiction", "explain_positions", "far_from_guess", "wrong_way_round"]
 
 FloatArray = NDArray[np.float64]
 
+_CLOSED = 1e-9
+"""A gap below this share of the scene's extent, or in radians, is none."""
 
-def explain_positions(
-    assembly: Assembly,
-    equations: Equations,
-    level: Level,
-    scales: FloatArray,
-    t: float,
-    q: FloatArray,
-    missing: FloatArray,
-) -> None:
-    """Raise the error that says whether a loop cannot close or the start contradicts itself."""
-    if any(one.holonomic for one in equations.constraints):
-        system = System(assembly, equations, [], True)
-        nearest, alone, _ = newton(system, scales, t, q)
-        if not float(np.max(np.abs(alone))) <= MET:
-            _raise_open_loop(assembly, equations, t, nearest, alone)
-    raise_contradiction(level.fixed, missing[len(missing) - len(level.fixed) :], equations)
+_HELD = 1e-4
+"""What is to hold all but exactly while something else is made small counts so much more."""
 
 
-def _raise_open_loop(
-    assembly: Assembly, equations: Equations, t: float, nearest: FloatArray, missing: FloatArray
-) -> None:
-    """Raise the error that names the loop that cannot close."""
+@dataclass(frozen=True)
+class Failed:
+    """A start that was not found.
+
+    Attributes
+    ----------
+    assembly, equations
+        The scene.
+    level
+        What is said of positions.
+    scales
+        Size of a displacement along each speed.
+    length
+        Extent of the scene, m.
+    time
+        Of the start, s.
+    rough
+        Where bodies were placed by what is said of them.
+    nearest
+        Where Newton's method came to rest.
+    missing
+        What each condition misses there, scaled.
+    """
+
+    assembly: Assembly
+    equations: Equations
+    level: Level
+    scales: FloatArray
+    length: float
+    time: float
+    rough: FloatArray
+    nearest: FloatArray
+    missing: FloatArray
+
+
+def explain_positions(failed: Failed) -> StartError:
+    """Return the error that says whether a loop cannot close or the start contradicts itself.
+
+    Parameters
+    ----------
+    failed
+        The start that was not found.
+    """
+    fixed = failed.level.fixed
+    own = failed.missing[len(failed.missing) - len(fixed) :]
+    if not any(one.value is not None for one in failed.equations.constraints):
+        return contradiction(fixed, own, failed.equations)
+    system = System(failed.assembly, failed.equations, [], True)
+    units = units_of_rows(failed.assembly, failed.equations, system, failed.length)
+    best = closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
+    if best is not None and best.size > _CLOSED:
+        return _open_loop(failed, system, best)
+    return contradiction(fixed, own, failed.equations, _what_stays_open(failed))
+
+
+def _what_stays_open(failed: Failed) -> str:
+    """Return, in words, how near loops come to closing while all that is fixed holds; empty where that says nothing."""
+    fixed = failed.level.fixed
+    if not fixed:
+        return ""
+    system = System(failed.assembly, failed.equations, fixed, True)
+    units = units_of_rows(failed.assembly, failed.equations, system, failed.length)
+    units[system.constraints :] *= _HELD  # what is fixed holds all but exactly
+    best = closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
+    if best is None:
+        return ""
+    if np.any(np.abs(best.missing[system.constraints :]) > 1e-6 / _HELD * units[system.constraints :]):
+        return ""
+    worst = _largest(find_gaps(failed.assembly, failed.equations, failed.time, best.coordinates), failed.length)
+    return f"; with {'it' if len(fixed) == 1 else 'them'}, {worst.part} stays open by {worst.describe()} at least"
+
+
+def _largest(gaps: Sequence[Gap], length: float) -> Gap:
+    return max(gaps, key=lambda gap: gap.size(length))
+
+
+def _open_loop(failed: Failed, system: System, best: Nearest) -> StartError:
+    """Return the error that names the loop that cannot close."""
+    best = _in_one_joint(failed, system, best)
+    gaps = find_gaps(failed.assembly, failed.equations, failed.time, best.coordinates)
+    worst = _largest(gaps, failed.length)
+    others = [one for one in gaps if one is not worst and one.size(failed.length) > 0.01 * worst.size(failed.length)]
+    loop = _loop_through(failed.assembly, worst.part)
+    text = f"the loop cannot close here: the nearest position found misses by {worst.describe()}"
+    if others:
+        text += f" (and by {', '.join(f'{one.describe()} at {one.part}' for one in others[:4])})"
+    if loop:
+        text += f" (the loop of {', '.join(loop)})"
+    lengths = _lengths_that_close(failed, system, best)
+    advice = "Check the lengths of the loop, or guess a start nearer to a position in which it closes."
+    if lengths:
+        advice = f"It would about close with {' or '.join(lengths)}. {advice}"
+    return StartError(text, where=worst.part, advice=advice)
+
+
+def _in_one_joint(failed: Failed, system: System, best: Nearest) -> Nearest:
+    """Return the place at which one joint misses least while all others close, if it can be had; else the one given.
+
+    Among several joints the least sum of squares shares out what is missing, which is harder to read.
+    """
+    equations = failed.equations
     holding = [one for one in equations.constraints if one.value is not None]
-    worst = holding[int(np.argmax(np.abs(missing)))]
-    values = [one.value for one in holding if one.key[0] == worst.key[0] and one.value is not None]
-    place = {equations.time: t, **dict(zip(equations.coordinates, nearest.tolist(), strict=True))}
-    miss = max(abs(v) for v in evaluate(values, {**assembly.mechanism.table.values, **place}))
-    loop = _loop_through(assembly, worst.key[0])
-    raise StartError(
-        f"the loop cannot close here: the nearest position found misses by {miss:.3g}"
-        + (f" (the loop of {', '.join(loop)})" if loop else ""),
-        where=worst.key[0],
-        advice="Check the lengths of the loop, or guess a start nearer to a position in which it closes.",
+    gaps = find_gaps(failed.assembly, equations, failed.time, best.coordinates)
+    worst = _largest(gaps, failed.length).part
+    others = np.array([one.key[0] != worst for one in holding])
+    if not np.any(others):
+        return best
+    units = units_of_rows(failed.assembly, equations, system, failed.length)
+    try:
+        found = closest(system, np.where(others, _HELD * units, units), failed.scales, failed.time, best.coordinates)
+    except (KernelEvaluationError, np.linalg.LinAlgError):
+        return best
+    is_closed = np.all(np.abs(found.missing / units)[others] <= 1e-6 * max(best.size, _CLOSED))
+    alone = float(np.linalg.norm((found.missing / units)[~others]))
+    return Nearest(found.coordinates, found.missing, alone) if is_closed else best
+
+
+def _lengths_that_close(failed: Failed, system: System, best: Nearest) -> list[str]:
+    """Return, in words, the lengths whose change would take away what is missed, those that do most first."""
+    assembly, shown = failed.assembly, 3
+    units = units_of_rows(assembly, failed.equations, system, failed.length)
+    program, values = system.program, assembly.parameter_values
+    missing = best.missing / units
+    found = []
+    for j, symbol in enumerate(assembly.parameters):
+        path, _, name = symbol.name.rpartition(".")
+        if name in "xyz":
+            path, _, name = path.rpartition(".")
+        part = assembly.flat.parts.get(path)
+        spec = None if part is None else part.component.parameter_specs().get(name)
+        if spec is None or spec.unit.text != "m":
+            continue
+        h = 1e-6 * failed.length
+        changed = values.copy()
+        changed[j] += h
+        after = assembly.compiled(program).bind(changed)(
+            [failed.time], best.coordinates, np.zeros(len(failed.equations.speeds))
+        )[0]
+        slope = float((np.asarray(after) / units - missing) @ missing) / (h * best.size)
+        if abs(slope) * failed.length > 0.3:
+            found.append((abs(slope), symbol.name, values[j], values[j] - best.size / slope))
+    found.sort(key=lambda one: -one[0])
+    good = [one for one in found if np.sign(one[2]) == np.sign(one[3])]
+    return [f"{name} = {new:.4g} m (it is {old:.4g} m)" for _, name, old, new in good[:shown]]
+
+
+def far_from_guess(failed: Failed, found: FloatArray) -> StartError:
+    """Return the error that says that all fits only far from the guess.
+
+    Parameters
+    ----------
+    failed
+        The start that was not found.
+    found
+        Coordinates of the nearest place at which everything holds.
+    """
+    equations, assembly = failed.equations, failed.assembly
+    if not any(one.value is not None for one in equations.constraints):
+        return contradiction(failed.level.fixed, failed.missing, equations)
+    gaps = find_gaps(assembly, equations, failed.time, failed.nearest)
+    worst = _largest(gaps, failed.length)
+    system = System(assembly, equations, failed.level.guessed, False)
+    off, _ = system.at(failed.time, found, np.zeros_like(failed.scales))
+    places = [f"{one.path} = {one.value + miss:.4g}" for one, miss in zip(failed.level.guessed, off, strict=True)]
+    return StartError(
+        f"the loop does not close near the guess: the nearest position found there misses by {worst.describe()}",
+        where=worst.part,
+        advice=f"It closes elsewhere; guess near to {', '.join(places[:6])}{', ...' if len(places) > 6 else ''}.",
+    )
+
+
+def wrong_way_round(failed: Failed, part: str) -> StartError:
+    """Return the error that says that a joint would have to be put in the wrong way round.
+
+    Parameters
+    ----------
+    failed
+        The start that was not found.
+    part
+        Path of the joint.
+    """
+    loop = _loop_through(failed.assembly, part)
+    return StartError(
+        "the loop closes near the guess only with this joint the wrong way round: its two frames would be half a turn "
+        "away from how it joins them" + (f" (the loop of {', '.join(loop)})" if loop else ""),
+        where=part,
+        advice="Turn its axis round, or the frame that it is fixed to, or guess a start in which it is the right way.",
     )
 
 
@@ -78,8 +240,8 @@ def _loop_through(assembly: Assembly, part: str) -> list[str]:
     return [*found, *([bodies.bodies[way[-1]].name] if way[-1] else [])]
 
 
-def raise_contradiction(fixed: Sequence[Target], missing: FloatArray, equations: Equations) -> None:
-    """Raise the error that says which fixed values cannot all hold.
+def contradiction(fixed: Sequence[Target], missing: FloatArray, equations: Equations, remark: str = "") -> StartError:
+    """Return the error that says which fixed values cannot all hold.
 
     Parameters
     ----------
@@ -89,16 +251,15 @@ def raise_contradiction(fixed: Sequence[Target], missing: FloatArray, equations:
         What each value misses, scaled.
     equations
         The scene's.
+    remark
+        What else there is to say.
     """
-    failing = [
-        f"{target.path} = {target.value:g}" for target, miss in zip(fixed, missing, strict=True) if abs(miss) > MET
-    ]
-    names = failing or [f"{target.path} = {target.value:g}" for target in fixed]
+    failing = [target for target, miss in zip(fixed, missing, strict=True) if not abs(miss) <= MET]
+    names = [f"{target.path} = {target.value:g}" for target in failing or fixed]
     freedom = len(equations.speeds) - len(equations.constraints)
-    where = next((t.path for t, m in zip(fixed, missing, strict=True) if abs(m) > MET), fixed[0].path if fixed else "")
-    raise StartError(
-        f"the start values contradict each other or the constraints: {', '.join(names)} cannot all hold",
-        where=where,
+    return StartError(
+        f"the start values contradict each other or the constraints: {', '.join(names)} cannot all hold{remark}",
+        where=(failing or fixed)[0].path if fixed else "",
         advice=f"The mechanism has {freedom} free coordinate{'s' if freedom != 1 else ''}; "
         "fix fewer values, or give some as guesses (on the command line: --start PATH=free).",
     )

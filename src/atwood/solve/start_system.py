@@ -93,6 +93,7 @@ class System:
     ) -> None:
         made = start_conditions(assembly, equations, targets, constrained, of_speeds)
         self.turning = None if of_speeds else turning_of(assembly, "reduced")
+        self.program = made.program
         self.kernel = assembly.kernel(made.program)
         self.rows, self.columns, self.shape = made.rows, made.columns, made.shape
         self.targets, self.constraints = targets, made.shape[0] - len(targets)
