@@ -86,6 +86,11 @@ class Solid(Component):
         """Return the angle."""
         return self.frame.angle
 
+    @observable(unit="rad/s", doc="Rate of the angle in the plane, counter-clockwise.", spaces=("plane",))
+    def angular_speed(self) -> Scalar:
+        """Return the rate of the angle; the rotation is about -y."""
+        return -self.frame.angular_velocity.y
+
     @observable(unit="rad/s", doc="Angular velocity in world axes.", spaces=("plane", "space"))
     def angular_velocity(self) -> Vector:
         """Return the angular velocity."""

@@ -81,8 +81,8 @@ class OrientationSensor(Component):
         """Return the component of the relative angular velocity along the second axis, the normal of the others."""
         first, third, _ = self._outer_axes()
         _, _, _, again, sense = self._sequence()
-        normal = cross(third, first) if not again else cross(first, third)
-        factor = -sense if not again else 1.0
+        normal = cross(first, third) if again else cross(third, first)
+        factor = 1.0 if again else sense
         return factor * dot(self.relative_spin(), normal) / norm(normal)
 
     @observable(unit="rad/s", doc="Rate of the third angle.", spaces=("space",))
