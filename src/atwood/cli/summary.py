@@ -101,6 +101,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         said = why.get(result.status, result.status)
         yield "ended early", f"{said}: {result.message}" if result.message else said
     yield from (("event", one.describe()) for one in result.happenings if one.target != "stop")
+    yield from _passages(result)
     yield (
         "solver",
         f"{solver_name(result)}, {count_of(statistics.steps, 'step')}, {statistics.residual_evaluations} residuals, "
@@ -114,6 +115,16 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         held = max(missed["held_position"], missed["held_velocity"])
         before = f" ({held:.1e} before projection)" if plan.is_projected else ""
         yield "constraints", f"missed by {max(missed['position'], missed['velocity']):.1e}{before}"
+
+
+def _passages(result: Result) -> Iterator[tuple[str, str]]:
+    """Yield the singular positions that a run passed through: the first, and when it came to others."""
+    if result.passages:
+        yield "singular", result.passages[0].describe()
+        if len(result.passages) > 1:
+            later = [f"{one.time:.6g}" for one in result.passages[1:6]]
+            more = len(result.passages) - 1 - len(later)
+            yield "", f"and in the same way at t = {', '.join(later)}{f' s and {more} more times' if more else ' s'}"
 
 
 def _energy(result: Result) -> str:

@@ -59,6 +59,10 @@ def describe_run(result: Result) -> dict[str, Any]:
         "happenings": [
             {"time": one.time, "part": one.part, "what": one.message, "mode": one.target} for one in result.happenings
         ],
+        "singular_positions": [
+            {"time": one.time, "ways": one.ways, "parts": list(one.parts), "what": one.describe()}
+            for one in result.passages
+        ],
         "solver": {
             "name": solver_name(result),
             "why": result.run.why,

@@ -22,6 +22,7 @@ from atwood.result.angles import unwrap
 from atwood.result.energy import EnergyLedger, make_ledger
 from atwood.solve.driver import Statistics
 from atwood.solve.modes import Happening
+from atwood.solve.passage import Passage
 from atwood.solve.projection import misses_of
 from atwood.solve.reactions import ReactionSolver
 from atwood.solve.record import Segment
@@ -86,6 +87,11 @@ class Result:
     def happenings(self) -> tuple[Happening, ...]:
         """Events on the way, in order."""
         return self.run.happenings
+
+    @property
+    def passages(self) -> tuple[Passage, ...]:
+        """Singular positions that the run passed through, in order."""
+        return self.run.passages
 
     @property
     def solver(self) -> str:
@@ -202,9 +208,7 @@ class Result:
         if any(reading):
             reactions, _ = self._reactions(segment)
         if any(accelerating) and segment.speeds.size:
-            kept = np.asarray(segment.plan.finding.kept, dtype=np.intp)
-            solver = self._solver(segment)
-            accelerations = solver.own_accelerations(segment.time, segment.coordinates, segment.speeds, kept)
+            accelerations = self._accelerations(segment)
         kernel = assembly.kernel(assembly.observer(paths), vectorized=True)
         values: FloatArray = kernel(
             segment.time[None, :], segment.coordinates, segment.speeds, accelerations, reactions
@@ -226,11 +230,30 @@ class Result:
             )
         return self._solvers[id(segment)]
 
+    def _accelerations(self, segment: Segment) -> FloatArray:
+        """Return the accelerations of the form's coordinates; near singular positions those of the smooth motion."""
+        kept, solver = np.asarray(segment.plan.finding.kept, dtype=np.intp), self._solver(segment)
+        found, clear = np.zeros_like(segment.speeds), np.ones(len(segment.time), dtype=bool)
+        for passage in segment.passages:
+            inside = passage.has_in_its_middle(segment.time)
+            found[:, inside] = passage.arc.at(segment.time[inside])[2]
+            clear &= ~inside
+        state = segment.time[clear], segment.coordinates[:, clear], segment.speeds[:, clear]
+        found[:, clear] = solver.own_accelerations(*state, kept)
+        return found
+
     def _reactions(self, segment: Segment) -> tuple[FloatArray, FloatArray]:
+        """Return all reactions, not known (nan) at singular positions, and the power of moving constraints."""
         if id(segment) not in self._reaction_cache:
-            self._reaction_cache[id(segment)] = self._solver(segment).at(
-                segment.time, segment.coordinates, segment.speeds
+            t, clear = segment.time, np.ones(len(segment.time), dtype=bool)
+            for passage in segment.passages:
+                clear &= ~passage.leaves_open(t)
+            values, power = np.full((len(segment.assembly.reactions), len(t)), np.nan), np.zeros(len(t))
+            values[:, clear], power[clear] = self._solver(segment).at(
+                t[clear], segment.coordinates[:, clear], segment.speeds[:, clear]
             )
+            power[~clear] = np.interp(t[~clear], t[clear], power[clear])
+            self._reaction_cache[id(segment)] = values, power
         return self._reaction_cache[id(segment)]
 
     # -- how good it is -------------------------------------------------------------------------------------------

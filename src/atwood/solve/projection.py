@@ -21,7 +21,7 @@ from atwood.solve.problem import Plan
 if TYPE_CHECKING:
     from atwood.solve.sparse_batch import Normal
 
-__all__ = ["Projected", "misses_of", "project_safely", "project_states"]
+__all__ = ["ConstraintsAt", "Projected", "constraints_at", "misses_of", "project_safely", "project_states"]
 
 _MET = 1e-11
 """Relative to the scene's sizes: a constraint that is missed by less is met."""
@@ -56,10 +56,11 @@ class Projected:
 
 
 @dataclass(frozen=True, eq=False)
-class _Constraints:
+class ConstraintsAt:
     """Constraints at many states, each in units of how much it changes with a displacement of the size that counts.
 
-    The slope is of shape (states, constraints, coordinates), or (entries, states) with normal equations.
+    The slope is of shape (states, constraints, coordinates), or (entries, states) with normal equations; the units,
+    in `rows`, of shape (states, constraints).
     """
 
     value: FloatArray
@@ -67,6 +68,7 @@ class _Constraints:
     drift: FloatArray
     kept: list[int]
     normal: Normal | None
+    rows: FloatArray
 
     def rate(self, speeds: FloatArray) -> FloatArray:
         """Return the constraints on velocity for speeds in units of the scales, shape (states, number)."""
@@ -128,7 +130,7 @@ def misses_of(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatA
     found = np.zeros((2, len(t)))
     for i in range(0, len(t), chunk):
         part = slice(i, i + chunk)
-        now = _constraints(plan, t[part], q[:, part], u[:, part])
+        now = constraints_at(plan, t[part], q[:, part], u[:, part])
         found[:, part] = _largest(now, (u[:, part] / plan.sizes[:, None]).T)
     return found
 
@@ -156,11 +158,12 @@ def _normal(plan: Plan) -> Normal | None:
     return plan.assembly.shared.get(("normal equations", plan.assembly.form, plan.finding.kept), make)
 
 
-def _largest(now: _Constraints, speeds: FloatArray) -> FloatArray:
+def _largest(now: ConstraintsAt, speeds: FloatArray) -> FloatArray:
     return np.stack([np.max(np.abs(now.value), axis=1), np.max(np.abs(now.rate(speeds)), axis=1)])
 
 
-def _constraints(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> _Constraints:
+def constraints_at(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> ConstraintsAt:
+    """Return the constraints at states, of shape (states,) and (number, states)."""
     p, count = plan.balance.program, len(t)
     kernel = plan.assembly.kernel(p.program, vectorized=True)
     _, _, value, _, _, slope, drift = kernel(t[None, :], q, u)
@@ -170,20 +173,20 @@ def _constraints(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> _Co
         slope = slope * plan.sizes[pattern.columns, None]
         rows = pattern.largest(slope).T
         rows[rows == 0.0] = 1.0
-        return _Constraints(value.T / rows, slope / rows.T[pattern.rows], drift.T / rows, kept, normal)
+        return ConstraintsAt(value.T / rows, slope / rows.T[pattern.rows], drift.T / rows, kept, normal, rows)
     full = np.zeros((count, p.constraints, p.speeds))
     full[:, p.slope_rows, p.slope_columns] = slope.T
     full *= plan.sizes
     rows = np.max(np.abs(full), axis=2)
     rows[rows == 0.0] = 1.0
-    return _Constraints(value.T / rows, full / rows[:, :, None], drift.T / rows, kept, None)
+    return ConstraintsAt(value.T / rows, full / rows[:, :, None], drift.T / rows, kept, None, rows)
 
 
 def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
     sizes = plan.sizes[:, None]
     turning, holding = plan.balance.turning, plan.balance.holding(list(plan.finding.kept))
     q, speeds = turning.normalized(q.copy()), (u / sizes).T
-    now = _constraints(plan, t, q, u)
+    now = constraints_at(plan, t, q, u)
     held = _largest(now, speeds)
     last = np.full(len(t), np.inf)
     active = np.ones(len(t), dtype=bool)
@@ -195,7 +198,7 @@ def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Project
         last = miss
         step = now.step(now.value, holding)
         q = turning.moved_each(t, q, -sizes * np.where(active[:, None], step, 0.0).T)
-        now = _constraints(plan, t, q, u)
+        now = constraints_at(plan, t, q, u)
     for _ in range(2):  # the second pass takes out the rounding of the first
         speeds = speeds - now.step(now.rate(speeds))
     left = _largest(now, speeds) * np.array([[1.0], [plan.scales.time]])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +10,9 @@ from numpy.typing import NDArray
 
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
+from atwood.solve.passage import Passage
 from atwood.solve.problem import Plan
-from atwood.solve.projection import project_safely, project_states
+from atwood.solve.projection import misses_of, project_safely, project_states
 
 __all__ = ["Recorder", "Segment"]
 
@@ -39,6 +41,8 @@ class Segment:
         Which samples are outputs.
     held
         By how much the solver's own states missed the constraints on position and velocity, shape (2, samples).
+    passages
+        Singular positions that it passed through.
     """
 
     plan: Plan
@@ -48,6 +52,7 @@ class Segment:
     speeds: FloatArray
     shown: NDArray[np.bool_]
     held: FloatArray
+    passages: tuple[Passage, ...] = ()
 
     @property
     def assembly(self) -> Assembly:
@@ -83,6 +88,7 @@ class Recorder:
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
+        self.passages: list[Passage] = []
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
         self._samples: tuple[tuple[_Block, ...], list[tuple[float, FloatArray, bool]]] = ((), [])
 
@@ -121,6 +127,41 @@ class Recorder:
             self.settle()
             self._finish(t, y, shown)
 
+    def pass_over(self, passage: Passage, t: FloatArray, shown: NDArray[np.bool_]) -> None:
+        """Record a passage, in place of all samples since its start; its states are not to be projected.
+
+        Parameters
+        ----------
+        passage
+            The passage.
+        t, shown
+            Sample times on its way, and which of them are outputs.
+        """
+        self._rewind(passage.arc.start)
+        self.settle()
+        self.passages.append(passage)
+        if len(t):
+            q, u, _ = passage.arc.at(t)
+            q = self.plan.balance.turning.normalized(q)
+            self._add(_Block(t, q, u, shown.copy(), misses_of(self.plan, t, q, u)))
+
+    def note(self, passages: Sequence[Passage]) -> None:
+        """Record passages that the solver made by itself; states quite near the place cannot be projected well."""
+        self.settle()
+        for passage in passages:
+            self.passages.append(passage)
+            for block in self._samples[0]:
+                inside = passage.has_in_its_middle(block.time)
+                if inside.any():
+                    q, u, _ = passage.arc.at(block.time[inside])
+                    block.q[:, inside], block.u[:, inside] = self.plan.balance.turning.normalized(q), u
+
+    def _rewind(self, t: float) -> None:
+        """Forget all samples after a time."""
+        blocks, pending = self._samples
+        kept = (one.first(int(np.searchsorted(one.time, t, side="right"))) for one in blocks)
+        self._samples = (tuple(one for one in kept if len(one.time)), [one for one in pending if one[0] <= t])
+
     def settle(self) -> None:
         """Project all that waits."""
         pending = self._samples[1]
@@ -147,7 +188,7 @@ class Recorder:
         blocks = self._samples[0]
         q, u, held = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u", "held"))
         time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
-        return Segment(self.plan, impact, time, q, u, shown, held)
+        return Segment(self.plan, impact, time, q, u, shown, held, tuple(self.passages))
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_]) -> None:
         q, u = (part.copy() for part in self.plan.program.split(y.T))

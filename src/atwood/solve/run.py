@@ -17,6 +17,7 @@ from atwood.solve.inputs import samples_needed
 from atwood.solve.missing import missing_at
 from atwood.solve.modes import EventProbe, Happening, enter_mode
 from atwood.solve.options import RunOptions, sample_times
+from atwood.solve.passage import Passage
 from atwood.solve.problem import Plan, make_plan
 from atwood.solve.record import Recorder, Segment
 from atwood.solve.scales import scene_length
@@ -65,6 +66,11 @@ class Run:
     start: Start
     options: RunOptions
     choices: tuple[Choice, ...]
+
+    @property
+    def passages(self) -> tuple[Passage, ...]:
+        """Singular positions that it passed through, in order."""
+        return tuple(one for segment in self.segments for one in segment.passages if one.ways)
 
     @property
     def solver(self) -> str:

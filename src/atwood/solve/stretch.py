@@ -15,7 +15,9 @@ from atwood.solve.missing import find_missing, states_ahead
 from atwood.solve.modes import EventProbe, Happening
 from atwood.solve.opening import Order, open_explicit_session, open_implicit_session
 from atwood.solve.options import RunOptions
+from atwood.solve.passage import Guard, Passage, events_on, guard_of
 from atwood.solve.problem import Plan, pack_state
+from atwood.solve.projection import project_safely
 from atwood.solve.record import Recorder
 
 __all__ = ["Outcome", "Stretch", "run_stretch"]
@@ -135,6 +137,7 @@ class _Runner:
         self.choices = [stretch.choice]
         self.before = Statistics(error_test_failures=0, convergence_failures=0)
         self.session: Session | None = None
+        self.guard: Guard | None = None
 
     def run(self, t: float, y: FloatArray, yp: FloatArray) -> Outcome:
         """Go from sample to sample; change the solver where the scene turns out stiff."""
@@ -160,7 +163,8 @@ class _Runner:
         return Outcome(t, status, message, self._cost(), tuple(self.choices))
 
     def _cost(self) -> Statistics:
-        return self.before if self.session is None else self.before + self.session.statistics
+        cost = self.before if self.session is None else self.before + self.session.statistics
+        return cost if self.guard is None else replace(cost, seconds=cost.seconds + self.guard.seconds)
 
     def _outcome(self, advance: Advance | None) -> Outcome:
         """Record where a solver stopped early, if it did."""
@@ -206,6 +210,7 @@ class _Runner:
             ),
         )
         if choice.solver.startswith("ida"):
+            self.guard = guard_of(stretch.plan, options.relative_tolerance, Advance(t, y, yp, Status.REACHED))
             self.session = open_implicit_session(order, choice.solver, t, y, yp)
         else:
             leave = self._is_stiff if options.solver == "auto" else None
@@ -251,22 +256,57 @@ class _Runner:
     def _advance(self, session: Session, done: int) -> tuple[int, Advance | None]:
         """Go from sample to sample; return how many are done, and why it stopped early."""
         stretch, recorder, progress = self.stretch, self.recorder, self.stretch.options.progress
-        times, shown = stretch.times[done:].tolist(), stretch.shown[done:].tolist()
-        plan = stretch.plan
+        times, shown = stretch.times.tolist(), stretch.shown.tolist()
+        plan, told = stretch.plan, -np.inf
         looks = plan.is_projected or bool(plan.dependent_speeds) or not plan.balance.turning.is_plain
-        for moment, show in zip(times, shown, strict=True):
-            advance = session.advance(moment)
+        while done < len(times):
+            moment, guard = times[done], self.guard
+            between = guard is not None and guard.next < moment
+            target = guard.next if guard is not None and between else moment
+            advance = session.advance(target)
             if advance.status is Status.FAILED and self._chose_anew(session, advance):
-                advance = session.advance(moment)
+                advance = session.advance(target)
+            passage = None if guard is None else guard.look(advance, between, moment >= stretch.end)
+            if passage is not None:
+                done, stopped = self._pass_over(session, passage)
+                if stopped is not None:
+                    return done, stopped
+                continue
+            if guard is not None and guard.agreed:
+                recorder.note(guard.agreed)
+                guard.agreed.clear()
             if advance.status is not Status.REACHED:
                 return done, advance
-            recorder.take(advance.t, advance.y, show)
+            if between:
+                continue
+            recorder.take(advance.t, advance.y, shown[done])
             done += 1
             if looks:
                 plan.review_output(advance.t, advance.y[: plan.program.coordinates])
                 self._repair(session, advance)
-            if progress is not None:
+            if progress is not None and moment > told:
+                told = moment
                 progress(moment)
+        return done, None
+
+    def _pass_over(self, session: Session, passage: Passage) -> tuple[int, Advance | None]:
+        """Take a passage into the record and go on behind it, unless something happens on its way."""
+        stretch, plan, arc = self.stretch, self.stretch.plan, passage.arc
+        times = stretch.times
+        root = events_on(arc, plan, stretch.probe)
+        end = arc.end if root is None else min(arc.end, root.state[0])
+        first, done = (int(np.searchsorted(times, one, side="right")) for one in (arc.start, end))
+        self.recorder.pass_over(passage, times[first:done], stretch.shown[first:done])
+        if root is not None and root.state[0] <= stretch.end:
+            return done, Advance(*root.state, Status.EVENT, root.events)
+        if done < len(times):
+            q, u, _ = (one[:, 0] for one in arc.at(np.array([arc.end])))
+            q, u = project_safely(plan, arc.end, q, u)
+            plan.review_dependent(arc.end, q)
+            y, yp = pack_state(plan, arc.end, q, u)
+            session.reinitialize(arc.end, y, yp)
+            assert self.guard is not None
+            self.guard.restart(Advance(arc.end, y, yp, Status.REACHED))
         return done, None
 
     def _chose_anew(self, session: Session, advance: Advance) -> bool:
