@@ -67,6 +67,7 @@ from atwood.model.laws import (
     observable,
     potential,
 )
+from atwood.model.outline import Outline
 from atwood.model.rotation import FREE, Rotation, normals, turn
 from atwood.model.scene import Scene
 from atwood.model.vector import Vector, as_vector, cross, dot, norm
@@ -107,6 +108,7 @@ __all__ = [
     "Load",
     "MechanismReport",
     "Model",
+    "Outline",
     "ParameterError",
     "Placement",
     "Point",

@@ -21,6 +21,7 @@ from atwood.model.space import FIXED_AXES, make_space, planar_axes
 from atwood.model.units import parse_si_unit
 
 ROOT = Path(atwood_library.__file__).parent
+TETRAHEDRON = Path(__file__).parent / "tetrahedron.stl"
 GROUPS = ("forces", "joints", "parts", "ropes", "sensors", "sources")
 
 
@@ -127,7 +128,8 @@ class Numbers:
 
 def example(cls: type[aw.Component]) -> aw.Component:
     """A component with admissible values for everything that is required, and with one of each counted connector."""
-    values = {name: 1.5 for name, spec in cls.parameter_specs().items() if repr(spec.default) == "<required>"}
+    required = [spec for spec in cls.parameter_specs().values() if repr(spec.default) == "<required>"]
+    values: dict = {spec.name: str(TETRAHEDRON) if spec.text else 1.5 for spec in required}
     values |= {spec.count: 2 for spec in cls.connector_specs().values() if spec.count}
     return cls(**values)
 
@@ -137,7 +139,7 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
     values = {}
     for name, spec in component.parameter_specs().items():
         value = component.parameters()[name]
-        if value is None or spec.integer or spec.choices:
+        if value is None or spec.integer or spec.choices or spec.text:
             values[name] = value
         elif spec.direction:
             values[name] = aw.Vector(*value)

@@ -140,6 +140,7 @@ def _collect(
         else:
             path = part.path
             signals = {name: part._value(name) for name in part.signal_specs()}
+            part.check_values()
             leaves[path] = Part(path, part, part.parameters(), signals)
     if isinstance(model, Scene):  # after the parts, so that the outer scene has the last word
         for target, given in ((start, model.start), (guess, model.guess)):

@@ -14,6 +14,7 @@ from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Slot, find_slots
 from atwood.mechanics.mechanism import extent
+from atwood.model.component import Component
 from atwood.model.deferred import Deferred
 from atwood.model.flatten import flatten
 from atwood.solve.start import find_start
@@ -66,7 +67,12 @@ class ParameterRows:
                 followers |= own
         self._followers = list(followers.items())
         mechanism = assembly.mechanism
-        self._is_simple = not mechanism.decisions and not mechanism.bodies.closures and not self._builds()
+        # Parts that check how their values go together are looked at run by run.
+        checks = any(
+            type(part.component).check_values is not Component.check_values for part in assembly.flat.parts.values()
+        )
+        closures = mechanism.bodies.closures
+        self._is_simple = not mechanism.decisions and not closures and not checks and not self._builds()
 
     def _builds(self) -> bool:
         """Return whether some model makes its parts from its parameters."""
@@ -187,7 +193,7 @@ class StartRows:
             fixed
         )
         # Guesses of other speeds than the coordinates' own, and orientations in space, are for one run at a time.
-        is_simple = is_simple and not speeds.guessed and not equations.charts
+        is_simple = is_simple and not speeds.guessed and not equations.charts and assembly.starting is assembly
         self.is_direct = is_simple and not self._start_is_bound()
         self._wanted = [columns.get(one.path, one.value) for one in speeds.fixed]
         self._conditions = start_conditions(assembly, equations, speeds.fixed, True, True) if self.is_direct else None

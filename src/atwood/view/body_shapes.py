@@ -1,14 +1,16 @@
-"""A body that has a mass and an inertia, but no shape, gets the simplest one that has both."""
+"""The shape of a body: its own, or, where it only has a mass and an inertia, the simplest one that has both."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.view.meshes import Mesh, box, cylinder, frame_along
+from atwood.view.outlines import outline_mesh
 from atwood.view.reading import Lump
 
 __all__ = ["BodyShape", "shape_of"]
@@ -24,29 +26,45 @@ _LONG = 2.5
 
 @dataclass(frozen=True, eq=False)
 class BodyShape:
-    """A uniform box or cylinder with a given mass and inertia.
+    """A uniform box or cylinder with a given mass and inertia, or the shape that a part has itself.
 
     Attributes
     ----------
     lump
         What it stands for.
     kind
-        ``point`` has no inertia.
+        ``point`` has no inertia; ``own`` is the part's own shape.
     axes
         Its axes in those of the body, as columns; of a cylinder the last is its own.
     sides
-        Full sides of the box; diameter, diameter and height of the cylinder, m.
+        Full sides of the box; diameter, diameter and height of the cylinder; of an own shape those of the box that it
+        fits in, m.
+    surface
+        Of an own shape its surface, in the axes of the body.
     """
 
     lump: Lump
-    kind: Literal["point", "box", "round"]
+    kind: Literal["point", "box", "round", "own"]
     axes: FloatArray
     sides: FloatArray
+    surface: Mesh | None = None
 
-    @property
+    @cached_property
     def center(self) -> FloatArray:
         """Its centre in the axes of the body, m."""
-        return self.lump.center
+        if self.surface is None:
+            return self.lump.center
+        seen = self.surface.vertices @ self.axes
+        middle: FloatArray = self.axes @ (0.5 * (seen.min(axis=0) + seen.max(axis=0)))
+        return middle
+
+    @property
+    def axis(self) -> FloatArray:
+        """Its axis of revolution in the axes of the body, or else the z axis of its frame."""
+        if self.kind == "round":
+            return self.axes[:, 2]
+        outline = self.lump.outline
+        return self.lump.axes[:, 2 if outline is None else outline.axis]
 
     @property
     def radius(self) -> float:
@@ -103,6 +121,8 @@ class BodyShape:
         thickest
             Bars that are thicker are drawn so thick, so that they do not hide the joints, m.
         """
+        if self.kind == "own":
+            return self
         sides = np.maximum(self.sides, thinnest)
         if self.is_long:
             along = int(np.argmax(self.sides))
@@ -112,6 +132,8 @@ class BodyShape:
     def mesh(self) -> Mesh:
         """Return its surface in the axes of the body."""
         sides = self.sides
+        if self.surface is not None:
+            return self.surface
         if self.kind == "round":
             made = cylinder(0.5 * float(sides[0]), float(sides[2]), marks=not self.is_long)
         else:
@@ -120,7 +142,7 @@ class BodyShape:
 
 
 def shape_of(lump: Lump) -> BodyShape:
-    """Return the uniform box that has a mass and principal moments, or the cylinder where two of these are equal.
+    """Return a part's own shape, or the uniform box of its mass and moments, or cylinder where two of these are equal.
 
     Of a box with sides a, b and c the moments are ``m (b^2 + c^2)/12`` and so on, so that
     ``a^2 = 6 (J2 + J3 - J1)/m``. Of a cylinder they are ``m r^2/2`` about its axis and ``m (3 r^2 + h^2)/12`` across
@@ -132,6 +154,10 @@ def shape_of(lump: Lump) -> BodyShape:
     lump
         Mass and inertia.
     """
+    if lump.outline is not None:
+        surface = outline_mesh(lump.outline)
+        placed = surface.placed(lump.origin, lump.axes)
+        return BodyShape(lump, "own", lump.axes, np.ptp(surface.vertices, axis=0), placed)
     moments, axes = np.linalg.eigh(lump.tensor)
     largest = float(moments[2])
     if largest <= 0.0:

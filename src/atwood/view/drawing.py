@@ -243,7 +243,7 @@ def _page(picture: Picture, shown: slice | None) -> tuple[Figure, Axes, Pen]:
 
 def _bounds(picture: Picture, shown: slice | None = None) -> tuple[FloatArray, FloatArray]:
     """Return the corners of a page that holds all places of the run, or of a part of it."""
-    everything = np.concatenate([points if shown is None else points[shown] for points in picture.points.values()])
+    everything = picture.everything() if shown is None else picture.everything(shown)
     margin = 0.09 * picture.extent
     side = max(picture.radii.values(), default=0.0)
     lows, highs = np.min(everything, axis=0) - margin, np.max(everything, axis=0) + margin

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -11,16 +11,20 @@ from numpy.typing import NDArray
 
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, Scalar, evaluate
+from atwood.forms.assembly import Assembly
 from atwood.mechanics.build import Mechanism
+from atwood.mechanics.orientation import body_offsets, plain
 from atwood.model.connectors import Groove
 from atwood.model.local import LocalPart
 from atwood.result.result import Result
 from atwood.view.columns import spread_columns
+from atwood.view.meshes import Mesh
+from atwood.view.outlines import outline_mesh, outline_of
 
 __all__ = ["Kind", "Picture", "Shape", "find_connectors", "make_picture"]
 
 FloatArray = NDArray[np.float64]
-Kind = Literal["ground", "rod", "link", "spring", "damper", "rope", "mass", "pulley", "rail", "pivot"]
+Kind = Literal["ground", "rod", "link", "spring", "damper", "rope", "mass", "pulley", "rail", "pivot", "solid"]
 
 
 @dataclass(frozen=True)
@@ -37,12 +41,15 @@ class Shape:
         Between which nodes, in order.
     size
         Mass of a mass, kg; zero otherwise.
+    surface
+        Of a solid its surface, in the axes of its node.
     """
 
     part: str
     kind: Kind
     nodes: tuple[int, ...]
     size: float = 0.0
+    surface: Mesh | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +68,8 @@ class Picture:
         For a scene on a line: ``"across"`` or ``"up"``; empty in the plane.
     radii
         On a vertical line: radius of each pulley by its groove's node.
+    angles
+        Of the nodes of solids: how they are turned, counter-clockwise, rad, shape (times,).
     """
 
     time: FloatArray
@@ -68,12 +77,24 @@ class Picture:
     shapes: tuple[Shape, ...]
     direction: str
     radii: Mapping[int, float]
+    angles: Mapping[int, FloatArray] = field(default_factory=dict)
 
     @property
     def extent(self) -> float:
         """The larger side of what is drawn."""
-        everything = np.concatenate(list(self.points.values()))
-        return float(np.max(np.ptp(everything, axis=0))) or 1.0
+        return float(np.max(np.ptp(self.everything(), axis=0))) or 1.0
+
+    def everything(self, shown: slice = slice(None)) -> FloatArray:
+        """Return the places that hold all that is drawn at some of the times, shape (places, 2)."""
+        places = [points[shown] for points in self.points.values()]
+        for shape in self.shapes:
+            if shape.surface is not None:
+                angles = self.angles[shape.nodes[0]][shown, None]
+                x, z = shape.surface.vertices[:, 0], shape.surface.vertices[:, 2]
+                turned = np.stack([x * np.cos(angles) - z * np.sin(angles), x * np.sin(angles) + z * np.cos(angles)], 2)
+                middle = self.points[shape.nodes[0]][shown]
+                places += [middle + turned.min(axis=1), middle + turned.max(axis=1)]
+        return np.concatenate(places)
 
 
 def find_connectors(result: Result, paths: str | Sequence[str]) -> dict[str, int]:
@@ -134,7 +155,8 @@ def make_picture(result: Result, also: Iterable[int] = ()) -> Picture:
             for node, values in points.items():
                 values[:, 0] = places.get(node, columns.get(mechanism.bodies.body_of[node], 0.0))
             _place_grounds(mechanism, shapes, points, columns)
-    return Picture(result.time, points, tuple(shapes), direction, radii)
+    angles = _node_angles(result, [shape.nodes[0] for shape in shapes if shape.surface is not None])
+    return Picture(result.time, points, tuple(shapes), direction, radii, angles)
 
 
 def _place_grounds(
@@ -154,22 +176,45 @@ def _place_grounds(
 
 def _node_points(result: Result) -> dict[int, FloatArray]:
     """Return x and z of every node at the output times."""
+    nodes = sorted(result.assembly.equations.kinematics.placements.positions)
+
+    def places(assembly: Assembly) -> Iterator[Scalar]:
+        for node in nodes:
+            position = assembly.equations.kinematics.placements.positions[node]
+            where = assembly.mechanism.space.vector(tuple(position))
+            yield from (where.x, where.z)
+
+    whole = _along_run(result, "places", places)
+    return {node: whole[2 * i : 2 * i + 2].T.copy() for i, node in enumerate(nodes)}
+
+
+def _node_angles(result: Result, nodes: Sequence[int]) -> dict[int, FloatArray]:
+    """Return, in a plane, how nodes are turned at the output times; what has no orientation is not turned."""
+    if not nodes:
+        return {}
+
+    def angles(assembly: Assembly) -> Iterator[Scalar]:
+        mechanism, known = assembly.mechanism, assembly.equations.kinematics.placements.angles
+        for node in nodes:
+            body = mechanism.bodies.bodies[mechanism.bodies.body_of[node]]
+            own = known.get(body.index)
+            yield (0.0 if own is None else own) + plain(body_offsets(body, mechanism.space)[1][node])
+
+    return dict(zip(nodes, _along_run(result, "angles", angles), strict=True))
+
+
+def _along_run(result: Result, name: str, quantities: Callable[[Assembly], Iterable[Scalar]]) -> FloatArray:
+    """Return quantities of the configuration at the output times, shape (quantities, times)."""
     pieces = []
     for segment in result.run.segments:
-        assembly, mechanism = segment.assembly, segment.assembly.mechanism
-        positions = assembly.equations.kinematics.placements.positions
-        nodes = sorted(positions)
-        expressions = []
-        for node in nodes:
-            where = mechanism.space.vector(tuple(positions[node]))
-            expressions += [mechanism.table.graph.convert(where.x), mechanism.table.graph.convert(where.z)]
-        program = assembly.state_program("places", expressions)
+        assembly = segment.assembly
+        graph = assembly.mechanism.table.graph
+        program = assembly.state_program(name, [graph.convert(one) for one in quantities(assembly)])
         idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
         kernel = assembly.kernel(program, vectorized=True)
         values = kernel(segment.time[None, :], segment.coordinates, segment.speeds, *idle)[0]
         pieces.append(np.asarray(values)[:, segment.shown])
-    whole = np.concatenate(pieces, axis=1)
-    return {node: whole[2 * i : 2 * i + 2].T.copy() for i, node in enumerate(nodes)}
+    return np.concatenate(pieces, axis=1)
 
 
 def _shapes(mechanism: Mechanism) -> list[Shape]:
@@ -177,7 +222,19 @@ def _shapes(mechanism: Mechanism) -> list[Shape]:
     found: list[Shape] = []
     for path, local in mechanism.locals_.items():
         found += _shapes_of(mechanism, path, local)
-    order: tuple[Kind, ...] = ("ground", "rail", "rope", "spring", "damper", "link", "rod", "pulley", "pivot", "mass")
+    order: tuple[Kind, ...] = (
+        "ground",
+        "rail",
+        "rope",
+        "spring",
+        "damper",
+        "solid",
+        "link",
+        "rod",
+        "pulley",
+        "pivot",
+        "mass",
+    )
     return sorted(found, key=lambda shape: order.index(shape.kind))
 
 
@@ -187,6 +244,9 @@ def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]
     nodes = {name: mechanism.graph.node_of[path, name] for name in kinds}
     ends = [nodes[name] for name, one in kinds.items() if not isinstance(one, Groove)]
     grooves = [nodes[name] for name, one in kinds.items() if isinstance(one, Groove)]
+    outline = outline_of(local) if mechanism.space.name == "plane" else None
+    if outline is not None:
+        return [Shape(path, "solid", (ends[0],), surface=outline_mesh(outline))]
     masses = [one for one in local.point_inertias if len(one.points) == 1]
     weight = sum(_value(mechanism, one.masses[0][0]) for one in masses)
     joints = [joint.law.options for joint in local.joints]

@@ -156,6 +156,10 @@ class Bench:
         points = [self.reading.offsets[node] for node in nodes]
         return bool(points) and bool(np.max(np.ptp(np.array(points), axis=0)) <= 1e-6 * self.unit)
 
+    def is_own(self, body: int) -> bool:
+        """Whether parts of a body have a shape of their own, which is then what is drawn."""
+        return any(one.kind == "own" for one in self.of_body(body))
+
     def children(self, body: int) -> list[int]:
         """Return the bodies that hang on a body, farther from the world."""
         of = self.reading.body_of

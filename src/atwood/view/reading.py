@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from atwood.model.outline import Outline
 
 __all__ = ["Joining", "Lump", "Pose", "Reading", "Tie"]
 
@@ -87,6 +89,10 @@ class Lump:
         Its frame in the axes of the body, as columns.
     tensor
         Inertia about the centre of mass in the axes of the body, kg m^2; zero for a point.
+    outline
+        What it looks like; None if the part does not say.
+    origin
+        Its node in the axes of the body, about which the outline is, m.
     """
 
     part: str
@@ -96,6 +102,8 @@ class Lump:
     center: FloatArray
     axes: FloatArray
     tensor: FloatArray
+    outline: Outline | None = None
+    origin: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True)

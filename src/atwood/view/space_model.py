@@ -349,7 +349,7 @@ def _add_tips(bench: Bench) -> None:
             if not joinings:
                 bench.tips.append(Tip(body, shape.center))
             continue
-        axis = shape.axes[:, 2] if shape.kind == "round" else shape.lump.axes[:, 2]
+        axis = shape.axis
         if (shape.center - fixed[0]) @ axis < -bench.unit:
             axis = -axis
         end = fixed[0] + _outside(shape, fixed[0], axis, 0.6) * axis

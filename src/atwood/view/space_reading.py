@@ -15,6 +15,7 @@ from atwood.model.laws import BodyInertia
 from atwood.model.local import LocalPart
 from atwood.result.result import Result
 from atwood.view.joint_reading import numbers, read_joint
+from atwood.view.outlines import outline_of
 from atwood.view.reading import Joining, Lump, Pose, Reading, Tie, TieKind
 
 __all__ = ["read_scene"]
@@ -111,7 +112,8 @@ def _lumps(reading: Reading, mechanism: Mechanism, path: str, local: LocalPart, 
     for body in local.body_inertias:
         center = numbers(mechanism, tuple(body.center_of_mass))
         (mass,) = numbers(mechanism, [body.mass])
-        found.append(_lump(reading, path, nodes[body.frame.name], float(mass), center, _tensor(mechanism, body)))
+        lump = _lump(reading, path, nodes[body.frame.name], float(mass), center, _tensor(mechanism, body))
+        found.append(replace(lump, outline=outline_of(local), origin=reading.offsets[lump.node]))
     return [one for one in found if one.mass > 0.0]
 
 

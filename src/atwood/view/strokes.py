@@ -129,6 +129,25 @@ class Pen:
             tone = self._tone(colour)
             axes.plot(points[:, 0], points[:, 1], color=tone, linewidth=width, solid_capstyle="round", zorder=front)
 
+    def _solid(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        """Draw what a surface shows from the front, and the lines where it ends."""
+        from matplotlib.collections import LineCollection, PolyCollection
+
+        assert shape.surface is not None
+        mesh, angle = shape.surface, float(self.picture.angles[shape.nodes[0]][moment])
+        c, s = np.cos(angle), np.sin(angle)
+        page = points[0] + mesh.vertices[:, [0, 2]] @ np.array([[c, s], [-s, c]])
+        front = mesh.normals[:, 1] < -1e-9  # the eye looks along y
+        ends, faces, _ = mesh.edges
+        borders = front[faces[:, 0]] != front[faces[:, 1]]
+        for tone, chosen in (("#c8d3de", front & ~mesh.marked), ("#b4c2cf", front & mesh.marked)):
+            colour = self._tone(tone)
+            flat = PolyCollection(list(page[mesh.faces[chosen]]), facecolors=[colour], edgecolors=[colour], **look)
+            flat.set_linewidth(0.4)
+            axes.add_collection(flat)
+        lines = list(page[ends[borders]])
+        axes.add_collection(LineCollection(lines, colors=[self._tone(INK)], linewidths=1.3, capstyle="round", **look))
+
     def _pivot(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         x, z = points[0]
         edge = self._tone(INK)

@@ -95,7 +95,12 @@ def add_gimbals(bench: Bench) -> None:
 
 def _is_gimbal(bench: Bench, body: int) -> bool:
     hinges = bench.hinges(body)
-    if len(hinges) < 2 or not bench.is_at_one_place(body) or len(hinges) != len(bench.joinings(body)):
+    if (
+        len(hinges) < 2
+        or bench.is_own(body)
+        or not bench.is_at_one_place(body)
+        or len(hinges) != len(bench.joinings(body))
+    ):
         return False
     return bool(np.linalg.norm(np.cross(hinges[0].axis, hinges[1].axis)) > 0.3)
 
@@ -166,7 +171,7 @@ def add_shafts(bench: Bench) -> None:
         hinges = bench.hinges(body)
         others = [one for one in bench.joinings(body) if one.kind in ("cross", "ball")]
         is_one = len(hinges) == 1 and len(others) == 1 and len(bench.joinings(body)) == 2
-        if body == 0 or not is_one or not bench.is_at_one_place(body) or body in bench.clad:
+        if body == 0 or not is_one or bench.is_own(body) or not bench.is_at_one_place(body) or body in bench.clad:
             continue
         axis = hinges[0].axis
         direction = bench.reading.poses[body].axes[0] @ axis

@@ -1,0 +1,25 @@
+"""StraightShape: what shapes with two ends on their axis have in common."""
+
+from __future__ import annotations
+
+from atwood import Frame, Placement, connector, joint, parameter
+from atwood_library.interfaces.shape import Shape, along
+
+
+class StraightShape(Shape):
+    """A shape along an axis of its frame, which is at its centre; frames a and b are in the middles of its ends."""
+
+    length: float = parameter(1.0, unit="m", above=0.0, doc="Length, from a to b.")
+    axis: str = parameter("z", choices=("x", "y", "z"), doc="Axis of the frame that it lies along, from a to b.")
+    a: Frame = connector(Frame, "The middle of the end at the negative side of the axis.")
+    b: Frame = connector(Frame, "The middle of the end at the positive side of the axis.")
+
+    @joint("frame", "a", rigid=True, spaces=("line", "plane", "space"))
+    def near_end(self) -> Placement:
+        """Place a in the axes of the frame."""
+        return Placement(along(self.axis, -0.5 * self.length), 0.0, axes="a")
+
+    @joint("frame", "b", rigid=True, spaces=("line", "plane", "space"))
+    def far_end(self) -> Placement:
+        """Place b in the axes of the frame."""
+        return Placement(along(self.axis, 0.5 * self.length), 0.0, axes="a")
