@@ -172,7 +172,6 @@ def test_the_torque_is_three_mu_over_r_cubed_e_cross_j_e() -> None:
     tensor = axes @ np.diag(np.array([YAW, ROLL, PITCH]) * MASS * SIZE**2) @ axes.T
     e = np.array([1.0, 0.0, 0.0])
     wanted = 3.0 * MU / RADIUS**3 * np.cross(e, tensor @ e)
-    # What the earth takes about its centre is that of the force and of the torque: together nothing; so the rest is spin.
     rate = [(result[f"craft.angular_momentum.{k}"][1] - result[f"craft.angular_momentum.{k}"][0]) / 1e-6 for k in "xyz"]
     assert np.allclose(rate, wanted, rtol=1e-4, atol=1e-5 * np.max(np.abs(wanted)))
 

@@ -194,7 +194,7 @@ def test_terminal_velocity_by_the_hyperbolic_tangent(space: str) -> None:
     scene = Scene(space=space, gravity=g, **({"line_axis": (0.0, 0.0, 1.0)} if space == "line" else {}))
     ball = scene.add("ball", lib.PointMass(mass=m))
     drag = scene.add("drag", lib.Drag(density=1.2, area=0.1, drag_coefficient=0.5))
-    assert 0.5 * 1.2 * 0.1 * 0.5 == pytest.approx(k)
+    assert pytest.approx(k) == 0.5 * 1.2 * 0.1 * 0.5
     scene.connect(ball.point, drag.point)
     result = simulate(scene, t_end=6.0, rtol=1e-10, outputs=13)
     final = math.sqrt(m * g / k)
@@ -244,7 +244,7 @@ def test_a_wrong_choice_gives_near_matches() -> None:
         lib.Force(resolved_in="wold")
     scene = Scene(space="space")
     push = scene.add("push", lib.Force(resolved_in="body"))
-    with pytest.raises(DeclarationError, match="push: it has no connector 'point' as it is set.*resolved_in='world'"):
+    with pytest.raises(DeclarationError, match=r"push: it has no connector 'point' as it is set.*resolved_in='world'"):
         _ = push.point
 
 
