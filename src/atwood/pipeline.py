@@ -17,7 +17,9 @@ from atwood.expr import Graph
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import LEVELS
 from atwood.forms.source import Source
+from atwood.forms.starting import with_places
 from atwood.mechanics.build import Mechanism, check_closures, make_gravity
+from atwood.mechanics.constraints import holds_velocities
 from atwood.mechanics.inertia import check_tensors
 from atwood.mechanics.orientation import body_offsets
 from atwood.model.composite import Model
@@ -100,7 +102,24 @@ def assemble_flat(
     all_modes.update(modes or {})
     mechanism = read_mechanism(flat, all_modes, sides)
     chosen: Any = form
-    return Assembly(flat, mechanism, chosen, level if form == "dae" else "", all_modes, Source(_assemble_like))
+    made = Assembly(flat, mechanism, chosen, level if form == "dae" else "", all_modes, Source(_assemble_like))
+    return made if all_modes or not holds_velocities(mechanism) else _with_start(made)
+
+
+def _with_start(assembly: Assembly) -> Assembly:
+    """Return an assembly whose constraints on velocities become what they are, with constants from the start.
+
+    Where parts have modes, another mode could begin with other constants, and everything stays as it is.
+    """
+    start = find_start(assembly)
+    reduced, maximal = assembly.reduced, assembly.maximal
+    q, _ = assembly.kernel(assembly.to_maximal)([start.time], start.coordinates, start.speeds)
+    time = {assembly.mechanism.time: start.time}
+    places = {
+        "reduced": {**time, **dict(zip(reduced.coordinates, start.coordinates.tolist(), strict=True))},
+        "dae": {**time, **dict(zip(maximal.coordinates, (float(x) for x in q), strict=True))},
+    }
+    return with_places(assembly, places)
 
 
 def _assemble_like(

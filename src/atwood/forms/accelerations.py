@@ -184,6 +184,7 @@ def _is_tree(assembly: Assembly) -> bool:
     reduced, maximal = assembly.reduced, assembly.maximal
     return (
         not reduced.eliminated
+        and not reduced.solved_speeds
         and not reduced.forest.cuts
         and (len(maximal.constraints) > 0 or not rates_are_speeds(maximal))
         and len(reduced.speeds) == len(maximal.speeds) - len(maximal.constraints)

@@ -228,7 +228,9 @@ class Assembly:
     def _moved(self, flat: FlatScene) -> tuple[Mechanism | None, str]:
         """Return the mechanism with the values of another scene; None, and why, if its structure is another."""
         with self.shared.lock:
-            _ = self.reduced  # what was decided by the size of numbers is known only then
+            # What was decided by the size of numbers is known only when the equations are.
+            if self.reduced.integrals or (self.mechanism.places is not None and self.maximal.integrals):
+                return None, "the start gives constants of integration"
             return with_values_of(self.flat, self.mechanism, self.shared, flat)
 
     # -- programs -------------------------------------------------------------------------------------------------

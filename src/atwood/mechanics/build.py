@@ -15,6 +15,7 @@ from atwood.mechanics.kinematics import Kinematics, shapes
 from atwood.mechanics.mechanism import Mechanism, check_closures, extent, make_gravity
 from atwood.mechanics.motion import motion_in_plane, motion_in_space
 from atwood.mechanics.orientation import body_offsets
+from atwood.mechanics.rolling import Taken, integrated, take_up
 from atwood.model.component import bind
 from atwood.model.local import LocalConstraint
 from atwood.model.vector import Vector
@@ -52,12 +53,17 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     every = motion.all_coordinates
     check_held(mechanism, masses, forest, every, values, left.on_velocities)
     solution = eliminate_linear(mechanism, masses, forest, every, values) if forest.form == "reduced" else {}
+    taken = Taken(solution, {}, (), left.on_velocities)
+    if forest.form == "reduced" and mechanism.places is not None:
+        taken = take_up(mechanism, site, masses, forest, motion, solution, values, left.on_velocities)
+        solution = dict(taken.solution)
     values = [(path, c, substitute([v], solution)[0] if solution else v) for path, c, v in values if v is not SOLVED]
-    state = motion.finish(solution)
+    state = motion.finish(solution, taken.speeds)
     values, prescribed = drop_closed(mechanism, state.coordinates, values)
     signals = resolve_signals(mechanism, site, state.kinematics)
     held = [(path, c, _multiplier(graph, path, c)) for path, c, _ in values]
-    rolling = [(path, c, _multiplier(graph, path, c)) for path, c in left.on_velocities]
+    rolling = [(path, c, _multiplier(graph, path, c)) for path, c in taken.left]
+    integrals = integrated(mechanism, site, state, taken.left) if forest.form == "dae" else {}
     rows = motion_rows(site, mechanism.locals_, masses, state.kinematics, state.lifted, signals, state.speeds)
     # Before the constraints' rates, which can then be written with the slopes that the forces are made of.
     forces = force_rows(site, mechanism.locals_, state.kinematics, [*held, *rolling], signals, state.speeds)
@@ -80,11 +86,13 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
         constraint_rows=tuple(forces),
         constraints=(
             *levels(mechanism, site, state, held, [value for _, _, value in values]),
-            *velocity_levels(mechanism, site, state, rolling, signals),
+            *velocity_levels(mechanism, site, state, rolling, signals, integrals),
         ),
         eliminated=tuple(c.name for c, s in zip(forest.coordinates, every, strict=True) if s in solution),
         prescribed=prescribed,
         charts=state.charts,
+        solved_speeds=tuple(s.name.removeprefix("u:") for s in taken.speeds),
+        integrals=(*taken.integrals, *integrals.values()),
     )
 
 

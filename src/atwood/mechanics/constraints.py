@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, depends_on, jvp, substitute
-from atwood.mechanics.equations import Constraint, constraint_levels, put_in_place
+from atwood.mechanics.equations import Constraint, Integral, constraint_levels, put_in_place
 from atwood.mechanics.forces import Site, in_body, is_on_velocities, local_map, slopes_of
 from atwood.mechanics.kinematics import Kinematics, Placements
 from atwood.mechanics.mechanism import Mechanism
@@ -17,7 +17,15 @@ from atwood.model.local import LocalConstraint, LocalPart
 from atwood.model.vector import Vector, cross
 from atwood.topology.forest import Forest
 
-__all__ = ["LeftOver", "Values", "constraint_values", "find_constraints", "levels", "velocity_levels"]
+__all__ = [
+    "LeftOver",
+    "Values",
+    "constraint_values",
+    "find_constraints",
+    "holds_velocities",
+    "levels",
+    "velocity_levels",
+]
 
 Values = list[tuple[str, LocalConstraint, Expression]]
 """Constraints with the path of their part and an expression: their value, or their multiplier."""
@@ -37,6 +45,11 @@ class LeftOver:
 
     on_positions: tuple[tuple[str, LocalConstraint], ...]
     on_velocities: tuple[tuple[str, LocalConstraint], ...]
+
+
+def holds_velocities(mechanism: Mechanism) -> bool:
+    """Return whether a scene has a constraint on velocities."""
+    return any(is_on_velocities(local, one.value) for local in mechanism.locals_.values() for one in local.constraints)
 
 
 def find_constraints(mechanism: Mechanism, forest: Forest) -> LeftOver:
@@ -102,9 +115,14 @@ def levels(
 
 
 def velocity_levels(
-    mechanism: Mechanism, site: Site, state: Movement, chosen: Values, signals: Mapping[Expression, Expression]
+    mechanism: Mechanism,
+    site: Site,
+    state: Movement,
+    chosen: Values,
+    signals: Mapping[Expression, Expression],
+    integrals: Mapping[tuple[str, str, int], Integral],
 ) -> list[Constraint]:
-    """Return constraints on velocities alone with their time derivative.
+    """Return constraints on velocities with their time derivative; those that are integrals hold positions too.
 
     Raises
     ------
@@ -119,7 +137,9 @@ def velocity_levels(
         rate = put_in_place(one.value, mapping)
         second = _differentiated(site, local, one.value, state.kinematics, mechanism.time)
         key = (path, one.law.name, one.index)
-        found.append(Constraint(key, one.reaction, one.sign, None, rate, second, multiplier, holonomic=False))
+        integral = integrals.get(key)
+        value = None if integral is None else integral.value
+        found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier, integral is not None))
     return found
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 from atwood.errors import TopologyError
@@ -46,19 +46,24 @@ SOLVED: Expression = _Solved()  # type: ignore[assignment]
 
 
 def eliminate_linear(
-    mechanism: Mechanism, masses: Masses, forest: Forest, q: Sequence[Expression], values: Values
+    mechanism: Mechanism,
+    masses: Masses,
+    forest: Forest,
+    q: Sequence[Expression],
+    values: Values,
+    before: Mapping[Expression, Expression] | None = None,
 ) -> dict[Expression, Expression]:
     """Solve linear constraints for one coordinate each; mark them in `values`.
 
     Coordinates of what has no mass go first, then those that were met last, so that the names that a reader expects
-    stay.
+    stay. What was eliminated before is given by `before`.
     """
     parameters = mechanism.table.values
     weightless = _weightless(mechanism, masses, forest)
     charts = {number for chart in forest.charts for number in chart.coordinates}
     curved = [s for number, s in enumerate(q) if number in charts]
     flat = [s for number, s in enumerate(q) if number not in charts]
-    solution: dict[Expression, Expression] = {}
+    solution = dict(before or {})
     for number, (path, constraint, original) in enumerate(values):
         value = substitute([original], solution)[0]
         if depends_on(value, curved):

@@ -18,7 +18,7 @@ from atwood.model.local import LocalConstraint, LocalPart
 from atwood.topology.charts import Chart
 from atwood.topology.forest import Coordinate, Forest
 
-__all__ = ["Constraint", "Equations", "balance_rows", "inertia_forces"]
+__all__ = ["Constraint", "Equations", "Integral", "balance_rows", "inertia_forces"]
 
 
 Lifted = tuple[Mapping[int, tuple[Expression, ...]], Mapping[int, tuple[Expression, ...]]]
@@ -62,6 +62,25 @@ class Constraint:
 
 
 @dataclass(frozen=True)
+class Integral:
+    """A constraint on positions that one on velocities, or several, turned out to be.
+
+    Attributes
+    ----------
+    keys
+        The constraints, as (part, law, number); it takes the place of the last one.
+    value
+        What stays zero, of time and coordinates.
+    constant
+        The constant that the start gives: a parameter, or zero.
+    """
+
+    keys: tuple[tuple[str, str, int], ...]
+    value: Expression
+    constant: Expression
+
+
+@dataclass(frozen=True)
 class Equations:
     """The equations of motion of one form of a scene, with everything they were made of.
 
@@ -99,6 +118,10 @@ class Equations:
         Constraints that no coordinate can change and that depend on time, with their residuals.
     charts
         Groups of coordinates that stand for an orientation together.
+    solved_speeds
+        Speeds that constraints on velocities gave as functions of the others, by name.
+    integrals
+        Constraints on velocities that turned out to be ones on positions.
     """
 
     graph: Graph
@@ -121,6 +144,8 @@ class Equations:
     eliminated: tuple[str, ...]
     prescribed: tuple[tuple[tuple[str, str, int], Expression], ...]
     charts: tuple[Chart, ...] = ()
+    solved_speeds: tuple[str, ...] = ()
+    integrals: tuple[Integral, ...] = ()
 
     @property
     def multipliers(self) -> tuple[Expression, ...]:

@@ -46,6 +46,9 @@ class Mechanism:
         On a line, the signs of lengths as the start values tell them; None elsewhere, and where they were given.
     decisions
         What shaped the equations by the size of numbers: how each was decided, and how it came out.
+    places
+        Where the scene starts, by form and by the symbols of its coordinates; None where nothing depends on it: then
+        constraints on velocities stay what they are.
     """
 
     table: ParameterTable
@@ -58,6 +61,7 @@ class Mechanism:
     links: Mapping[tuple[str, str], tuple[str, str]]
     sides: Mapping[tuple[str, str, str], float] | None = None
     decisions: list[tuple[Callable[[Mechanism], object], object]] = field(default_factory=list)
+    places: Mapping[str, Mapping[Expression, float]] | None = None
 
 
 def decide(mechanism: Mechanism, how: Callable[[Mechanism], T]) -> T:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 from atwood.expr import Expression, substitute
 from atwood.mechanics.kinematics import (
@@ -25,7 +26,9 @@ __all__ = ["Motion", "Movement", "motion_in_plane", "motion_in_space"]
 
 Lifted = tuple[dict[int, Components], dict[int, Components]]
 Solution = Mapping[Expression, Expression]
-"""Coordinates that are eliminated, in terms of those that are left."""
+"""Coordinates that are eliminated, in terms of those that are left; or speeds."""
+
+_NONE: Solution = {}
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,14 @@ class Movement:
     lifted: Lifted
 
 
+class Finish(Protocol):
+    """Gives the motion in terms of what solutions for coordinates and for speeds leave."""
+
+    def __call__(self, solution: Solution, speeds: Solution = _NONE) -> Movement:
+        """Return the motion."""
+        ...
+
+
 @dataclass(frozen=True)
 class Motion:
     """Placements in all coordinates of a forest, from which motion follows when it is known which of them are left.
@@ -70,12 +81,12 @@ class Motion:
     placements
         Positions and orientations in terms of these.
     finish
-        Gives the motion in the coordinates that a solution leaves.
+        Gives the motion in the coordinates that a solution leaves, and, in space, in the speeds that a second one does.
     """
 
     all_coordinates: tuple[Expression, ...]
     placements: Placements
-    finish: Callable[[Solution], Movement]
+    finish: Finish
 
 
 @dataclass(frozen=True)
@@ -95,12 +106,13 @@ def _all_symbols(mechanism: Mechanism, forest: Forest) -> tuple[Expression, ...]
     return tuple(mechanism.table.graph.symbol(f"q:{c.name}") for c in forest.coordinates)
 
 
-def _left(mechanism: Mechanism, forest: Forest, solution: Solution) -> _Symbols:
-    """Return the symbols that a solution leaves."""
+def _left(mechanism: Mechanism, forest: Forest, solution: Solution, solved: Solution = _NONE) -> _Symbols:
+    """Return the symbols that a solution for coordinates leaves, and one for speeds."""
     graph = mechanism.table.graph
     every = _all_symbols(mechanism, forest)
     kept = [i for i, symbol in enumerate(every) if symbol not in solution]
     gone = {f"{c.name}'" for i, c in enumerate(forest.coordinates) if every[i] in solution}
+    gone |= {f"{speed.name.removeprefix('u:')}'" for speed in solved}
     kept_speeds = [i for i, one in enumerate(forest.speeds) if one.name not in gone]
     stems = [forest.speeds[i].name.removesuffix("'") for i in kept_speeds]
     u = tuple(graph.symbol(f"u:{stem}") for stem in stems)
@@ -119,15 +131,14 @@ def _left(mechanism: Mechanism, forest: Forest, solution: Solution) -> _Symbols:
     for chart in charts:
         parts = quaternion_rates([q[i] for i in chart.coordinates], [u[i] for i in chart.speeds])
         rates.update(zip(chart.coordinates, (graph.convert(part) for part in parts), strict=True))
-    in_charts = {i for chart in charts for i in chart.speeds}
-    own = iter(speed for i, speed in enumerate(u) if i not in in_charts)
+    own = [graph.symbol(f"u:{forest.coordinates[i].name}") for i in kept]
     return _Symbols(
         q,
         u,
         a,
         tuple(forest.coordinates[i] for i in kept),
         tuple(forest.speeds[i] for i in kept_speeds),
-        tuple(rates[i] if i in rates else next(own) for i in range(len(q))),
+        tuple(rates[i] if i in rates else solved.get(speed, speed) for i, speed in enumerate(own)),
         charts,
     )
 
@@ -160,7 +171,8 @@ def motion_in_plane(mechanism: Mechanism, forest: Forest, shape_of: Mapping[int,
     movable = place(graph, mechanism.graph, mechanism.bodies, forest, shape_of, mechanism.locals_, every, space, origin)
     placements = _substituted(movable, dict.fromkeys(origin, graph.zero))
 
-    def finish(solution: Solution) -> Movement:
+    def finish(solution: Solution, speeds: Solution = _NONE) -> Movement:
+        assert not speeds, "in a plane, places are differentiated by coordinates, whose rates are speeds"
         left = _left(mechanism, forest, solution)
         q, u, a, time = left.coordinates, left.speeds, left.accelerations, mechanism.time
         still = _substituted(placements, solution) if solution else placements
@@ -184,8 +196,8 @@ def motion_in_space(mechanism: Mechanism, forest: Forest, shape_of: Mapping[int,
         The mechanism.
     """
 
-    def finish(solution: Solution) -> Movement:
-        left = _left(mechanism, forest, solution)
+    def finish(solution: Solution, speeds: Solution = _NONE) -> Movement:
+        left = _left(mechanism, forest, solution, speeds)
         graph = mechanism.table.graph
         stems = [one.name.removesuffix("'") for one in forest.speeds]
         course = Course(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute
+from atwood.mechanics.joint_shift import Turned, displaced, reads_axes
 from atwood.mechanics.kinematics import BodyShape, Components, Kinematics, Placements
 from atwood.mechanics.orientation import (
     Quaternion,
@@ -214,12 +215,30 @@ class _Walk:
         at_near = quaternion_product(parent.quaternion, node_quaternions(near_body)[near])
         return quaternion_product(quaternion_product(at_near, rotation_quaternion(rotation)), (w, -x, -y, -z))
 
+    def shifts(self, joint: Joint) -> tuple[Vector, Vector, Vector]:
+        """Return the displacement of a joint and its derivatives, in the axes that it is given in."""
+        if reads_axes(joint.local):
+            symbols = [symbol for symbol in joint.local.coordinates if symbol in self.known]
+            values = [self.known[symbol] for symbol in symbols]
+            swings = zip(values, *self.course.differentiated(values), strict=True)
+            ends = [self.turned_at(node) for node in (joint.a, joint.b)]
+            return displaced(self.graph, joint.local, ends, dict(zip(symbols, swings, strict=True)))
+        shift = self.placed(list(joint.local.placement.displacement))
+        rate, second = (Vector(*values) for values in self.course.differentiated(shift))
+        return Vector(*shift), rate, second
+
+    def turned_at(self, node: int) -> Turned:
+        """Return how the frame of a node is turned and goes on turning, in world axes."""
+        body = self.bodies.body_of[node]
+        turning, turn = self.turnings[body], self.shape_of[body].turns[node]
+        assert isinstance(turn, tuple)
+        spin, spin_rate = (self.in_world(turning.axes, one) for one in (turning.spin, turning.spin_rate))
+        return compose(turning.axes, turn), spin, spin_rate
+
     def across_joint(self, attachment: Attachment, joint: Joint) -> _State:
         """Return the state of the child's node from that of the parent's."""
         placement = joint.local.placement
-        shift = self.placed(list(placement.displacement))
-        rate, second = (Vector(*values) for values in self.course.differentiated(shift))
-        parts = Vector(*shift), rate, second
+        parts = self.shifts(joint)
         body = self.bodies.body_of[joint.a]
         if placement.axes == "a":
             turn = self.shape_of[body].turns[joint.a]

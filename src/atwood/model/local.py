@@ -80,11 +80,12 @@ class LocalConnector:
 
 @dataclass(frozen=True)
 class LocalJoint:
-    """A joint law: its coordinates as symbols, and the placement they give."""
+    """A joint law: its coordinates as symbols, the placement they give, and in space the axes of both its frames."""
 
     law: Law
     coordinates: tuple[Expression, ...]
     placement: Placement
+    axes: tuple[Axes, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -205,7 +206,7 @@ def _localize_part(
     potentials, dissipations = scalar_laws("potential"), scalar_laws("dissipation")
     _check_reads(part, connectors, potentials, dissipations)
     inertias = [one for law in laws("inertia") for one in _call(part, law, functools.partial(_listed, bound, law))]
-    joints = tuple(_local_joint(part, law, bound, graph) for law in laws("joint"))
+    joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws("joint"))
     return LocalPart(
         part=part,
         binding=binding,
@@ -359,12 +360,15 @@ def local_motion(symbols: LocalConnector, space: Space) -> Motion:
     )
 
 
-def _local_joint(part: Part, law: Law, bound: Any, graph: Graph) -> LocalJoint:
+def _local_joint(
+    part: Part, law: Law, bound: Any, graph: Graph, connectors: Mapping[str, LocalConnector]
+) -> LocalJoint:
     coordinates = tuple(graph.symbol(f"{part.path}.{name}") for name in law.options.coordinates)
     placement = _call(part, law, lambda: getattr(bound, law.name)(*coordinates))
     if not isinstance(placement, Placement):
         raise DeclarationError("a joint must return a Placement", where=f"{part.path}.{law.name}")
-    return LocalJoint(law, coordinates, placement)
+    ends = [connectors[name].axes for name in (law.options.a, law.options.b) if name in connectors]
+    return LocalJoint(law, coordinates, placement, tuple(axes for axes in ends if axes is not None))
 
 
 def _local_constraints(part: Part, law: Law, bound: Any, graph: Graph) -> Iterable[LocalConstraint]:

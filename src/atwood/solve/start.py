@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from atwood.errors import StartError
 from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
+from atwood.forms.starting import starting
 from atwood.solve.scales import motion_scales, scene_length
 from atwood.solve.start_positions import solve_positions
 from atwood.solve.start_speeds import solve_speeds
@@ -79,8 +80,9 @@ def find_start(assembly: Assembly) -> Start:
     StartError
         If a start value names no quantity, or they contradict each other or the constraints.
     """
-    if assembly.starting is not assembly:
-        return _taken_up(assembly, find_start(assembly.starting))
+    before = starting(assembly)
+    if before is not assembly:
+        return _taken_up(assembly, before, find_start(before))
     equations, length = assembly.reduced, scene_length(assembly)
     positions, speeds = sort_targets(assembly, equations)
     scales = motion_scales(equations, length)
@@ -90,7 +92,7 @@ def find_start(assembly: Assembly) -> Start:
     return Start(t, at.coordinates, u, length, at.free, free_u, (*at.repeated, *repeated_u), at.rough)
 
 
-def _taken_up(assembly: Assembly, start: Start) -> Start:
+def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
     """Return a start in the coordinates and speeds that constraints on velocities leave.
 
     Raises
@@ -98,7 +100,7 @@ def _taken_up(assembly: Assembly, start: Start) -> Start:
     StartError
         If the equations were made for another start, which gave their constants of integration.
     """
-    before, after = assembly.starting.reduced, assembly.reduced
+    before, after = starting.reduced, assembly.reduced
     q = dict(zip(before.coordinates, start.coordinates.tolist(), strict=True))
     u = dict(zip(before.speeds, start.speeds.tolist(), strict=True))
     place = {**assembly.mechanism.table.values, before.time: start.time, **q}

@@ -13,6 +13,7 @@ from atwood.errors import AtwoodError
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Slot, find_slots
+from atwood.forms.starting import starting
 from atwood.mechanics.mechanism import extent
 from atwood.model.component import Component
 from atwood.model.deferred import Deferred
@@ -193,7 +194,7 @@ class StartRows:
             fixed
         )
         # Guesses of other speeds than the coordinates' own, and orientations in space, are for one run at a time.
-        is_simple = is_simple and not speeds.guessed and not equations.charts and assembly.starting is assembly
+        is_simple = is_simple and not speeds.guessed and not equations.charts and starting(assembly) is assembly
         self.is_direct = is_simple and not self._start_is_bound()
         self._wanted = [columns.get(one.path, one.value) for one in speeds.fixed]
         self._conditions = start_conditions(assembly, equations, speeds.fixed, True, True) if self.is_direct else None

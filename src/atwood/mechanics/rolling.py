@@ -1,0 +1,186 @@
+"""What becomes of constraints on velocities: positions, fewer speeds, or what they are.
+
+In turn, for the reduced form: those that can be integrated become constraints on positions, with the constant that the
+start says, and are eliminated with the linear ones; in space, those that are left give speeds in terms of others, where
+each can be solved for a speed whose coefficient is the same everywhere. Then the motion is written in the speeds that
+are left (quasi-velocities), d'Alembert's principle along them has no multipliers, and nothing is constrained. Any other
+constraint stays as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from atwood.expr import Expression, depends_on, evaluate, substitute
+from atwood.mechanics.constraints import Values
+from atwood.mechanics.elimination import SOLVED, eliminate_linear
+from atwood.mechanics.equations import Integral, put_in_place
+from atwood.mechanics.forces import Site, local_map
+from atwood.mechanics.inertia import Masses
+from atwood.mechanics.mechanism import Mechanism
+from atwood.mechanics.motion import Motion, Movement
+from atwood.mechanics.pfaffian import Form, Places, constant_pivot, is_idle, linear_integrals, pfaffian_forms
+from atwood.model.local import LocalConstraint
+from atwood.topology.forest import Forest
+
+__all__ = ["Taken", "integrated", "take_up"]
+
+OnVelocities = Sequence[tuple[str, LocalConstraint]]
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What constraints on velocities have become.
+
+    Attributes
+    ----------
+    solution
+        Coordinates that are eliminated, in terms of those that are left.
+    speeds
+        The same for speeds.
+    integrals
+        Constraints that have become ones on positions.
+    left
+        Those that stay what they are.
+    """
+
+    solution: Mapping[Expression, Expression]
+    speeds: Mapping[Expression, Expression]
+    integrals: tuple[Integral, ...]
+    left: tuple[tuple[str, LocalConstraint], ...]
+
+
+def take_up(
+    mechanism: Mechanism,
+    site: Site,
+    masses: Masses,
+    forest: Forest,
+    motion: Motion,
+    solution: Mapping[Expression, Expression],
+    values: Values,
+    rolling: OnVelocities,
+) -> Taken:
+    """Find out what becomes of constraints on velocities in the reduced form.
+
+    Parameters
+    ----------
+    mechanism, site, masses, forest, motion
+        The mechanism.
+    solution
+        Coordinates that constraints on positions have eliminated.
+    values
+        All constraints on positions, those that are used up marked.
+    rolling
+        The constraints on velocities.
+    """
+    found, left = dict(solution), list(rolling)
+    integrals: list[Integral] = []
+    while left:
+        state = motion.finish(found)
+        places = Places(state, mechanism.time)
+        forms = _forms(mechanism, site, state, left)
+        moving = [form for form in forms if not is_idle(mechanism, places, form)]
+        left = [(form.path, form.constraint) for form in moving]
+        new = linear_integrals(mechanism, places, moving, together=True)
+        if not new:
+            held = any(value is not SOLVED and _holds(value, found, state) for _, _, value in values)
+            speeds = {} if held or mechanism.space.name != "space" else _solved_speeds(mechanism, places, moving)
+            return Taken(found, speeds, tuple(integrals), () if speeds else tuple(left))
+        made = [
+            _integral(mechanism, state, moving, members, c, len(integrals) + i) for i, (members, c) in enumerate(new)
+        ]
+        pending: Values = [
+            (moving[members[-1]].path, moving[members[-1]].constraint, one.value)
+            for (members, _), one in zip(new, made, strict=True)
+        ]
+        more = eliminate_linear(mechanism, masses, forest, motion.all_coordinates, pending, found)
+        used = {members[-1] for (members, _), (_, _, value) in zip(new, pending, strict=True) if value is SOLVED}
+        if not used:
+            return Taken(found, {}, tuple(integrals), tuple(left))
+        found = more
+        integrals += [one for (members, _), one in zip(new, made, strict=True) if members[-1] in used]
+        left = [one for i, one in enumerate(left) if i not in used]
+    return Taken(found, {}, tuple(integrals), ())
+
+
+def _holds(value: Expression, solution: Mapping[Expression, Expression], state: Movement) -> bool:
+    return depends_on(substitute([value], solution)[0] if solution else value, state.coordinates)
+
+
+def _forms(mechanism: Mechanism, site: Site, state: Movement, rolling: OnVelocities) -> list[Form]:
+    rates = []
+    for path, one in rolling:
+        mapping = local_map(site, mechanism.locals_[path], state.kinematics)
+        rates.append((path, one, put_in_place(one.value, mapping)))
+    return pfaffian_forms(state, rates)
+
+
+def _integral(
+    mechanism: Mechanism,
+    state: Movement,
+    forms: Sequence[Form],
+    members: Sequence[int],
+    coefficients: Mapping[int, Expression],
+    number: int,
+    form: str = "reduced",
+) -> Integral:
+    """Return an integral with its constant, a parameter that gets its value from the start."""
+    graph, table = mechanism.table.graph, mechanism.table
+    places = {rate: q for q, rate in zip(state.coordinates, state.rates, strict=True)}
+    symbols = [places.get(speed) for speed in state.speeds] + [mechanism.time]
+    total = graph.zero
+    for i, c in coefficients.items():
+        symbol = symbols[i]
+        assert symbol is not None
+        total = total + c * symbol
+    assert mechanism.places is not None
+    (start,) = evaluate([total], {**table.values, **mechanism.places[form]})
+    constant = table.scalar(f"integral {number} ({form})", start)
+    keys = tuple((forms[i].path, forms[i].constraint.law.name, forms[i].constraint.index) for i in members)
+    return Integral(keys, graph.convert(total - constant), graph.convert(constant))
+
+
+def _solved_speeds(mechanism: Mechanism, places: Places, forms: Sequence[Form]) -> dict[Expression, Expression]:
+    """Return speeds in terms of the others, one for each form; none unless all forms can be solved so."""
+    state = places.state
+    rates = set(state.rates)
+    solved: dict[Expression, Expression] = {}
+    for form in forms:
+        total = form.drift
+        for speed, slope in zip(state.speeds, form.slopes, strict=True):
+            total = total + slope * solved.get(speed, speed)
+        (now,) = pfaffian_forms(state, [(form.path, form.constraint, total)])
+        allowed = [i for i, speed in enumerate(state.speeds) if speed in rates and speed not in solved]
+        chosen = constant_pivot(mechanism, places, now, allowed)
+        if chosen is None:
+            return {}
+        pivot, coefficient = chosen
+        rest = now.drift
+        for i, (speed, slope) in enumerate(zip(state.speeds, now.slopes, strict=True)):
+            if i != pivot:
+                rest = rest + slope * speed
+        value = -rest / coefficient
+        solved = {s: substitute([e], {state.speeds[pivot]: value})[0] for s, e in solved.items()}
+        solved[state.speeds[pivot]] = value
+    return solved
+
+
+def integrated(
+    mechanism: Mechanism, site: Site, state: Movement, rolling: OnVelocities
+) -> dict[tuple[str, str, int], Integral]:
+    """Return the constraints on velocities that are ones on positions by themselves, in the dae form.
+
+    Parameters
+    ----------
+    mechanism, site, state
+        The mechanism, and how it moves.
+    rolling
+        The constraints on velocities.
+    """
+    if mechanism.places is None or not rolling:
+        return {}
+    forms = _forms(mechanism, site, state, rolling)
+    found = linear_integrals(mechanism, Places(state, mechanism.time), forms, together=False)
+    made = [_integral(mechanism, state, forms, *one, number, "dae") for number, one in enumerate(found)]
+    return {one.keys[-1]: one for one in made}
