@@ -70,12 +70,13 @@ def list_command(as_json: bool) -> None:
 
 @main.command("info", short_help="Say what a scene is made of, before any run.", epilog=_SCENE_HELP)
 @_scene_options
+@click.option("--moved", is_flag=True, help="Show in full what the start moved from where it was guessed.")
 @reporting_errors
-def info_command(scene: str, settings: tuple[str, ...], starts: tuple[str, ...], as_json: bool) -> None:
+def info_command(scene: str, settings: tuple[str, ...], starts: tuple[str, ...], as_json: bool, moved: bool) -> None:
     """Say what SCENE is made of: bodies, joints, freedom, constraints, and what its equations cost."""
     from atwood.cli.info import show_info
 
-    show_info(scene, settings, starts, as_json)
+    show_info(scene, settings, starts, as_json, moved)
 
 
 _FORM = click.Choice(["reduced", "dae"])

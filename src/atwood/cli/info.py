@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["show_info"]
 
 
-def show_info(scene: str, settings: Sequence[str], starts: Sequence[str], as_json: bool) -> None:
+def show_info(scene: str, settings: Sequence[str], starts: Sequence[str], as_json: bool, moved: bool = False) -> None:
     """Show what a scene is made of.
 
     Parameters
@@ -24,6 +24,8 @@ def show_info(scene: str, settings: Sequence[str], starts: Sequence[str], as_jso
         See `atwood.cli.scenes.prepare`.
     as_json
         Whether to write JSON.
+    moved
+        Whether to show, instead of the parameters, all that the start moved.
     """
     from atwood.reporting import report
 
@@ -32,10 +34,10 @@ def show_info(scene: str, settings: Sequence[str], starts: Sequence[str], as_jso
     if as_json:
         print_json(found.to_dict())
     else:
-        _print(found)
+        _print(found, moved)
 
 
-def _print(found: MechanismReport) -> None:
+def _print(found: MechanismReport, moved: bool) -> None:
     from rich.table import Table
     from rich.text import Text
 
@@ -49,6 +51,10 @@ def _print(found: MechanismReport) -> None:
     for label, text in facts(found):
         table.add_row(label, Text(text))
     out.print(table)
+    if moved:
+        out.print()
+        out.print(Text(str(found.placement)), soft_wrap=True)
+        return
     groups: dict[tuple[str, float, str, str], list[str]] = {}
     for one in found.parameters:
         if isinstance(one.value, (int, float)):

@@ -175,6 +175,7 @@ def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
         "multipliers": multiplier_labels(result),
         "states": result.run.segments[0].plan.program.size,
         "solver": data.pop("solver"),
+        "placement": result.placement.to_dict(),
         "start": result.at(0),
         "end": result.at(-1),
         "energy": data.pop("energy"),

@@ -24,6 +24,7 @@ from atwood.reporting.parts import (
     list_parameters,
     list_ties,
 )
+from atwood.solve.placement import Placement, find_placement
 from atwood.solve.problem import Plan, make_plan
 from atwood.solve.scales import motion_names
 from atwood.solve.start import Start, find_start, own_state
@@ -77,6 +78,8 @@ class MechanismReport:
         What nothing fixes at the start; it keeps its guess as far as it can, or starts at zero.
     repeated
         Start values that follow from the others.
+    placement
+        What the start moved from where it was guessed.
     states
         Length of the solver's vector, by form.
     operations
@@ -106,6 +109,7 @@ class MechanismReport:
     free_coordinates: tuple[str, ...]
     free_speeds: tuple[str, ...]
     repeated: tuple[str, ...]
+    placement: Placement
     states: Mapping[str, int]
     operations: Mapping[str, Mapping[str, int]]
     parameters: tuple[ParameterEntry, ...]
@@ -148,6 +152,7 @@ class MechanismReport:
                 "free_speeds": list(self.free_speeds),
                 "repeated": list(self.repeated),
             },
+            "placement": self.placement.to_dict(),
             "states": dict(self.states),
             "operations": {form: dict(counts) for form, counts in self.operations.items()},
             "masses": {one.path: one.mass for one in self.bodies},
@@ -218,6 +223,7 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
         free_coordinates=start.free_coordinates,
         free_speeds=start.free_speeds,
         repeated=start.repeated,
+        placement=find_placement(reduced, start),
         states={form: plan.program.size for form, plan in plans.items()},
         operations={form: plan.program.operations for form, plan in plans.items()},
         parameters=list_parameters(reduced, None if isinstance(scene, Assembly) else scene),

@@ -128,6 +128,8 @@ def _warnings(report: MechanismReport) -> Iterator[tuple[str, str]]:
         if report.not_unique:
             text += f"; the reactions {shorten(report.not_unique)} are then not unique, the smallest ones are reported"
         yield "redundant", text
+    if report.placement.summary:
+        yield "assembled", report.placement.summary
     if report.starts_singular:
         yield "singular start", "here constraints lose rank; the motion from this position is not unique"
     if report.repeated:

@@ -23,6 +23,7 @@ from atwood.result.energy import EnergyLedger, make_ledger
 from atwood.solve.driver import Statistics
 from atwood.solve.modes import Happening
 from atwood.solve.passage import Passage
+from atwood.solve.placement import Placement, find_placement
 from atwood.solve.projection import misses_of
 from atwood.solve.reactions import ReactionSolver
 from atwood.solve.record import Segment
@@ -97,6 +98,11 @@ class Result:
     def solver(self) -> str:
         """What solved it and why, as a sentence."""
         return self.run.why
+
+    @cached_property
+    def placement(self) -> Placement:
+        """What the start moved: bodies and guesses, and the joints that were open before."""
+        return find_placement(self.assembly, self.run.start)
 
     @property
     def statistics(self) -> Statistics:

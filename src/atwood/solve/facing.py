@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import KernelEvaluationError
-from atwood.expr import Expression, Scalar, substitute
+from atwood.expr import Expression, Program, Scalar, substitute
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.forces import local_map
@@ -47,7 +47,7 @@ def wrongly_turned(assembly: Assembly, equations: Equations, t: float, q: FloatA
     return [part for part, trace in zip(parts, traces, strict=True) if trace < 2.0]
 
 
-def _facing(assembly: Assembly, equations: Equations) -> tuple[tuple[str, ...], object]:
+def _facing(assembly: Assembly, equations: Equations) -> tuple[tuple[str, ...], Program]:
     found = {}
     for joint in equations.forest.cuts:
         if joint.says_rotation:
