@@ -62,21 +62,26 @@ class _Quantity:
 
 
 def states_ahead(
-    t: float, q: FloatArray, u: FloatArray, a: FloatArray, horizon: float
+    t: float, state: tuple[FloatArray, FloatArray], rates: tuple[FloatArray, FloatArray], horizon: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return a state and others ahead of it on a parabola, nearer ones first: times, coordinates and speeds.
+    """Return a state and others ahead of it, nearer ones first: times, coordinates and speeds.
 
     Parameters
     ----------
-    t, q, u, a
-        The state and its accelerations.
+    t
+        Time, s.
+    state, rates
+        Coordinates and speeds, and their derivatives.
     horizon
         Length of the run, s.
     """
     h = np.concatenate([[0.0], horizon * np.geomspace(1e-16, _FARTHEST, 97)])
     with np.errstate(all="ignore"):
-        a = np.where(np.isfinite(a), a, 0.0)[:, None]
-        return t + h, q[:, None] + h * u[:, None] + 0.5 * h * h * a, u[:, None] + h * a
+        q_rate, a = (np.where(np.isfinite(one), one, 0.0)[:, None] for one in rates)
+        q, u = (one[:, None] for one in state)
+        # A parabola where coordinates are integrals of the speeds; orientations go straight ahead.
+        bent = 0.5 * h * h * a if len(q) == len(u) else 0.0
+        return t + h, q + h * q_rate + bent, u + h * a
 
 
 def find_missing(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> Missing | None:

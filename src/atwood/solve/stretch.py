@@ -182,9 +182,9 @@ class _Runner:
 
     def _explain(self, advance: Advance) -> SolveError | None:
         """Return an error that names what has no value; None if everything has one."""
-        n, assembly, options = self.stretch.plan.program.coordinates, self.stretch.plan.assembly, self.stretch.options
-        q, u, a = advance.y[:n], advance.y[n : 2 * n], advance.yp[n : 2 * n]
-        states = states_ahead(advance.t, q, u, a, options.t_end - self.stretch.choice.time)
+        program, assembly, options = self.stretch.plan.program, self.stretch.plan.assembly, self.stretch.options
+        now, rates = program.split(advance.y), program.split(advance.yp)
+        states = states_ahead(advance.t, now, rates, options.t_end - self.stretch.choice.time)
         found = find_missing(assembly, *states)
         if found is None:
             return None
