@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 from atwood import (
-    Component,
     Frame,
+    ParameterError,
     Placement,
     Scalar,
+    Shaft,
     Vector,
     as_vector,
     atan2,
@@ -19,9 +22,10 @@ from atwood import (
     parameter,
     turn,
 )
+from atwood_library.interfaces.loaded_cross import LoadedCross
 
 
-class Universal(Component):
+class Universal(LoadedCross):
     """A universal joint (Hooke, Cardan): frame b turns about `axis_a` of frame a, and then about its own `axis_b`.
 
     The two axes meet at a right angle in a cross. Its `force` is what it exerts on frame b, `cross_torque` the torque
@@ -32,6 +36,21 @@ class Universal(Component):
     axis_b: tuple[float, float, float] = parameter((0.0, 1.0, 0.0), direction=True, doc="Second axis, in frame b.")
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")
+    shaft_a: Shaft = connector(Shaft, "The angle of the cross, where gears take hold of it.", of="angle_a")
+    shaft_b: Shaft = connector(Shaft, "The angle from the cross, where gears take hold of it.", of="angle_b")
+
+    def check_values(self) -> None:
+        """Refuse axes that are not square to each other while the frames are not turned."""
+        cosine = abs(float(dot(as_vector(self.axis_a), as_vector(self.axis_b))))
+        if cosine > 1e-9:
+            angle = math.degrees(math.acos(min(cosine, 1.0)))
+            what = "parallel" if angle < 1e-3 else f"at {angle:.3g} degrees"
+            raise ParameterError(
+                f"the two axes of a universal joint are square to each other; these are {what} while its frames are "
+                "turned alike",
+                where=f"{self.path}.axis_b",
+                advice="Give an axis_b square to axis_a, and turn frame b with a Weld where it is mounted askew.",
+            )
 
     @constraint(reaction="force", unit="N", doc="Force exerted on frame b, in world axes.")
     def coincidence(self) -> Vector:

@@ -175,6 +175,7 @@ def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
         "multipliers": multiplier_labels(result),
         "states": result.run.segments[0].plan.program.size,
         "solver": data.pop("solver"),
+        "immobile": None if result.immobile is None else result.immobile.to_dict(),
         "placement": result.placement.to_dict(),
         "start": result.at(0),
         "end": result.at(-1),

@@ -24,6 +24,7 @@ from atwood.reporting.parts import (
     list_parameters,
     list_ties,
 )
+from atwood.solve.immobile import Immobile, find_immobile
 from atwood.solve.placement import Placement, find_placement
 from atwood.solve.problem import Plan, make_plan
 from atwood.solve.scales import motion_names
@@ -56,6 +57,10 @@ class MechanismReport:
         Coordinates of the reduced form.
     eliminated
         Coordinates that linear constraints gave as functions of the others.
+    integrated
+        Constraints on velocities that turned out to hold positions, by themselves or together.
+    solved_speeds
+        Rates of coordinates that constraints on velocities gave as functions of the speeds.
     dependent
         With loops: the coordinates that follow from the others at the start; of orientations, the speeds that do.
     bodies, massless
@@ -80,6 +85,8 @@ class MechanismReport:
         Start values that follow from the others.
     placement
         What the start moved from where it was guessed.
+    immobile
+        Why nothing can move, and what would have to let go; None if something can, or is driven.
     states
         Length of the solver's vector, by form.
     operations
@@ -109,7 +116,10 @@ class MechanismReport:
     free_coordinates: tuple[str, ...]
     free_speeds: tuple[str, ...]
     repeated: tuple[str, ...]
+    integrated: tuple[str, ...]
+    solved_speeds: tuple[str, ...]
     placement: Placement
+    immobile: Immobile | None
     states: Mapping[str, int]
     operations: Mapping[str, Mapping[str, int]]
     parameters: tuple[ParameterEntry, ...]
@@ -142,6 +152,8 @@ class MechanismReport:
             "dropped": [one.path for one in self.dropped],
             "coordinates": list(self.coordinates),
             "eliminated": list(self.eliminated),
+            "integrated": list(self.integrated),
+            "solved_speeds": list(self.solved_speeds),
             "dependent": list(self.dependent),
             "loop_joints": list(self.loop_joints),
             "constraint_labels": list(self.constraints),
@@ -153,6 +165,7 @@ class MechanismReport:
                 "repeated": list(self.repeated),
             },
             "placement": self.placement.to_dict(),
+            "immobile": None if self.immobile is None else self.immobile.to_dict(),
             "states": dict(self.states),
             "operations": {form: dict(counts) for form, counts in self.operations.items()},
             "masses": {one.path: one.mass for one in self.bodies},
@@ -223,7 +236,10 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
         free_coordinates=start.free_coordinates,
         free_speeds=start.free_speeds,
         repeated=start.repeated,
+        integrated=tuple(dict.fromkeys(f"{k[0]}.{k[1]}" for one in reduced.reduced.integrals for k in one.keys)),
+        solved_speeds=reduced.reduced.solved_speeds,
         placement=find_placement(reduced, start),
+        immobile=find_immobile(reduced, len(reduced.reduced.speeds) - plans["reduced"].finding.rank, start),
         states={form: plan.program.size for form, plan in plans.items()},
         operations={form: plan.program.operations for form, plan in plans.items()},
         parameters=list_parameters(reduced, None if isinstance(scene, Assembly) else scene),

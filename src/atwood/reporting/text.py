@@ -105,6 +105,12 @@ def _what_became(report: MechanismReport) -> Iterator[tuple[str, str]]:
         yield "merged", shorten(f"{one.path} is one with {_world(one.into)}" for one in report.merged)
     if report.dropped:
         yield "dropped", shorten(f"{one.path} ({one.why})" for one in report.dropped)
+    if report.integrated:
+        one = "it holds" if len(report.integrated) == 1 else "they hold"
+        yield "integrated", f"{shorten(report.integrated)}: {one} positions too, where the start has put them"
+    if report.solved_speeds:
+        rates = (f"{name}'" for name in report.solved_speeds)
+        yield "rolling", f"{shorten(rates)} follow from the other speeds, and only these are states"
     if report.eliminated:
         yield "eliminated", f"{shorten(report.eliminated)}: a linear constraint gives it from the other coordinates"
 
@@ -128,6 +134,8 @@ def _warnings(report: MechanismReport) -> Iterator[tuple[str, str]]:
         if report.not_unique:
             text += f"; the reactions {shorten(report.not_unique)} are then not unique, the smallest ones are reported"
         yield "redundant", text
+    if report.immobile is not None:
+        yield "immobile", report.immobile.describe()
     if report.placement.summary:
         yield "assembled", report.placement.summary
     if report.starts_singular:

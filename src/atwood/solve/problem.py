@@ -19,10 +19,11 @@ from atwood.solve.balance import Balance, balance_of, least_norm, row_scales, so
 from atwood.solve.columns import columns_of
 from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
-from atwood.solve.matrices import Matrix, is_full, to_array
+from atwood.solve.matrices import to_array
 from atwood.solve.rank import RankFinding, find_rank
-from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_names, motion_scales
+from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_scales
 from atwood.solve.uncompiled import announce, find_uncompiled
+from atwood.solve.without_inertia import check_inertia
 
 if TYPE_CHECKING:
     from atwood.forms.loops import LoopProgram
@@ -311,7 +312,7 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
             advice="Do two points coincide that a spring, damper or rope joins? Give start positions that part them.",
         ) from error
     slope = now.slope[list(finding.kept)] if finding.kept else now.slope[:0]
-    _check_inertia(assembly, now.mass, slope, sizes)
+    check_inertia(assembly, now.mass, slope, sizes)
     if finding.starts_singular:
         raise _singular_start(assembly, finding)
     dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
@@ -338,44 +339,6 @@ def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
         "and nowhere near",
         where=constraints[finding.lost_at_start[0]].key[0],
         advice="Start a little away from it, on the side that you mean.",
-    )
-
-
-def _check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatArray) -> None:
-    """Refuse a direction in which something can move without inertia."""
-    n = mass.shape[0]
-    if n == 0:
-        return
-    if not is_full(mass):
-        from atwood.solve.sparse import without_inertia
-
-        moving = without_inertia(mass, slope, sizes)
-        if moving is not None:
-            raise _without_inertia(assembly, moving)
-        return
-    scaled = mass * sizes[:, None] * sizes[None, :]
-    if slope.shape[0]:
-        _, values, directions = np.linalg.svd(slope * sizes)
-        rank = int(np.sum(values > 1e-9 * values[0]))
-        free = directions[rank:]
-    else:
-        free = np.eye(n)
-    if not len(free):
-        return
-    values, vectors = np.linalg.eigh(free @ scaled @ free.T)
-    if values[0] > 1e-14 * max(values[-1], 1e-300):
-        return
-    raise _without_inertia(assembly, np.abs(vectors[:, 0] @ free))
-
-
-def _without_inertia(assembly: Assembly, moving: FloatArray) -> StartError:
-    every = motion_names(assembly.equations)
-    names = [name for name, size in zip(every, moving, strict=True) if size > 0.1 * np.max(moving)]
-    return StartError(
-        f"something without inertia is free to move along {', '.join(names)}: "
-        "a force would accelerate it without bound",
-        where=names[0].rpartition(".")[0],
-        advice="Give it a mass, or hold it with a joint.",
     )
 
 

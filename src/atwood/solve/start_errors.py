@@ -14,15 +14,18 @@ from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Equations
 from atwood.solve.closing import Nearest, closest, closest_of_all, units_of_rows
 from atwood.solve.gaps import Gap, find_gaps
+from atwood.solve.matrices import independent_rows, row_scales, scaled
 from atwood.solve.start_system import MET, System
 from atwood.solve.start_targets import Level, Target
 
-__all__ = ["Failed", "contradiction", "explain_positions", "far_from_guess", "wrong_way_round"]
+__all__ = ["Failed", "contradiction", "explain_positions", "far_from_guess", "freedom_at", "wrong_way_round"]
 
 FloatArray = NDArray[np.float64]
 
 _CLOSED = 1e-9
 """A gap below this share of the scene's extent, or in radians, is none."""
+
+_SHOWN = 6
 
 _HELD = 1e-4
 """What is to hold all but exactly while something else is made small counts so much more."""
@@ -74,13 +77,30 @@ def explain_positions(failed: Failed) -> StartError:
     fixed = failed.level.fixed
     own = failed.missing[len(failed.missing) - len(fixed) :]
     if not any(one.value is not None for one in failed.equations.constraints):
-        return contradiction(fixed, own, failed.equations)
+        return contradiction(fixed, own, _freedom(failed), _as_near_as_it_gets(failed))
     system = System(failed.assembly, failed.equations, [], True)
     units = units_of_rows(failed.assembly, failed.equations, system, failed.length)
     best = closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
     if best is not None and best.size > _CLOSED:
         return _open_loop(failed, system, best)
-    return contradiction(fixed, own, failed.equations, _what_stays_open(failed))
+    return contradiction(fixed, own, _freedom(failed), _what_stays_open(failed))
+
+
+def _as_near_as_it_gets(failed: Failed) -> str:
+    """Return, in words, the values of all that is fixed where they are met best."""
+    fixed = failed.level.fixed
+    system = System(failed.assembly, failed.equations, fixed, True)
+    units = units_of_rows(failed.assembly, failed.equations, system, failed.length)
+    best = closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
+    if best is None:
+        return ""
+    off = [
+        f"{target.path} = {target.value + miss:.4g}"
+        for target, miss, unit in zip(fixed, best.missing, units, strict=True)
+        if abs(miss) > 1e-6 * unit
+    ]
+    more = "" if len(off) <= _SHOWN else ", ..."
+    return f"; the nearest there is has {', '.join(off[:_SHOWN])}{more}" if off else ""
 
 
 def _what_stays_open(failed: Failed) -> str:
@@ -186,7 +206,7 @@ def far_from_guess(failed: Failed, found: FloatArray) -> StartError:
     """
     equations, assembly = failed.equations, failed.assembly
     if not any(one.value is not None for one in equations.constraints):
-        return contradiction(failed.level.fixed, failed.missing, equations)
+        return contradiction(failed.level.fixed, failed.missing, _freedom(failed))
     gaps = find_gaps(assembly, equations, failed.time, failed.nearest)
     worst = _largest(gaps, failed.length)
     system = System(assembly, equations, failed.level.guessed, False)
@@ -240,7 +260,29 @@ def _loop_through(assembly: Assembly, part: str) -> list[str]:
     return [*found, *([bodies.bodies[way[-1]].name] if way[-1] else [])]
 
 
-def contradiction(fixed: Sequence[Target], missing: FloatArray, equations: Equations, remark: str = "") -> StartError:
+def _freedom(failed: Failed) -> int:
+    return freedom_at(failed.assembly, failed.equations, failed.scales, failed.time, failed.nearest)
+
+
+def freedom_at(assembly: Assembly, equations: Equations, scales: FloatArray, t: float, q: FloatArray) -> int:
+    """Return how many speeds constraints leave free at a place.
+
+    Parameters
+    ----------
+    assembly, equations
+        The scene.
+    scales
+        Size of a displacement along each speed.
+    t, q
+        Time and coordinates.
+    """
+    if not equations.constraints:
+        return len(scales)
+    matrix = System(assembly, equations, [], True, of_speeds=True).at(t, q, np.zeros_like(scales))[1]
+    return len(scales) - len(independent_rows(scaled(matrix, scales, row_scales(matrix, scales))))
+
+
+def contradiction(fixed: Sequence[Target], missing: FloatArray, freedom: int, remark: str = "") -> StartError:
     """Return the error that says which fixed values cannot all hold.
 
     Parameters
@@ -249,14 +291,13 @@ def contradiction(fixed: Sequence[Target], missing: FloatArray, equations: Equat
         What is fixed.
     missing
         What each value misses, scaled.
-    equations
-        The scene's.
+    freedom
+        How many coordinates are free.
     remark
         What else there is to say.
     """
     failing = [target for target, miss in zip(fixed, missing, strict=True) if not abs(miss) <= MET]
     names = [f"{target.path} = {target.value:g}" for target in failing or fixed]
-    freedom = len(equations.speeds) - len(equations.constraints)
     return StartError(
         f"the start values contradict each other or the constraints: {', '.join(names)} cannot all hold{remark}",
         where=(failing or fixed)[0].path if fixed else "",

@@ -9,7 +9,7 @@ from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Equations
 from atwood.solve.matrices import least_norm, row_scales, scaled
 from atwood.solve.scales import motion_names
-from atwood.solve.start_errors import contradiction
+from atwood.solve.start_errors import contradiction, freedom_at
 from atwood.solve.start_system import System, counted
 from atwood.solve.start_targets import Level, said
 
@@ -62,7 +62,8 @@ def solve_speeds(
         own[system.constraints :] += [abs(x.value) for x in level.fixed]
         share = np.abs(missing) / np.where(own > 0.0, own, 1.0)
         if not float(np.max(share)) <= 1e-8:
-            raise contradiction(level.fixed, share[system.constraints :], equations)
+            freedom = freedom_at(assembly, equations, scales, t, q)
+            raise contradiction(level.fixed, share[system.constraints :], freedom)
         matrix = scaled(matrix, scales, rows)
     names = motion_names(equations)
     return u, *counted(names, None, level.fixed, system.constraints, matrix)

@@ -21,6 +21,10 @@ __all__ = ["Level", "Target", "said", "sort_targets"]
 FloatArray = NDArray[np.float64]
 
 
+_SAME = 1e-9
+"""Values that differ by less, as rounding makes them, say the same."""
+
+
 @dataclass(frozen=True)
 class Target:
     """A quantity with the value that it is to have at the start."""
@@ -62,6 +66,15 @@ def _restated(assembly: Assembly, given: Mapping[str, float]) -> dict[str, float
         part = assembly.flat.parts[path]
         restated = part.component.restate_start(own, assembly.mechanism.space.name)
         if restated != own:
+            for name, value in restated.items():
+                said_too = given.get(f"{path}.{name}", value)
+                if not abs(said_too - value) <= _SAME:
+                    others = ", ".join(f"{one} = {own[one]:g}" for one in own if one not in restated)
+                    raise StartError(
+                        f"it is given as {said_too:g}, and {others} makes it {value:g}",
+                        where=f"{path}.{name}",
+                        advice="The start values contradict each other: give one or the other.",
+                    )
             for name in own:
                 del found[f"{path}.{name}"]
             found.update({f"{path}.{name}": value for name, value in restated.items()})

@@ -1,0 +1,106 @@
+"""Mechanisms that cannot move: what holds them, and what would have to let go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.expr import depends_on
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.equations import Constraint
+from atwood.solve.balance import balance_of
+from atwood.solve.matrices import LARGEST_FULL, row_scales, scaled, to_array
+from atwood.solve.scales import motion_scales
+from atwood.solve.start import Start, maximal_state
+
+__all__ = ["Immobile", "find_immobile"]
+
+FloatArray = NDArray[np.float64]
+
+_SHOWN = 4
+
+
+@dataclass(frozen=True)
+class Immobile:
+    """A mechanism in which nothing can move: a structure, whose forces are those of statics.
+
+    Attributes
+    ----------
+    freed
+        Joint laws and ties with the degrees of freedom that there would be without each; those that give fewest first.
+    surplus
+        How many of its constraints follow from the others, so that their reactions are not unique.
+    """
+
+    freed: tuple[tuple[str, int], ...]
+    surplus: int
+
+    def describe(self) -> str:
+        """Return what it is, and what would have to let go, as a sentence."""
+        text = "nothing can move: joints and ties hold every body where it is"
+        if self.surplus:
+            text += f", {self.surplus} of their constraints to spare"
+        if self.freed:
+            ways = [f"{name} ({count})" for name, count in self.freed[:_SHOWN]]
+            more = len(self.freed) - _SHOWN
+            text += f"; degrees of freedom if one let go: {', '.join(ways)}" + (f" and {more} more" if more > 0 else "")
+        else:
+            text += "; it takes more than one of them to let go"
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {"freed": [{"path": path, "degrees_of_freedom": n} for path, n in self.freed], "surplus": self.surplus}
+
+
+def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | None:
+    """Return why nothing can move; None if something can, or is driven.
+
+    Parameters
+    ----------
+    assembly
+        The scene, in either form.
+    freedom
+        Its degrees of freedom.
+    start
+        Its start.
+    """
+    equations = assembly.maximal
+    values = [one.value if one.value is not None else one.rate for one in equations.constraints]
+    if freedom > 0 or not equations.speeds:
+        return None
+    if equations.prescribed or any(depends_on(value, [equations.time]) for value in values):
+        return None  # driven
+    if len(equations.speeds) > LARGEST_FULL:
+        return Immobile((), 0)
+    scales = motion_scales(equations, start.length)
+    q, _ = maximal_state(assembly, start)
+    slope = to_array(balance_of(assembly, "dae").at(start.time, q, np.zeros_like(scales)).slope)
+    rows = scaled(slope, scales, row_scales(slope, scales))
+    groups: dict[str, list[int]] = {}
+    for i, one in enumerate(equations.constraints):
+        groups.setdefault(_name(assembly, one), []).append(i)
+    found = []
+    for name, numbers in groups.items():
+        left = len(scales) - _rank(np.delete(rows, numbers, axis=0))
+        if left > 0:
+            found.append((name, left))
+    found.sort(key=lambda one: one[1])
+    return Immobile(tuple(found), len(rows) - _rank(rows))
+
+
+def _name(assembly: Assembly, one: Constraint) -> str:
+    """Return the path of a law; of the part alone where it has no other law that holds."""
+    part, law, _ = one.key
+    laws = {other.key[1] for other in assembly.maximal.constraints if other.key[0] == part}
+    return part if len(laws) == 1 else f"{part}.{law}"
+
+
+def _rank(matrix: FloatArray) -> int:
+    if 0 in matrix.shape:
+        return 0
+    sizes = np.linalg.svd(matrix, compute_uv=False)
+    return int(np.sum(sizes > 1e-7 * sizes[0]))

@@ -1,0 +1,77 @@
+"""What can move without inertia, which no force may act on: named before a run."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import StartError
+from atwood.forms.assembly import Assembly
+from atwood.solve.matrices import Matrix, is_full
+from atwood.solve.scales import motion_names
+
+__all__ = ["check_inertia"]
+
+FloatArray = NDArray[np.float64]
+
+
+def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatArray) -> None:
+    """Refuse a direction in which something can move without inertia.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    mass, slope
+        The mass matrix, and the derivatives of the independent constraints, along the speeds.
+    sizes
+        Size of a displacement along each speed.
+
+    Raises
+    ------
+    StartError
+        If there is one; it names the part.
+    """
+    n = mass.shape[0]
+    if n == 0:
+        return
+    if not is_full(mass):
+        from atwood.solve.sparse import without_inertia
+
+        moving = without_inertia(mass, slope, sizes)
+        if moving is not None:
+            raise _without_inertia(assembly, moving)
+        return
+    scaled = mass * sizes[:, None] * sizes[None, :]
+    if slope.shape[0]:
+        _, values, directions = np.linalg.svd(slope * sizes)
+        rank = int(np.sum(values > 1e-9 * values[0]))
+        free = directions[rank:]
+    else:
+        free = np.eye(n)
+    if not len(free):
+        return
+    values, vectors = np.linalg.eigh(free @ scaled @ free.T)
+    if values[0] > 1e-14 * max(values[-1], 1e-300):
+        return
+    raise _without_inertia(assembly, np.abs(vectors[:, 0] @ free))
+
+
+def _without_inertia(assembly: Assembly, moving: FloatArray) -> StartError:
+    every = motion_names(assembly.equations)
+    names = [name for name, size in zip(every, moving, strict=True) if size > 0.1 * np.max(moving)]
+    units = dict(zip(every, (one.unit for one in assembly.equations.speed_names), strict=True))
+    turns = all(units[name] == "rad/s" for name in names)
+    return StartError(
+        f"something without inertia is free to move along {', '.join(names)}: "
+        "a force would accelerate it without bound",
+        where=_part_of(assembly, names[0]),
+        advice=f"Give it a {'moment of inertia' if turns else 'mass'}, or hold it with a joint.",
+    )
+
+
+def _part_of(assembly: Assembly, name: str) -> str:
+    """Return the part, or the connector, that a coordinate belongs to."""
+    path = name.rpartition(".")[0]
+    head, _, last = path.rpartition(".")
+    return head if last in ("position", "velocity", "spin") and head else path
