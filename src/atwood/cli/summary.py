@@ -94,6 +94,8 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     if multipliers:
         size.append(count_of(multipliers, "multiplier"))
     yield "mechanism", ", ".join(size)
+    if result.immobile is not None:
+        yield "immobile", result.immobile.describe()
     if result.placement.summary:
         yield "assembled", result.placement.summary
     span = f"t = {result.run.start.time:g} to {result.time[-1]:.6g} s"

@@ -21,6 +21,7 @@ from atwood.model.quantities import Quantity
 from atwood.result.angles import unwrap
 from atwood.result.energy import EnergyLedger, make_ledger
 from atwood.solve.driver import Statistics
+from atwood.solve.immobile import Immobile, find_immobile
 from atwood.solve.modes import Happening
 from atwood.solve.passage import Passage
 from atwood.solve.placement import Placement, find_placement
@@ -98,6 +99,13 @@ class Result:
     def solver(self) -> str:
         """What solved it and why, as a sentence."""
         return self.run.why
+
+    @cached_property
+    def immobile(self) -> Immobile | None:
+        """Why nothing can move, and what would have to let go; None if something can, or is driven."""
+        plan, start = self.run.segments[0].plan, self.run.start
+        freedom = len(plan.assembly.equations.speeds) - plan.finding.rank
+        return find_immobile(self.assembly, freedom, start)
 
     @cached_property
     def placement(self) -> Placement:

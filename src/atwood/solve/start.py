@@ -22,7 +22,7 @@ from atwood.solve.start_speeds import solve_speeds
 from atwood.solve.start_targets import sort_targets
 from atwood.solve.turning import turning_of
 
-__all__ = ["Start", "find_start", "own_state"]
+__all__ = ["Start", "find_start", "maximal_state", "own_state"]
 
 FloatArray = NDArray[np.float64]
 
@@ -61,8 +61,11 @@ class Start:
 
 def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
     """Return a start in the coordinates of the form of an assembly."""
-    if assembly.form == "reduced":
-        return start.coordinates, start.speeds
+    return (start.coordinates, start.speeds) if assembly.form == "reduced" else maximal_state(assembly, start)
+
+
+def maximal_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
+    """Return a start in maximal coordinates, whatever the form of an assembly."""
     q, u = assembly.kernel(assembly.to_maximal)([start.time], start.coordinates, start.speeds)
     return turning_of(assembly, "dae").normalized(np.asarray(q, dtype=float)), np.asarray(u, dtype=float)
 
