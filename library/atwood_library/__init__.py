@@ -13,15 +13,19 @@ from atwood_library.joints.constant_velocity import ConstantVelocity
 from atwood_library.joints.cylindrical import Cylindrical
 from atwood_library.joints.drive import Drive
 from atwood_library.joints.free_joint import FreeJoint
+from atwood_library.joints.gear import Gear
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.planar import Planar
+from atwood_library.joints.planetary_gear import PlanetaryGear
 from atwood_library.joints.point_on_circle import PointOnCircle
 from atwood_library.joints.point_on_line import PointOnLine
 from atwood_library.joints.point_on_plane import PointOnPlane
+from atwood_library.joints.rack_and_pinion import RackAndPinion
 from atwood_library.joints.rolling_disc import RollingDisc
 from atwood_library.joints.rolling_sphere import RollingSphere
 from atwood_library.joints.rotary_drive import RotaryDrive
 from atwood_library.joints.screw import Screw
+from atwood_library.joints.slide_gear import SlideGear
 from atwood_library.joints.slider import Slider
 from atwood_library.joints.spherical import Spherical
 from atwood_library.joints.universal import Universal
@@ -72,6 +76,7 @@ __all__ = [
     "ForceSensor",
     "FrameSensor",
     "FreeJoint",
+    "Gear",
     "Ground",
     "Link",
     "Mass1D",
@@ -79,12 +84,14 @@ __all__ = [
     "OrientationSensor",
     "Pivot",
     "Planar",
+    "PlanetaryGear",
     "PointMass",
     "PointOnCircle",
     "PointOnLine",
     "PointOnPlane",
     "PositionSensor",
     "Pulley",
+    "RackAndPinion",
     "Ramp",
     "RelativePositionSensor",
     "RigidBody",
@@ -95,6 +102,7 @@ __all__ = [
     "RotaryDrive",
     "Screw",
     "Sine",
+    "SlideGear",
     "Slider",
     "Sphere",
     "Spherical",

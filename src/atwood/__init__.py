@@ -51,7 +51,7 @@ from atwood.expr.graph import Expression
 from atwood.expr.operations import ExternalFunction
 from atwood.model.component import Component
 from atwood.model.composite import Model, connect
-from atwood.model.connectors import Connector, Frame, Groove, Point, connector
+from atwood.model.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
 from atwood.model.fields import parameter, signal
 from atwood.model.laws import (
     BodyInertia,
@@ -119,6 +119,8 @@ __all__ = [
     "SavedResult",
     "Scalar",
     "Scene",
+    "Shaft",
+    "Slide",
     "SolveError",
     "StartError",
     "Sweep",

@@ -164,6 +164,8 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
             angle=angle,
             angular_velocity=aw.Vector(0.0, -numbers.draw(f"{name}.w") if turns else 0.0, 0.0),
             angular_acceleration=aw.Vector(0.0, -numbers.draw(f"{name}.e") if turns else 0.0, 0.0),
+            value=numbers.draw(f"{name}.value"),
+            rate=numbers.draw(f"{name}.rate"),
         )
     names = list(component.connectors())
     return Binding(

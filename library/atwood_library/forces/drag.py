@@ -72,7 +72,8 @@ class Drag(Component):
             moves = square > 0.0
             # The root's derivative has no value at rest, where the product with w has the derivative zero.
             factor = factor + coefficient * select(moves, sqrt(select(moves, square, 1.0)), 0.0)
-        return -(w * factor)
+        force: Vector = -(w * factor)
+        return force
 
     @force
     def drag(self) -> Iterable[Load]:

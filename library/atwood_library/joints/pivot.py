@@ -6,6 +6,7 @@ from atwood import (
     Frame,
     Placement,
     Scalar,
+    Shaft,
     Vector,
     as_vector,
     connector,
@@ -34,6 +35,7 @@ class Pivot(LoadedHinge):
     )
     a: Frame = connector(Frame, "The frame that the angle is measured from.")
     b: Frame = connector(Frame, "The frame that turns.")
+    shaft: Shaft = connector(Shaft, "The angle, where gears take hold of it.", of="angle")
 
     def axis_in_world(self) -> Vector:
         """Return the axis in world axes."""

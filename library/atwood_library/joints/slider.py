@@ -6,6 +6,7 @@ from atwood import (
     Frame,
     Placement,
     Scalar,
+    Slide,
     Vector,
     as_vector,
     connector,
@@ -35,6 +36,7 @@ class Slider(LoadedSlide):
     )
     a: Frame = connector(Frame, "The frame that carries the guide.")
     b: Frame = connector(Frame, "The frame that slides.")
+    carriage: Slide = connector(Slide, "The displacement, where gears take hold of it.", of="displacement")
 
     def normal(self) -> Vector:
         """Return, in a plane, the axis turned counter-clockwise by a quarter turn, in the axes of frame a."""

@@ -398,5 +398,8 @@ class Assembly:
             if turn.coordinate is not None:
                 positions[turn.coordinate] = kinematics.placements.angles[turn.body]
                 speeds[turn.coordinate] = kinematics.angular_velocities[turn.body][0]
+        for symbol, (coordinate, speed) in forest.counted.items():
+            positions[coordinate] = kinematics.placements.joint_coordinates[symbol]
+            speeds[speed] = kinematics.joint_rates[symbol]
         outputs = (OutputGroup("q", tuple(positions)), OutputGroup("u", tuple(speeds)))
         return Program(f"{self.flat.name} to maximal coordinates", state_groups(reduced), self.parameters, outputs)

@@ -48,7 +48,7 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     turns = {node: turn for _, body_turns in layouts.values() for node, turn in body_turns.items()}
     site = Site(graph, mechanism.graph, bodies, space, turns)
     motion = (motion_in_space if space.name == "space" else motion_in_plane)(mechanism, forest, shape_of)
-    left = find_constraints(mechanism, forest)
+    left = find_constraints(mechanism, forest, motion.placements)
     values = constraint_values(mechanism, site, motion.placements, left.on_positions)
     every = motion.all_coordinates
     check_held(mechanism, masses, forest, every, values, left.on_velocities)

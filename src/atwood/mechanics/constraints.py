@@ -8,7 +8,16 @@ from dataclasses import dataclass
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, depends_on, jvp, substitute
 from atwood.mechanics.equations import Constraint, Integral, constraint_levels, put_in_place
-from atwood.mechanics.forces import Site, in_body, is_on_velocities, local_map, slopes_of
+from atwood.mechanics.forces import (
+    Site,
+    in_body,
+    in_coordinates,
+    is_on_velocities,
+    joint_slopes,
+    local_map,
+    rate_symbol,
+    slopes_of,
+)
 from atwood.mechanics.kinematics import Kinematics, Placements
 from atwood.mechanics.mechanism import Mechanism
 from atwood.mechanics.motion import Movement
@@ -52,8 +61,8 @@ def holds_velocities(mechanism: Mechanism) -> bool:
     return any(is_on_velocities(local, one.value) for local in mechanism.locals_.values() for one in local.constraints)
 
 
-def find_constraints(mechanism: Mechanism, forest: Forest) -> LeftOver:
-    """Return the constraints that hold only if somebody sees to it.
+def find_constraints(mechanism: Mechanism, forest: Forest, placements: Placements) -> LeftOver:
+    """Return the constraints that hold only if somebody sees to it, in joint coordinates where these are known.
 
     Raises
     ------
@@ -72,7 +81,8 @@ def find_constraints(mechanism: Mechanism, forest: Forest) -> LeftOver:
                 )
             if (path, constraint.law.name, constraint.index) in forest.solved or constraint.value.is_zero:
                 continue
-            (velocities if is_on_velocities(local, constraint.value) else positions).append((path, constraint))
+            one = in_coordinates(local, constraint, placements)
+            (velocities if is_on_velocities(local, one.value) else positions).append((path, one))
     return LeftOver(tuple(positions), tuple(velocities))
 
 
@@ -169,6 +179,8 @@ def _rate_by_slopes(
             torque = in_body(site, node, substitute(turning, mapping))
             for t, w in zip(torque, kinematics.angular_velocities[body], strict=True):
                 total = total + t * w
+    for symbol, slope in joint_slopes(local, one.value):
+        total = total + substitute([slope], mapping)[0] * kinematics.joint_rates[symbol]
     return total
 
 
@@ -182,6 +194,7 @@ def _differentiated_twice(
 def _first_directions(local: LocalPart, time: Expression) -> dict[Expression, Expression | float]:
     """Return how the local symbols of positions and orientations go on in time."""
     directions: dict[Expression, Expression | float] = {time: 1.0}
+    directions.update({symbol: rate_symbol(symbol) for symbol in local.formulas})
     for symbols in local.connectors.values():
         directions.update(zip(symbols.position, symbols.velocity, strict=True))
         if symbols.angle is not None and symbols.angular_speed is not None:
@@ -199,6 +212,10 @@ def _differentiated(
     graph, path = site.graph, local.part.path
     directions = _first_directions(local, time)
     mapping = local_map(site, local, kinematics)
+    for symbol, acceleration in kinematics.joint_accelerations.items():
+        if symbol in local.formulas:
+            directions[rate_symbol(symbol)] = graph.symbol(f"{symbol.name}''")
+            mapping[graph.symbol(f"{symbol.name}''")] = acceleration
     for name, symbols in local.connectors.items():
         node = site.node(path, name)
         body = site.bodies.body_of[node]

@@ -6,13 +6,13 @@ Each is found on the local symbols of a part, and then put where the part is.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Graph, Scalar, depends_on, is_zero, substitute, vjp
-from atwood.mechanics.kinematics import Kinematics
+from atwood.mechanics.kinematics import Kinematics, Placements
 from atwood.mechanics.orientation import NodeTurn, node_axes, spin_in_world, torque_components
-from atwood.model.local import LocalPart
+from atwood.model.local import LocalConstraint, LocalPart
 from atwood.model.rotation import Axes, from_axes
 from atwood.model.space import Space
 from atwood.model.vector import Vector, dot
@@ -49,6 +49,11 @@ class Forces:
         held = self.on_nodes.get(node)
         new = [self.graph.convert(c) for c in components]
         self.on_nodes[node] = new if held is None else [a + b for a, b in zip(held, new, strict=True)]
+
+    def push_joint(self, symbol: Expression, force: Expression) -> None:
+        """Add a generalized force on a joint coordinate."""
+        held = self.on_joints.get(symbol)
+        self.on_joints[symbol] = force if held is None else held + force
 
     def twist(self, body: int, torque: Sequence[Scalar], node: int | None = None) -> None:
         """Add a torque on a body, at a node of it."""
@@ -110,8 +115,9 @@ def local_map(site: Site, local: LocalPart, kinematics: Kinematics) -> dict[Expr
                 spin_W = spin_in_world(kinematics.angular_velocities[body], placements.axes[body])
                 found.update(zip(symbols.spin, (site.graph.convert(c) for c in spin_W), strict=True))
     for symbol in local.formulas:
-        if symbol in kinematics.joint_rates:
+        if symbol in kinematics.placements.joint_coordinates:
             found[symbol] = kinematics.placements.joint_coordinates[symbol]
+        if symbol in kinematics.joint_rates:
             found[rate_symbol(symbol)] = kinematics.joint_rates[symbol]
     return found
 
@@ -143,6 +149,15 @@ def in_joint_coordinates(
         if rate is not None:
             formulas[rate] = rate_symbol(symbol)
     return (substitute(list(functions), formulas) if formulas else list(functions)), hung
+
+
+def in_coordinates(local: LocalPart, one: LocalConstraint, placements: Placements) -> LocalConstraint:
+    """Return a constraint with joint coordinates, where they are the mechanism's, in place of their formulas."""
+    known = [symbol for symbol in local.formulas if symbol in placements.joint_coordinates]
+    if not known or one.counts is not None:
+        return one
+    (value,) = substitute([one.value], {local.formulas[symbol][0]: symbol for symbol in known})
+    return one if value is one.value else replace(one, value=value)
 
 
 def part_forces(
@@ -179,8 +194,7 @@ def _add_gradient(
             moved = rate_symbol(symbol) if of_velocities else symbol
             (slope,) = vjp([function], [site.graph.constant(-1.0)], [moved])
             if not slope.is_zero:
-                held, new = forces.on_joints.get(symbol), substitute([slope], mapping)[0]
-                forces.on_joints[symbol] = new if held is None else held + new
+                forces.push_joint(symbol, substitute([slope], mapping)[0])
         for name, slopes, turning in slopes_of(local, function, site.graph.constant(-1.0), of_velocities):
             _push_mapped(site, local, name, slopes, turning, mapping, forces)
 
@@ -272,6 +286,15 @@ def constraint_forces(
     for name, slopes, turning in slopes_of(local, value, site.graph.constant(1.0), of_velocities):
         pushes, twists = [slope * multiplier for slope in slopes], [slope * multiplier for slope in turning]
         _push_mapped(site, local, name, pushes, twists, mapping, forces)
+    for symbol, slope in joint_slopes(local, value):
+        forces.push_joint(symbol, substitute([slope * multiplier], mapping)[0])
+
+
+def joint_slopes(local: LocalPart, value: Expression) -> list[tuple[Expression, Expression]]:
+    """Return the derivatives of a function with respect to the joint coordinates that it depends on."""
+    read = [symbol for symbol in local.formulas if depends_on(value, [symbol])]
+    slopes = vjp([value], [value.graph.constant(1.0)], read) if read else []
+    return list(zip(read, slopes, strict=True))
 
 
 def is_on_velocities(local: LocalPart, value: Expression) -> bool:

@@ -55,7 +55,7 @@ class Placements:
     references
         Free position components of the reference point of each body.
     joint_coordinates
-        Value of each joint coordinate symbol of a joint that a body hangs on.
+        Value of each joint coordinate symbol of a joint that a body hangs on, or whose turns are counted.
     axes, quaternions
         In space: axes of each body that has an orientation, in world axes; and its quaternion, scalar part first.
     """
@@ -83,8 +83,9 @@ class Kinematics:
         axes of the body.
     reference_velocities, reference_accelerations
         Of the reference points.
-    joint_rates
-        In space: derivative of each joint coordinate of a joint that a body hangs on.
+    joint_rates, joint_accelerations
+        Derivatives of each joint coordinate of a joint that a body hangs on, or whose turns are counted; in a plane
+        only of those that other parts take hold of.
     """
 
     placements: Placements
@@ -95,6 +96,7 @@ class Kinematics:
     reference_velocities: Mapping[int, Components]
     reference_accelerations: Mapping[int, Components]
     joint_rates: Mapping[Expression, Expression] = field(default_factory=dict)
+    joint_accelerations: Mapping[Expression, Expression] = field(default_factory=dict)
 
 
 def shapes(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
-from atwood.expr import Expression, substitute
+from atwood.expr import Expression, jvp, substitute
 from atwood.mechanics.kinematics import (
     BodyShape,
     Components,
@@ -177,7 +177,7 @@ def motion_in_plane(mechanism: Mechanism, forest: Forest, shape_of: Mapping[int,
         q, u, a, time = left.coordinates, left.speeds, left.accelerations, mechanism.time
         still = _substituted(placements, solution) if solution else placements
         lifting = _substituted(movable, solution) if solution else movable
-        kinematics = differentiate(still, time, q, u, a)
+        kinematics = _with_grips(mechanism, differentiate(still, time, q, u, a), time, q, u, a)
         return _moved(
             left,
             kinematics,
@@ -185,6 +185,29 @@ def motion_in_plane(mechanism: Mechanism, forest: Forest, shape_of: Mapping[int,
         )
 
     return Motion(every, placements, finish)
+
+
+def _with_grips(
+    mechanism: Mechanism,
+    kinematics: Kinematics,
+    time: Expression,
+    q: Sequence[Expression],
+    u: Sequence[Expression],
+    a: Sequence[Expression],
+) -> Kinematics:
+    """Return kinematics with the rates of the joint coordinates that other parts take hold of."""
+    held = {symbol for local in mechanism.locals_.values() for symbol in local.formulas}
+    known = {symbol: value for symbol, value in kinematics.placements.joint_coordinates.items() if symbol in held}
+    if not known:
+        return kinematics
+    first: dict[Expression, Expression | float] = {time: 1.0, **dict(zip(q, u, strict=True))}
+    rates = jvp(list(known.values()), first)
+    seconds = jvp(rates, {**first, **dict(zip(u, a, strict=True))})
+    return replace(
+        kinematics,
+        joint_rates=dict(zip(known, rates, strict=True)),
+        joint_accelerations=dict(zip(known, seconds, strict=True)),
+    )
 
 
 def motion_in_space(mechanism: Mechanism, forest: Forest, shape_of: Mapping[int, BodyShape]) -> Motion:

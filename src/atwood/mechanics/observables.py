@@ -11,9 +11,10 @@ from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.forces import in_joint_coordinates, local_map
 from atwood.mechanics.inertia import tensor_of, turned_tensor
+from atwood.mechanics.kinematics import Kinematics
 from atwood.mechanics.orientation import NodeTurn, node_axes, spin_in_world
 from atwood.model.component import Binding
-from atwood.model.connectors import Frame, Motion
+from atwood.model.connectors import Frame, JointCoordinate, Motion
 from atwood.model.laws import BodyInertia
 from atwood.model.local import LocalPart
 from atwood.model.rotation import from_axes, to_axes
@@ -166,7 +167,11 @@ def make_binding(
     """
     path, site, kinematics, space = local.part.path, equations.site, equations.kinematics, mechanism.space
     motions = {}
+    mapping = local_map(site, local, kinematics) if local.borrowed else {}
     for name, one in local.part.component.connectors().items():
+        if isinstance(one, JointCoordinate):
+            motions[name] = _grip_in_place(local, kinematics, local.binding.motions.get(name), mapping)
+            continue
         node = site.node(path, name)
         body = site.bodies.body_of[node]
         motion = Motion(
@@ -191,6 +196,17 @@ def make_binding(
         reactions=reactions,
         energies=energies,
     )
+
+
+def _grip_in_place(
+    local: LocalPart, kinematics: Kinematics, grip: Motion | None, mapping: Mapping[Expression, Expression]
+) -> Motion:
+    """Return a joint coordinate that a part takes hold of, in terms of the state; nothing at the joint itself."""
+    if grip is None:
+        return Motion()
+    found = [grip.value, *(() if grip.rate is None else (grip.rate,))]
+    value, *rate = substitute(in_joint_coordinates(local, kinematics, found)[0], mapping)
+    return Motion(value=value, rate=rate[0] if rate else None)
 
 
 def _turned(mechanism: Mechanism, equations: Equations, motion: Motion, node: int, body: int) -> Motion:

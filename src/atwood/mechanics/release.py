@@ -13,7 +13,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar
 from atwood.mechanics.arms import arm_of
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.equations import Equations
-from atwood.mechanics.forces import Forces, constraint_forces, local_map, part_forces
+from atwood.mechanics.forces import Forces, constraint_forces, in_coordinates, local_map, part_forces
 from atwood.mechanics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.observables import Reaction
 from atwood.mechanics.orientation import inertial_torque, spin_in_world, torque_components
@@ -96,7 +96,8 @@ def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:
         for constraint in local.constraints:
             for law, index, multiplier in by_part.get(path, ()):
                 if (law, index) == (constraint.law.name, constraint.index):
-                    constraint_forces(site, local, constraint.value, multiplier, mapping, forces)
+                    held = in_coordinates(local, constraint, kinematics.placements)
+                    constraint_forces(site, local, held.value, multiplier, mapping, forces)
         for inertia in local.point_inertias:
             nodes = [site.node(path, p.name) for p in inertia.points]
             for i, node in enumerate(nodes):

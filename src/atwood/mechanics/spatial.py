@@ -303,6 +303,8 @@ def move_in_space(
         walk.spread(body, attachment.node, start)
         if joint is None:
             walk.references[body.index] = center
+    for symbol, (number, _) in forest.counted.items():
+        walk.known[symbol] = course.values[number]
     return _gathered(walk)
 
 
@@ -319,6 +321,7 @@ def _gathered(walk: _Walk) -> tuple[Kinematics, tuple[dict[int, Components], dic
         x, y, z = (Vector(*components(axis)) for axis in axes)
         return x, y, z
 
+    joint_rates, joint_accelerations = walk.course.differentiated(list(walk.known.values()))
     placements = Placements(
         all_of(walk.nodes, "position"),
         {},
@@ -335,6 +338,7 @@ def _gathered(walk: _Walk) -> tuple[Kinematics, tuple[dict[int, Components], dic
         {i: components(one.spin_rate) for i, one in walk.turnings.items()},
         all_of(walk.references, "velocity"),
         all_of(walk.references, "acceleration"),
-        dict(zip(walk.known, walk.course.differentiated(list(walk.known.values()))[0], strict=True)),
+        dict(zip(walk.known, joint_rates, strict=True)),
+        dict(zip(walk.known, joint_accelerations, strict=True)),
     )
     return kinematics, (all_of(walk.nodes, "lifted"), all_of(walk.references, "lifted"))

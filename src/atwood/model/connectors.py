@@ -17,7 +17,20 @@ from atwood.model.vector import Vector, dot
 if TYPE_CHECKING:
     from atwood.model.component import Component
 
-__all__ = ["Connector", "ConnectorSpec", "Frame", "Groove", "InputRef", "Motion", "OutputRef", "Point", "connector"]
+__all__ = [
+    "Connector",
+    "ConnectorSpec",
+    "Frame",
+    "Groove",
+    "InputRef",
+    "JointCoordinate",
+    "Motion",
+    "OutputRef",
+    "Point",
+    "Shaft",
+    "Slide",
+    "connector",
+]
 
 
 @dataclass(frozen=True)
@@ -36,9 +49,11 @@ class Motion:
         Of the frame, in world axes.
     spin
         Angular velocity along the frame's own axes, in space; None where it follows from the two above.
+    value, rate
+        Of a joint's coordinate, for a `Shaft` or a `Slide`.
     """
 
-    position: Vector
+    position: Vector | None = None
     velocity: Vector | None = None
     acceleration: Vector | None = None
     axes: tuple[Vector, Vector, Vector] | None = None
@@ -46,6 +61,8 @@ class Motion:
     angular_velocity: Vector | None = None
     angular_acceleration: Vector | None = None
     spin: Vector | None = None
+    value: Scalar = None
+    rate: Scalar = None
 
 
 class Connector:
@@ -182,15 +199,58 @@ class Groove(Point):
     __slots__ = ()
 
 
+class JointCoordinate(Connector):
+    """The coordinate of a joint, where gears take hold of it: a `Shaft` turns, a `Slide` moves along.
+
+    Joints offer them, and other parts are connected to them, each to one joint's.
+    """
+
+    __slots__ = ()
+
+    @property
+    def value(self) -> Scalar:
+        """The coordinate; an angle counts its turns."""
+        return self._read("value")
+
+    @property
+    def rate(self) -> Scalar:
+        """The rate of the coordinate."""
+        return self._read("rate")
+
+
+class Shaft(JointCoordinate):
+    """The angle of frame b of a joint from frame a, and the torque about it."""
+
+    across: ClassVar[Mapping[str, str]] = {"value": "rad"}
+    through: ClassVar[Mapping[str, str]] = {"torque": "N*m"}
+    family: ClassVar[str] = "shaft"
+    __slots__ = ()
+
+
+class Slide(JointCoordinate):
+    """The displacement of frame b of a joint from frame a, and the force along it."""
+
+    across: ClassVar[Mapping[str, str]] = {"value": "m"}
+    through: ClassVar[Mapping[str, str]] = {"force": "N"}
+    family: ClassVar[str] = "slide"
+    __slots__ = ()
+
+
 class ConnectorSpec:
     """The declaration of a connector in a class body; see `connector`."""
 
     def __init__(
-        self, kind: type[Connector], doc: str, count: str | None, when: Mapping[str, Sequence[str]] | None = None
+        self,
+        kind: type[Connector],
+        doc: str,
+        count: str | None,
+        when: Mapping[str, Sequence[str]] | None = None,
+        of: str = "",
     ) -> None:
         self.kind = kind
         self.doc = doc
         self.count = count
+        self.of = of
         self.when = dict(when or {})
         self.name = ""
 
@@ -234,6 +294,7 @@ def connector(
     *,
     count: str | None = None,
     when: Mapping[str, Sequence[str]] | None = None,
+    of: str = "",
     init: Literal[False] = False,
 ) -> Any:
     """Declare a connector in the class body of a component.
@@ -241,17 +302,19 @@ def connector(
     Parameters
     ----------
     kind
-        `Point`, `Frame` or `Groove`.
+        `Point`, `Frame`, `Groove`, `Shaft` or `Slide`.
     doc
         One line that says where it is.
     count
         Name of the integer parameter that says how many there are; then it is a tuple of connectors.
     when
         For a connector that is there only if asked for: names of choice parameters, each with the values that ask.
+    of
+        For a `Shaft` or a `Slide` that a joint offers: name of the joint coordinate that it is.
     """
     if not doc.strip():
         raise DeclarationError("a connector needs one line that says where it is")
-    return ConnectorSpec(kind, doc, count, when)
+    return ConnectorSpec(kind, doc, count, when, of)
 
 
 @dataclass(frozen=True)

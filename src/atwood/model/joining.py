@@ -139,7 +139,7 @@ def check_ends(a: Any, b: Any, path_a: str, path_b: str) -> None:
     if kind_a.family != kind_b.family:
         raise ConnectError(
             f"{path_a} is a {kind_a.__name__} and {path_b} is a {kind_b.__name__}; they are unlike and cannot meet",
-            advice="A Groove takes a rope's bend; points and frames meet each other.",
+            advice="A Groove takes a rope's bend, a Shaft or a Slide a gear; points and frames meet each other.",
         )
 
 

@@ -7,18 +7,20 @@ says by itself which connectors it depends on, and whose derivatives are the for
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError
 from atwood.expr import Expression, Graph, Scalar, depends_on
 from atwood.model.component import Binding, bind
-from atwood.model.connectors import Frame, Motion
+from atwood.model.connectors import Frame, JointCoordinate, Motion
 from atwood.model.fields import ParameterSpec
 from atwood.model.flatten import FlatScene, Part
-from atwood.model.laws import BodyInertia, Law, Load, Placement, PointInertia, scalars
-from atwood.model.rotation import Axes
+from atwood.model.grips import counting_constraints, find_grips, formulas_of
+from atwood.model.laws import BodyInertia, Law, Placement, PointInertia, scalars
+from atwood.model.local_parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart
+from atwood.model.shafts import Held, find_held
 from atwood.model.space import FIXED_AXES, Space, planar_axes
 from atwood.model.vector import Vector
 
@@ -40,97 +42,6 @@ class ParameterTable:
         symbol = self.graph.parameter(name)
         self.values[symbol] = float(value)
         return symbol
-
-
-@dataclass(frozen=True)
-class LocalConnector:
-    """The symbols that stand for what one connector knows.
-
-    Attributes
-    ----------
-    position, velocity
-        One symbol for each free position component of the space.
-    angle, angular_speed
-        Rotation in the plane and its rate, for a frame in the plane; else None.
-    axes, angular_velocity
-        The frame's axes and its angular velocity, in world axes, for a frame in space; else None.
-    """
-
-    position: tuple[Expression, ...]
-    velocity: tuple[Expression, ...]
-    angle: Expression | None = None
-    angular_speed: Expression | None = None
-    axes: Axes | None = None
-    angular_velocity: Vector | None = None
-
-    @property
-    def orientation(self) -> tuple[Expression, ...]:
-        """The symbols that say how it is turned."""
-        if self.axes is not None:
-            return tuple(component for axis in self.axes for component in axis)
-        return () if self.angle is None else (self.angle,)
-
-    @property
-    def spin(self) -> tuple[Expression, ...]:
-        """The symbols that say how fast it turns."""
-        if self.angular_velocity is not None:
-            return tuple(self.angular_velocity)
-        return () if self.angular_speed is None else (self.angular_speed,)
-
-
-@dataclass(frozen=True)
-class LocalJoint:
-    """A joint law: its coordinates as symbols, the placement they give, and in space the axes of both its frames."""
-
-    law: Law
-    coordinates: tuple[Expression, ...]
-    placement: Placement
-    axes: tuple[Axes, ...] = ()
-
-
-@dataclass(frozen=True)
-class LocalConstraint:
-    """One scalar that must stay zero: its law, its number there, its reaction's name and sign."""
-
-    law: Law
-    index: int
-    value: Expression
-    reaction: str
-    sign: float
-
-
-@dataclass(frozen=True)
-class LocalPart:
-    """What one part contributes, on its local symbols.
-
-    Attributes
-    ----------
-    part
-        The leaf.
-    binding
-        What the laws were evaluated on.
-    connectors
-        Symbols by connector name.
-    joints, point_inertias, body_inertias, potentials, dissipations, loads, constraints
-        What its laws returned.
-    signal_symbols
-        Stand-ins for inputs that are linked to an output.
-    formulas
-        In space, for the symbol of each joint coordinate, the formulas of the observable of its name and of its rate.
-    """
-
-    part: Part
-    binding: Binding
-    connectors: Mapping[str, LocalConnector]
-    joints: tuple[LocalJoint, ...]
-    point_inertias: tuple[PointInertia, ...]
-    body_inertias: tuple[BodyInertia, ...]
-    potentials: tuple[Expression, ...]
-    dissipations: tuple[Expression, ...]
-    loads: tuple[Load, ...]
-    constraints: tuple[LocalConstraint, ...]
-    signal_symbols: Mapping[str, Expression]
-    formulas: Mapping[Expression, tuple[Expression, Expression | None]] = field(default_factory=dict)
 
 
 def localize(
@@ -164,7 +75,13 @@ def localize(
     AtwoodError
         If a law cannot be evaluated; it names the part and the law.
     """
-    return {path: _localize_part(part, flat, space, time, table, modes, sides) for path, part in flat.parts.items()}
+    held = find_held(flat)
+    found: dict[str, LocalPart] = {}
+    for path in sorted(flat.parts, key=lambda path: path in held):  # joints before what takes hold of them
+        taken = [(one, found[one.joint]) for one in held.get(path, ())]
+        counted = {one.coordinate for several in held.values() for one in several if one.joint == path}
+        found[path] = _localize_part(flat.parts[path], flat, space, time, table, modes, sides, taken, counted)
+    return {path: found[path] for path in flat.parts}
 
 
 def _localize_part(
@@ -175,6 +92,8 @@ def _localize_part(
     table: ParameterTable,
     modes: Mapping[str, str],
     sides: Mapping[tuple[str, str, str], float] | None,
+    taken: Sequence[tuple[Held, LocalPart]],
+    counted: Collection[str],
 ) -> LocalPart:
     graph, component = table.graph, part.component
     values = {name: _parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
@@ -184,15 +103,22 @@ def _localize_part(
     connectors = {
         name: _local_connector(f"{part.path}.{name}", isinstance(one, Frame), space, graph)
         for name, one in component.connectors().items()
+        if not isinstance(one, JointCoordinate)
     }
+    grips = find_grips(taken, graph)
     binding = Binding(
         values=values,
-        motions={name: local_motion(symbols, space) for name, symbols in connectors.items()},
+        motions={
+            **{name: local_motion(symbols, space) for name, symbols in connectors.items()},
+            **{one.connector: Motion(value=one.value, rate=one.rate) for one in grips},
+        },
         time=time,
         space=space.name,
         line=space.line,
         sides=None if sides is None else {(a, b): s for (path, a, b), s in sides.items() if path == part.path},
     )
+    for one in grips:
+        connectors.update(one.connectors)
     bound = bind(component, binding)
     mode = modes.get(part.path, component.modes[0] if component.modes else "")
 
@@ -207,6 +133,8 @@ def _localize_part(
     _check_reads(part, connectors, potentials, dissipations)
     inertias = [one for law in laws("inertia") for one in _call(part, law, functools.partial(_listed, bound, law))]
     joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws("joint"))
+    own = [symbol for joint in joints for symbol in joint.coordinates]
+    formulas = formulas_of(part, bound, own, graph) if space.name == "space" else {}
     return LocalPart(
         part=part,
         binding=binding,
@@ -217,28 +145,14 @@ def _localize_part(
         potentials=potentials,
         dissipations=dissipations,
         loads=tuple(one for law in laws("force") for one in _call(part, law, functools.partial(_listed, bound, law))),
-        constraints=tuple(one for law in laws("constraint") for one in _local_constraints(part, law, bound, graph)),
+        constraints=(
+            *(one for law in laws("constraint") for one in _local_constraints(part, law, bound, graph)),
+            *counting_constraints(part, counted, formulas, graph),
+        ),
         signal_symbols=signal_symbols,
-        formulas=_formulas(part, bound, joints, graph) if space.name == "space" else {},
+        formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in grips}},
+        borrowed={full: end for one in grips for full, end in one.borrowed.items()},
     )
-
-
-def _formulas(
-    part: Part, bound: Any, joints: Iterable[LocalJoint], graph: Graph
-) -> dict[Expression, tuple[Expression, Expression | None]]:
-    """Return what the coordinates of joints, and their rates, are in terms of connectors."""
-    laws = {law.name: law for law in part.component.laws("observable")}
-
-    def formula(name: str) -> Expression:
-        return graph.convert(_call(part, laws[name], getattr(bound, name)))
-
-    found = {}
-    for joint in joints:
-        for name, symbol in zip(joint.law.options.coordinates, joint.coordinates, strict=True):
-            if name in laws and laws[name].holds_in("space"):
-                rate = laws[name].options.rate
-                found[symbol] = formula(name), formula(rate) if rate in laws else None
-    return found
 
 
 def _scalar(bound: Any, law: Law, graph: Graph) -> Expression:

@@ -145,7 +145,7 @@ def _orientations(
                 needed.add(body(load.at.name))
         for name in [*_angles_read(local, plain), *_measured(local)]:
             needed.add(body(name))
-        for law in dict.fromkeys(constraint.law.name for constraint in local.constraints):
+        for law in dict.fromkeys(one.law.name for one in local.constraints if one.counts is None):
             rows = [constraint for constraint in local.constraints if constraint.law.name == law]
             turned = {body(name) for name in _angles_read(local, [one.value for one in rows])} - {0}
             if any(reads_position(local, one) for one in rows):

@@ -8,10 +8,11 @@ bodies are attached greedily, the cheapest way first, and a body waits while a c
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from atwood.errors import DeclarationError
+from atwood.expr import Expression
 from atwood.model.local import LocalPart
 from atwood.model.space import Space
 from atwood.topology.bodies import Bodies, reads_position
@@ -124,6 +125,8 @@ class Forest:
         How many independent loops the joints make.
     cuts
         Joints that no body hangs on.
+    counted
+        Numbers of coordinates, and of their speeds, that only count the turns of a joint, by its coordinate's symbol.
     """
 
     form: Literal["reduced", "dae"]
@@ -135,6 +138,7 @@ class Forest:
     solved: frozenset[tuple[str, str, int]]
     loops: int
     cuts: tuple[Joint, ...]
+    counted: Mapping[Expression, tuple[int, int]] = field(default_factory=dict)
 
 
 def grow_forest(
@@ -169,6 +173,7 @@ def grow_forest(
             by_position = reads_position(local, constraint)
             if id(joint) in hung if by_position else id(joint) in locked:
                 solved.add((joint.part, constraint.law.name, constraint.index))
+    counted = grower.count_turns(solved)
     pairs = [(bodies.body_of[joint.a], bodies.body_of[joint.b]) for joint in joints]
     numbers = range(len(bodies.bodies))
     loops = len(pairs) - len(numbers) + len(connected_groups(numbers, pairs))
@@ -183,6 +188,7 @@ def grow_forest(
         frozenset(solved),
         loops,
         cuts,
+        counted,
     )
 
 
@@ -201,6 +207,7 @@ class _Grower:
         self.attachments: list[Attachment] = []
         self.orientations: list[OrientationStep] = []
         self.placed: dict[int, int] = {0: 0}  # body -> depth
+        self.told: set[Expression] = set()  # coordinates of joints that bodies hang on
 
     def attach_by_joints(self, joints: list[Joint]) -> None:
         """Hang bodies on joints, the cheapest way first."""
@@ -265,6 +272,7 @@ class _Grower:
         for symbol in joint.local.coordinates if follows else joint.moves:
             if symbol in joint.turns and not in_space:
                 continue
+            self.told.add(symbol)
             numbers.append(self._coordinate(symbol.name, _unit_of(self.locals[joint.part], symbol.name)))
         chart, spin = self._chart(child) if in_space and oriented and not follows else ((), ())
         node, other = (joint.a, joint.b) if backwards else (joint.b, joint.a)
@@ -348,6 +356,32 @@ class _Grower:
         # Bodies that need no orientation still have one for those who ask, where a lock tells it.
         spread(None)
         return locked
+
+    def count_turns(self, solved: set[tuple[str, str, int]]) -> dict[Expression, tuple[int, int]]:
+        """Give coordinates to joints whose turns gears count and that nothing hangs on; add what needs none to solved.
+
+        Parameters
+        ----------
+        solved
+            Constraints that hold whatever the coordinates are.
+        """
+        counted: dict[Expression, tuple[int, int]] = {}
+        wanted = {
+            symbol
+            for path, local in self.locals.items()
+            if local.borrowed
+            and any((path, one.law.name, one.index) not in solved for one in local.constraints)
+            for symbol in local.formulas
+        }
+        for path, local in self.locals.items():
+            for one in local.constraints:
+                if one.counts is None:
+                    continue
+                if one.counts in self.told or one.counts not in wanted:
+                    solved.add((path, one.law.name, one.index))
+                else:
+                    counted[one.counts] = self._coordinate(one.counts.name, _unit_of(local, one.counts.name))
+        return counted
 
     def _order_of_angles(self) -> list[int]:
         return [one.body for one in self.attachments]

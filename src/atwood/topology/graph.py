@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from atwood.errors import ConnectError, DeclarationError, suggestion
 from atwood.expr import Expression, depends_on
-from atwood.model.connectors import Frame
+from atwood.model.connectors import Frame, JointCoordinate
 from atwood.model.flatten import FlatScene
 from atwood.model.local import LocalJoint, LocalPart
 from atwood.model.rotation import FREE, Rotation
@@ -137,6 +137,8 @@ def build_graph(flat: FlatScene, locals_: Mapping[str, LocalPart]) -> MechanismG
         If a connection names a connector that does not exist.
     """
     nodes, node_of = _nodes(flat)
+    for path, local in locals_.items():
+        node_of.update({(path, full): node_of[end] for full, end in local.borrowed.items()})
     joints = tuple(_joint(path, local, joint, node_of) for path, local in locals_.items() for joint in local.joints)
     return MechanismGraph(nodes, node_of, joints)
 
@@ -145,21 +147,26 @@ def _nodes(flat: FlatScene) -> tuple[tuple[Node, ...], dict[tuple[str, str], int
     owners: dict[str, tuple[str, str]] = {}
     frames: set[str] = set()
     meeting: dict[str, None] = {}
+    grips: set[str] = set()
     for path, part in flat.parts.items():
         for name, one in part.component.connectors().items():
             full = f"{path}.{name}"
+            if isinstance(one, JointCoordinate):
+                grips.add(full)
+                continue
             owners[full] = (path, name)
             meeting[full] = None
             if isinstance(one, Frame):
                 frames.add(full)
-    for a, b in flat.connections:
+    connections = [pair for pair in flat.connections if grips.isdisjoint(pair)]
+    for a, b in connections:
         for end in (a, b):
             # A connector of a nested model is no leaf's: it only passes the connection on.
             if end not in owners and end.rpartition(".")[0] in flat.parts:
                 raise ConnectError("there is no such connector", where=end, advice=suggestion(end, owners))
         meeting |= {a: None, b: None}
-    met = connected_groups(meeting, flat.connections)
-    _check_frames(met, flat.connections, frames, set(owners) - frames)
+    met = connected_groups(meeting, connections)
+    _check_frames(met, connections, frames, set(owners) - frames)
     nodes = [Node(WORLD, "world", (), True)]
     node_of: dict[tuple[str, str], int] = {}
     order = {name: i for i, name in enumerate(owners)}

@@ -240,7 +240,7 @@ def _shapes(mechanism: Mechanism) -> list[Shape]:
 
 def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]:
     """Return what a part looks like, from what its laws do."""
-    kinds = local.part.component.connectors()
+    kinds = {name: one for name, one in local.part.component.connectors().items() if name in local.connectors}
     nodes = {name: mechanism.graph.node_of[path, name] for name in kinds}
     ends = [nodes[name] for name, one in kinds.items() if not isinstance(one, Groove)]
     grooves = [nodes[name] for name, one in kinds.items() if isinstance(one, Groove)]

@@ -1,0 +1,29 @@
+"""Gear: a fixed ratio between the angles of two joints."""
+
+from __future__ import annotations
+
+from atwood import Component, Scalar, Shaft, connector, constraint, observable, parameter
+
+
+class Gear(Component):
+    """An ideal gear between two joints that turn: hinges, screws, or any other with a shaft.
+
+    ``angle_a = ratio * angle_b + offset``, with the angles of the two joints, turns counted. For two outer wheels on
+    one carrier the ratio is minus the teeth of b over the teeth of a; for an inner wheel, or a belt, it is positive.
+    It passes torques on to both frames of both joints, without loss.
+    """
+
+    ratio: float = parameter(-1.0, doc="Turns of joint a for one turn of joint b; negative for outer wheels.")
+    offset: float = parameter(0.0, unit="rad", doc="Angle of joint a where that of joint b is zero.")
+    a: Shaft = connector(Shaft, "The angle of one joint.")
+    b: Shaft = connector(Shaft, "The angle of the other joint.")
+
+    @constraint(reaction="torque_a", unit="N*m", doc="Torque of the gear on frame b of joint a, about its axis.")
+    def mesh(self) -> Scalar:
+        """Return by how much the angles are out of their ratio."""
+        return self.a.value - self.ratio * self.b.value - self.offset
+
+    @observable(unit="N*m", doc="Torque of the gear on frame b of joint b, about its axis.")
+    def torque_b(self) -> Scalar:
+        """Return the torque, which does the opposite work."""
+        return -(self.ratio * self.reaction("torque_a"))

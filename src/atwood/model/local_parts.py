@@ -1,0 +1,114 @@
+"""What a part contributes, on symbols of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from atwood.expr import Expression
+from atwood.model.binding import Binding
+from atwood.model.flatten import Part
+from atwood.model.laws import BodyInertia, Law, Load, Placement, PointInertia
+from atwood.model.rotation import Axes
+from atwood.model.vector import Vector
+
+__all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart"]
+
+
+@dataclass(frozen=True)
+class LocalConnector:
+    """The symbols that stand for what one connector knows.
+
+    Attributes
+    ----------
+    position, velocity
+        One symbol for each free position component of the space.
+    angle, angular_speed
+        Rotation in the plane and its rate, for a frame in the plane; else None.
+    axes, angular_velocity
+        The frame's axes and its angular velocity, in world axes, for a frame in space; else None.
+    """
+
+    position: tuple[Expression, ...]
+    velocity: tuple[Expression, ...]
+    angle: Expression | None = None
+    angular_speed: Expression | None = None
+    axes: Axes | None = None
+    angular_velocity: Vector | None = None
+
+    @property
+    def orientation(self) -> tuple[Expression, ...]:
+        """The symbols that say how it is turned."""
+        if self.axes is not None:
+            return tuple(component for axis in self.axes for component in axis)
+        return () if self.angle is None else (self.angle,)
+
+    @property
+    def spin(self) -> tuple[Expression, ...]:
+        """The symbols that say how fast it turns."""
+        if self.angular_velocity is not None:
+            return tuple(self.angular_velocity)
+        return () if self.angular_speed is None else (self.angular_speed,)
+
+
+@dataclass(frozen=True)
+class LocalJoint:
+    """A joint law: its coordinates as symbols, the placement they give, and in space the axes of both its frames."""
+
+    law: Law
+    coordinates: tuple[Expression, ...]
+    placement: Placement
+    axes: tuple[Axes, ...] = ()
+
+
+@dataclass(frozen=True)
+class LocalConstraint:
+    """One scalar that must stay zero: its law, its number there, its reaction's name and sign.
+
+    One that `counts` gives a joint coordinate its value, turns counted, where nothing hangs on the joint.
+    """
+
+    law: Law
+    index: int
+    value: Expression
+    reaction: str
+    sign: float
+    counts: Expression | None = None
+
+
+@dataclass(frozen=True)
+class LocalPart:
+    """What one part contributes, on its local symbols.
+
+    Attributes
+    ----------
+    part
+        The leaf.
+    binding
+        What the laws were evaluated on.
+    connectors
+        Symbols by connector name.
+    joints, point_inertias, body_inertias, potentials, dissipations, loads, constraints
+        What its laws returned.
+    signal_symbols
+        Stand-ins for inputs that are linked to an output.
+    formulas
+        For the symbol of each joint coordinate, the formulas of the observable of its name and of its rate: in space
+        of the part's own, and everywhere of those that it takes hold of.
+    borrowed
+        Connectors of joints that it takes hold of, which are among its own under their full paths.
+    """
+
+    part: Part
+    binding: Binding
+    connectors: Mapping[str, LocalConnector]
+    joints: tuple[LocalJoint, ...]
+    point_inertias: tuple[PointInertia, ...]
+    body_inertias: tuple[BodyInertia, ...]
+    potentials: tuple[Expression, ...]
+    dissipations: tuple[Expression, ...]
+    loads: tuple[Load, ...]
+    constraints: tuple[LocalConstraint, ...]
+    signal_symbols: Mapping[str, Expression]
+    formulas: Mapping[Expression, tuple[Expression, Expression | None]] = field(default_factory=dict)
+    borrowed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
