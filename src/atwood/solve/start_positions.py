@@ -78,7 +78,7 @@ def solve_positions(
     rough = q
     system = System(assembly, equations, level.fixed, True)
     q, missing, matrix = newton(system, scales, t, q)
-    if missing.size and (not _is_met(missing) or wrongly_turned(assembly, equations, t, q)):
+    if not _is_met(missing) or wrongly_turned(assembly, equations, t, q):
         failed = Failed(assembly, equations, level, scales, length, t, rough, q, missing)
         q, matrix = _elsewhere(failed, system)
     tangent = None if turning.is_plain else turning.tangent(t, q)
