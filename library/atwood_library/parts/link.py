@@ -11,6 +11,7 @@ from atwood import (
     Placement,
     Scalar,
     Vector,
+    atan2,
     connector,
     cross,
     inertia,
@@ -57,15 +58,28 @@ class Link(Component):
         """Place b in the axes of a."""
         return Placement(Vector(self.length, 0.0, 0.0), 0.0, axes="a")
 
-    @observable(unit="rad", doc="Angle of the x axis, counter-clockwise.", spaces=("plane",))
+    @observable(
+        unit="rad",
+        doc="Angle of the x axis as seen along y, counter-clockwise.",
+        periodic=True,
+        rate="angular_velocity",
+        spaces=("plane", "space"),
+    )
     def angle(self) -> Scalar:
         """Return the angle."""
-        return self.a.angle
+        if not self.in_space:
+            return self.a.angle
+        x = self.a.axes[0]
+        return atan2(x.z, x.x)
 
-    @observable(unit="rad/s", doc="Rate of the angle.", spaces=("plane",))
+    @observable(unit="rad/s", doc="Rate of the angle.", spaces=("plane", "space"))
     def angular_velocity(self) -> Scalar:
         """Return the rate of the angle; the rotation is about -y."""
-        return -self.a.angular_velocity.y
+        if not self.in_space:
+            return -self.a.angular_velocity.y
+        x = self.a.axes[0]
+        rate = cross(self.a.angular_velocity, x)
+        return (x.x * rate.z - x.z * rate.x) / (x.x * x.x + x.z * x.z)
 
     @observable(unit="m", doc="Position of the centre of mass in world axes.")
     def position(self) -> Vector:

@@ -29,7 +29,8 @@ class Rod(Component):
 
     Without mass it only carries a tension. With mass it is uniform and slender; its kinetic energy in terms of the
     velocities of its ends is ``m/6 (v_a^2 + v_a.v_b + v_b^2)`` (the integral of ``1/2 v^2`` over its length, in
-    which the velocity is linear). The angle is zero when b hangs straight below a, and counter-clockwise.
+    which the velocity is linear). The angle is zero when b hangs straight below a, and counter-clockwise; in space it is
+    that of the rod as seen along y.
     """
 
     length: float = parameter(1.0, unit="m", above=0.0, doc="Length.")
@@ -71,16 +72,16 @@ class Rod(Component):
         doc="Angle from the downward vertical, counter-clockwise.",
         periodic=True,
         rate="angular_velocity",
-        spaces=("plane",),
+        spaces=("plane", "space"),
     )
     def angle(self) -> Scalar:
         """Return the angle."""
         r = self.b.position - self.a.position
         return atan2(r.x, -r.z)
 
-    @observable(unit="rad/s", doc="Rate of the angle.", spaces=("plane",))
+    @observable(unit="rad/s", doc="Rate of the angle.", spaces=("plane", "space"))
     def angular_velocity(self) -> Scalar:
-        """Return ``(r x v) / r^2``."""
+        """Return ``(r x v) / r^2``, of the components along x and z."""
         r = self.b.position - self.a.position
         v = self.b.velocity - self.a.velocity
-        return (r.x * v.z - r.z * v.x) / dot(r, r)
+        return (r.x * v.z - r.z * v.x) / (r.x * r.x + r.z * r.z)

@@ -9,6 +9,7 @@ from atwood.reporting.mechanism import (
     ParameterEntry,
     report,
 )
+from atwood.reporting.offers import Offer
 
 __all__ = [
     "BodyEntry",
@@ -16,6 +17,7 @@ __all__ = [
     "JointEntry",
     "MechanismReport",
     "MergedPart",
+    "Offer",
     "ParameterEntry",
     "report",
 ]

@@ -11,6 +11,7 @@ import numpy as np
 from atwood.forms.assembly import Assembly
 from atwood.model.composite import Model
 from atwood.pipeline import assemble, assemble_flat
+from atwood.reporting.offers import Offer, find_offers
 from atwood.reporting.parts import (
     BodyEntry,
     DroppedPart,
@@ -91,6 +92,8 @@ class MechanismReport:
         Length of the solver's vector, by form.
     operations
         Operations of one residual, by form and kind.
+    offers
+        In space: the plane and the line that the motion stays in by symmetry, and what it would cost there.
     parameters
         All parameters.
     """
@@ -122,6 +125,7 @@ class MechanismReport:
     immobile: Immobile | None
     states: Mapping[str, int]
     operations: Mapping[str, Mapping[str, int]]
+    offers: tuple[Offer, ...]
     parameters: tuple[ParameterEntry, ...]
 
     def __str__(self) -> str:
@@ -168,6 +172,7 @@ class MechanismReport:
             "immobile": None if self.immobile is None else self.immobile.to_dict(),
             "states": dict(self.states),
             "operations": {form: dict(counts) for form, counts in self.operations.items()},
+            "offers": [one.to_dict() for one in self.offers],
             "masses": {one.path: one.mass for one in self.bodies},
             "merged_into": {one.path: one.into for one in self.merged},
             "dropped_because": {one.path: one.why for one in self.dropped},
@@ -242,6 +247,7 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
         immobile=find_immobile(reduced, len(reduced.reduced.speeds) - plans["reduced"].finding.rank, start),
         states={form: plan.program.size for form, plan in plans.items()},
         operations={form: plan.program.operations for form, plan in plans.items()},
+        offers=find_offers(reduced, start),
         parameters=list_parameters(reduced, None if isinstance(scene, Assembly) else scene),
     )
 

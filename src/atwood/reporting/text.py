@@ -98,6 +98,7 @@ def facts(report: MechanismReport) -> Iterator[tuple[str, str]]:
     yield from _loops(report)
     yield from _warnings(report)
     yield from _forms(report)
+    yield from _offers(report)
 
 
 def _what_became(report: MechanismReport) -> Iterator[tuple[str, str]]:
@@ -157,6 +158,22 @@ def _forms(report: MechanismReport) -> Iterator[tuple[str, str]]:
         counts = report.operations[form]
         total = count_of(sum(counts.values()), "operation")
         yield f"{form} form", f"{count_of(states, 'state')}{notes[form]}; {total}{_kinds(counts)} a residual"
+
+
+def _offers(report: MechanismReport) -> Iterator[tuple[str, str]]:
+    """Say where the motion stays by symmetry, and of the smallest space what it would save."""
+    ready = [one for one in report.offers if one.states]
+    for one in ready[:1]:
+        forms = []
+        for form, states in one.states.items():
+            there, here = (sum(of[form].values()) for of in (one.operations, report.operations))
+            forms.append(
+                f"{form} form {count_of(states, 'state')} instead of {report.states[form]}, "
+                f"{count_of(there, 'operation')} instead of {here}"
+            )
+        yield "symmetry", f"the motion stays {one.where}; with space={one.space!r} it would have: {'; '.join(forms)}"
+    for one in [] if ready else report.offers:
+        yield "symmetry", f"the motion stays {one.where}, where the scene cannot be assembled: {one.why_not}"
 
 
 def _kinds(counts: object) -> str:

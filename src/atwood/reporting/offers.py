@@ -1,0 +1,209 @@
+"""What a scene in space would save in a plane or on a line, where by symmetry its motion stays there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import AtwoodError
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.orientation import node_axes
+from atwood.model.flatten import FlatScene
+from atwood.pipeline import assemble_flat
+from atwood.solve.balance import balance_of, independent_rows
+from atwood.solve.problem import make_plan
+from atwood.solve.start import Start, find_start, own_state
+from atwood.solve.symmetry import Symmetry, find_symmetries
+
+__all__ = ["Offer", "find_offers"]
+
+FloatArray = NDArray[np.float64]
+
+_SAME = 1e-8
+"""Relative to the scene's sizes: how well place, speed and acceleration at the start must agree in both spaces."""
+
+_CARRIED = (
+    *("position.x", "position.z", "velocity.x", "velocity.z", "displacement", "speed"),
+    *("angle", "angular_velocity", "angular_velocity.y"),
+)
+"""Quantities that mean the same in both spaces and are handed on as guesses."""
+
+
+@dataclass(frozen=True, eq=False)
+class Offer:
+    """Where a motion in space stays by symmetry, and what it would cost to compute it there.
+
+    Attributes
+    ----------
+    space
+        ``"plane"`` or ``"line"``.
+    where
+        Which one, in words.
+    direction
+        Unit normal of the plane, or unit vector along the line, in world axes.
+    states, operations
+        Of the scene there, by form: length of the solver's vector, and operations of one residual. Empty where the
+        scene could not be assembled there.
+    why_not
+        Why it could not be; empty if it was.
+    assembly
+        The scene there in the reduced form, ready to be simulated; None where it could not be assembled.
+    """
+
+    space: str
+    where: str
+    direction: tuple[float, float, float]
+    states: Mapping[str, int] = field(default_factory=dict)
+    operations: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    why_not: str = ""
+    assembly: Assembly | None = field(default=None, repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the offer as plain data."""
+        return {
+            "space": self.space,
+            "where": self.where,
+            "direction": list(self.direction),
+            "states": dict(self.states),
+            "operations": {form: dict(counts) for form, counts in self.operations.items()},
+            "why_not": self.why_not,
+        }
+
+
+def find_offers(assembly: Assembly, start: Start) -> tuple[Offer, ...]:
+    """Return where the motion of a scene in space stays by symmetry: on a line, in a plane, or neither.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    start
+        Its start.
+    """
+    return tuple(_offer(assembly, start, one) for one in find_symmetries(assembly, start))
+
+
+def _offer(assembly: Assembly, start: Start, found: Symmetry) -> Offer:
+    x, y, z = (float(component) for component in found.direction)
+    offer = Offer(found.space, found.name, (x, y, z))
+    if found.space == "plane" and (x, y, z) != (0.0, 1.0, 0.0):
+        return replace(offer, why_not="a scene in a plane lies in the plane x-z")
+    try:
+        reduced, plans = _assemble_there(assembly, start, found)
+    except AtwoodError as error:
+        return replace(offer, why_not=str(error).splitlines()[0])
+    gap = _gap(assembly, start, reduced, found)
+    if not gap < _SAME:
+        return replace(offer, why_not="its start could not be carried over")
+    states = {form: plan[0] for form, plan in plans.items()}
+    return replace(offer, states=states, operations={form: plan[1] for form, plan in plans.items()}, assembly=reduced)
+
+
+def _assemble_there(
+    assembly: Assembly, start: Start, found: Symmetry
+) -> tuple[Assembly, dict[str, tuple[int, dict[str, int]]]]:
+    """Return the scene in a plane or on a line, and of each form its states and operations."""
+    flat = assembly.flat
+    axis = found.direction if found.space == "line" else np.array(flat.line_axis)
+    there = replace(
+        flat,
+        space=found.space,
+        line_axis=(float(axis[0]), float(axis[1]), float(axis[2])),
+        start={},
+        guess=_carried(assembly, start) if found.space == "line" else {},
+    )
+    known = assemble_flat(there, modes=assembly.modes).start_observables
+    moved = _with_start(assembly, start, there, known)
+    plans = {}
+    for form in ("reduced", "dae"):
+        made = assemble_flat(moved, form=form, level=assembly.level or "ggl", modes=assembly.modes)
+        begun = find_start(made)
+        span = max(flat.t_end - begun.time, 1e-3)
+        program = make_plan(made, begun.time, *own_state(made, begun), begun.length, span).program
+        plans[form] = program.size, program.operations
+    return assemble_flat(moved, modes=assembly.modes), plans
+
+
+def _with_start(assembly: Assembly, start: Start, there: FlatScene, known: Mapping[str, object]) -> FlatScene:
+    """Return the scene with what its start says there: what has a meaning, and guesses for the rest."""
+    kept = {path: value for path, value in assembly.flat.start.items() if _is_free(known, path)}
+    guess = {path: value for path, value in assembly.flat.guess.items() if _is_free(known, path)}
+    guess.update({path: value for path, value in _carried(assembly, start).items() if _is_free(known, path)})
+    return replace(there, start=kept, guess={path: value for path, value in guess.items() if path not in kept})
+
+
+def _is_free(known: Mapping[str, object], path: str) -> bool:
+    """Return whether there is such a quantity, and it can have more than one value."""
+    value = getattr(known.get(path), "value", None)
+    return value is not None and not value.is_parametric
+
+
+def _carried(assembly: Assembly, start: Start) -> dict[str, float]:
+    """Return what is handed on: quantities that mean the same there, with their values at the start."""
+    known = assembly.start_observables
+    paths = [path for path in known if path.endswith(_CARRIED)]
+    q, u = start.coordinates, start.speeds
+    program = assembly.coordinate_program("carried", assembly.reduced, [known[path].value for path in paths])
+    values = np.asarray(assembly.kernel(program)([start.time], q, u)[0], dtype=float)
+    found = {path: float(value) for path, value in zip(paths, values, strict=True) if np.isfinite(value)}
+    found.update(_angles(assembly, start))
+    return found
+
+
+def _angles(assembly: Assembly, start: Start) -> dict[str, float]:
+    """Return the angles in the plane of parts with a body frame, and their rates, from the frame's x axis."""
+    reduced, bodies, graph = assembly.reduced, assembly.mechanism.bodies, assembly.mechanism.table.graph
+    placements = reduced.kinematics.placements
+    found: dict[str, float] = {}
+    for path, local in assembly.mechanism.locals_.items():
+        for one in local.body_inertias:
+            node = assembly.mechanism.graph.node_of[path, one.frame.name]
+            axes = node_axes(None, placements.axes.get(bodies.body_of[node]), reduced.site.node_turns[node])
+            if axes is None:
+                continue
+            program = assembly.coordinate_program("angle", reduced, [graph.convert(c) for c in axes[0]])
+            x = np.asarray(assembly.kernel(program)([start.time], start.coordinates, start.speeds)[0], dtype=float)
+            if np.hypot(x[0], x[2]) > 0.0:
+                found[f"{path}.angle"] = float(np.arctan2(x[2], x[0]))
+    return found
+
+
+def _gap(assembly: Assembly, start: Start, there: Assembly, found: Symmetry) -> float:
+    """Return how far the starts are apart: places, speeds and accelerations of all nodes, relative to the sizes."""
+    begun = find_start(there)
+    sets = [_nodes(one, first) for one, first in ((assembly, start), (there, begun))]
+    nodes = [key for key in sets[0] if key in sets[1]]
+    # How far aside bodies are means nothing there.
+    seen = np.eye(3)[[0, 2]] if found.space == "plane" else found.direction[None]
+    gaps = []
+    for order in range(3):
+        one, other = (np.array([seen @ known[key][order] for key in nodes]) for known in sets)
+        size = max(float(np.max(np.abs(one), initial=0.0)), start.length if order == 0 else 0.0)
+        if order and size == 0.0:
+            size = 1.0
+        gaps.append(float(np.max(np.abs(one - other), initial=0.0)) / size)
+    return max(gaps)
+
+
+def _nodes(assembly: Assembly, start: Start) -> dict[tuple[str, str], FloatArray]:
+    """Return place, velocity and acceleration of every connector at the start, shape (3, 3), without what is fixed."""
+    equations, mechanism = assembly.reduced, assembly.mechanism
+    kinematics, graph = equations.kinematics, assembly.mechanism.table.graph
+    balance = balance_of(assembly, "reduced")
+    q, u = start.coordinates, start.speeds
+    kept = np.asarray(independent_rows(balance.at(start.time, q, u).slope), dtype=np.intp)
+    a, _ = balance.accelerate(start.time, q, u, kept)
+    tables = (kinematics.placements.positions, kinematics.velocities, kinematics.accelerations)
+    nodes = sorted(tables[0])
+    expressions = [
+        graph.convert(c) for node in nodes for table in tables for c in mechanism.space.vector(tuple(table[node]))
+    ]
+    program = assembly.state_program("nodes", expressions)
+    idle = np.zeros(len(assembly.reactions))
+    values = np.asarray(assembly.kernel(program)([start.time], q, u, a, idle)[0], dtype=float).reshape(-1, 3, 3)
+    place = dict(zip(nodes, values, strict=True))
+    return {key: place[node] for key, node in mechanism.graph.node_of.items() if node in place}
