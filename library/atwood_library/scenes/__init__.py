@@ -19,6 +19,8 @@ from atwood_library.scenes.intermediate_axis import IntermediateAxis
 from atwood_library.scenes.lagrange_top import LagrangeTop
 from atwood_library.scenes.mass_spring_chain import MassSpringChain
 from atwood_library.scenes.pendulum_on_cart import PendulumOnCart
+from atwood_library.scenes.rolling_ball import RollingBall
+from atwood_library.scenes.rolling_disc import RollingDiscScene
 from atwood_library.scenes.simple_pendulum import SimplePendulum
 from atwood_library.scenes.slider_crank import SliderCrank
 from atwood_library.scenes.spatial_slider_crank import SpatialSliderCrank
@@ -46,6 +48,8 @@ __all__ = [
     "LagrangeTop",
     "MassSpringChain",
     "PendulumOnCart",
+    "RollingBall",
+    "RollingDiscScene",
     "SimplePendulum",
     "SliderCrank",
     "SpatialSliderCrank",
@@ -75,6 +79,8 @@ SCENES: dict[str, type[Scene]] = {
     "heavy-top": HeavyTop,
     "intermediate-axis": IntermediateAxis,
     "lagrange-top": LagrangeTop,
+    "rolling-ball": RollingBall,
+    "rolling-disc": RollingDiscScene,
     "spatial-slider-crank": SpatialSliderCrank,
     "spherical-pendulum": SphericalPendulum,
     "stewart-platform": StewartPlatform,

@@ -105,7 +105,7 @@ class Assembly:
 
     def _tidy(self, equations: Equations, rows: Sequence[Expression]) -> list[Expression]:
         """Write rows as an expert would by hand, for scenes of the size that one would do by hand."""
-        if len(equations.coordinates) > _BY_HAND:
+        if len(equations.coordinates) > _BY_HAND or equations.solved_speeds:
             return list(rows)
         angles = [q for q, c in zip(equations.coordinates, equations.names, strict=True) if c.unit == "rad"]
         return collect(list(rows), angles, self.parameters)

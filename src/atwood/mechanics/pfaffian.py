@@ -43,6 +43,8 @@ class Form:
     ----------
     path, constraint
         The part and its constraint.
+    rate
+        What stays zero, in terms of coordinates and speeds.
     slopes
         The coefficient of each speed.
     drift
@@ -51,6 +53,7 @@ class Form:
 
     path: str
     constraint: LocalConstraint
+    rate: Expression
     slopes: tuple[Expression, ...]
     drift: Expression
 
@@ -72,7 +75,7 @@ def pfaffian_forms(state: Movement, rates: Sequence[tuple[str, LocalConstraint, 
         slopes = [rate.graph.zero] * len(state.speeds)
         for column, entry in zip(entries.columns, entries.entries, strict=True):
             slopes[column] = entry
-        found.append(Form(path, one, tuple(slopes), substitute([rate], still)[0]))
+        found.append(Form(path, one, rate, tuple(slopes), substitute([rate], still)[0]))
     return found
 
 

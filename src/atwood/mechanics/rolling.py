@@ -147,22 +147,18 @@ def _solved_speeds(mechanism: Mechanism, places: Places, forms: Sequence[Form]) 
     rates = set(state.rates)
     solved: dict[Expression, Expression] = {}
     for form in forms:
-        total = form.drift
-        for speed, slope in zip(state.speeds, form.slopes, strict=True):
-            total = total + slope * solved.get(speed, speed)
-        (now,) = pfaffian_forms(state, [(form.path, form.constraint, total)])
+        rate = substitute([form.rate], solved)[0] if solved else form.rate
+        (now,) = pfaffian_forms(state, [(form.path, form.constraint, rate)])
         allowed = [i for i, speed in enumerate(state.speeds) if speed in rates and speed not in solved]
         chosen = constant_pivot(mechanism, places, now, allowed)
         if chosen is None:
             return {}
         pivot, coefficient = chosen
-        rest = now.drift
-        for i, (speed, slope) in enumerate(zip(state.speeds, now.slopes, strict=True)):
-            if i != pivot:
-                rest = rest + slope * speed
-        value = -rest / coefficient
-        solved = {s: substitute([e], {state.speeds[pivot]: value})[0] for s, e in solved.items()}
-        solved[state.speeds[pivot]] = value
+        speed = state.speeds[pivot]
+        # What is left without the speed is as short as it was; a sum over all slopes would be longer.
+        value = -substitute([rate], {speed: 0.0})[0] / coefficient
+        solved = {s: substitute([e], {speed: value})[0] for s, e in solved.items()}
+        solved[speed] = value
     return solved
 
 

@@ -87,6 +87,12 @@ def find_start(assembly: Assembly) -> Start:
     if before is not assembly:
         return _taken_up(assembly, before, find_start(before))
     equations, length = assembly.reduced, scene_length(assembly)
+    if not 1e-100 < length < 1e100:
+        raise StartError(
+            f"its extent, {length:g} m, is beyond what can be computed with",
+            where=assembly.flat.name,
+            advice="Look at its lengths and at the start values that are lengths.",
+        )
     positions, speeds = sort_targets(assembly, equations)
     scales = motion_scales(equations, length)
     t = assembly.flat.t_start
@@ -115,6 +121,6 @@ def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
                 where=one.keys[-1][0],
                 advice="Assemble the scene anew, or give the start to `with_values`.",
             )
-    coordinates = np.array([q[symbol] for symbol in after.coordinates])
+    kept = [before.coordinates.index(symbol) for symbol in after.coordinates]
     speeds = np.array([u[symbol] for symbol in after.speeds])
-    return replace(start, coordinates=coordinates, speeds=speeds)
+    return replace(start, coordinates=start.coordinates[kept], speeds=speeds, rough=start.rough[kept])

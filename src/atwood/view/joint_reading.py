@@ -105,6 +105,8 @@ def _shift(
     mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], one: Expression, value: float
 ) -> FloatArray:
     known = {**dict.fromkeys(joint.coordinates, 0.0), one: value, mechanism.time: 0.0}
+    for axes in joint.axes:  # whichever way they are turned, the step along a coordinate is the same
+        known.update((c, float(i == k)) for i, axis in enumerate(axes) for k, c in enumerate(axis))
     return numbers(mechanism, shift, known)
 
 

@@ -1,0 +1,166 @@
+"""Constraints on velocities that are ones on positions: found, integrated, and eliminated where they are linear."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import atwood_library as lib
+from atwood import Component, Frame, Scalar, Scene, connector, constraint, report, simulate, sweep
+from atwood.pipeline import assemble
+
+from ..helpers.runs import FORMS
+
+G = 9.81
+
+
+def wheel_on_a_slope(slope: float = 0.3, **more: float) -> Scene:
+    """Return a disc that rolls down a slope in the plane."""
+    scene = Scene(t_end=2.0, **more)
+    ground, contact = scene.add("ground", lib.Ground(angle=-slope)), scene.add("contact", lib.RollingDisc(radius=0.5))
+    wheel = scene.add("wheel", lib.Disc(radius=0.5, mass=2.0))
+    scene.connect(ground.frame, contact.a)
+    scene.connect(contact.b, wheel.frame)
+    scene.start.update({"contact.displacement": 0.3, "wheel.angle": 0.2, "contact.speed": 0.2})
+    return scene
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_wheel_on_a_slope(form: str) -> None:
+    made = simulate(wheel_on_a_slope(), form=form, rtol=1e-11)
+    pull = G * np.sin(0.3) / 1.5
+    run = 0.3 + 0.2 * made.time + 0.5 * pull * made.time**2
+    assert np.max(np.abs(made["contact.displacement"] - run)) < 1e-9
+    assert np.max(np.abs(made["wheel.angle"] - 0.2 + (run - 0.3) / 0.5)) < 1e-9
+    assert np.max(np.abs(made["contact.friction"] + 2.0 * G * np.sin(0.3) / 3.0)) < 1e-8
+    assert np.max(np.abs(made["contact.normal_force"] - 2.0 * G * np.cos(0.3))) < 1e-8
+    equations = made.assembly.equations
+    (integral,) = equations.integrals
+    assert integral.keys == (("contact", "rolling_on_line", 0),)
+    assert all(one.holonomic for one in equations.constraints)
+
+
+def test_a_wheel_in_the_plane_has_the_states_of_a_hand_count() -> None:
+    found = report(wheel_on_a_slope())
+    assert found.degrees_of_freedom == 1
+    assert found.states["reduced"] == 2
+    assert found.states["dae"] == 6 + 2 * 2  # three coordinates, and two constraints that both hold positions
+    assert sum(found.operations["reduced"].values()) <= 4
+    assert found.integrated == ("contact.rolling_on_line",)
+    assert "contact.rolling_on_line" in str(found)
+
+
+def test_a_wheel_on_a_seesaw_keeps_two_freedoms() -> None:
+    """The line itself turns: the integral is linear in the joint's own coordinate, and not in the world's."""
+    scene = Scene(t_end=0.5)
+    ground, pivot = scene.add("ground", lib.Ground()), scene.add("pivot", lib.Pivot())
+    beam = scene.add("beam", lib.RigidBody(mass=3.0, moments=(0.2, 0.4, 0.2)))
+    wheel, contact = (
+        scene.add("wheel", lib.Disc(radius=0.2, mass=1.0)),
+        scene.add("contact", lib.RollingDisc(radius=0.2)),
+    )
+    scene.connect(ground.frame, pivot.a)
+    scene.connect(pivot.b, beam.frame)
+    scene.connect(beam.frame, contact.a)
+    scene.connect(contact.b, wheel.frame)
+    scene.start.update({"pivot.angle": 0.1, "contact.displacement": 0.3})
+    reduced, dae = (simulate(scene, form=form, rtol=1e-11, outputs=6) for form in FORMS)
+    assert report(scene).states["reduced"] == 4
+    assert reduced.energy.max_drift < 1e-9
+    for path in reduced.paths:
+        assert np.max(np.abs(reduced[path] - dae[path])) < 1e-6, path
+
+
+def upright() -> Scene:
+    """Return a disc in space that a plate keeps upright and on a line."""
+    scene = Scene(space="space", t_end=1.0)
+    ground, guide = scene.add("ground", lib.Ground(angle=0.2)), scene.add("guide", lib.Planar(axis=(0.0, 1.0, 0.0)))
+    disc, contact = scene.add("disc", lib.Disc(radius=0.5, mass=2.0)), scene.add("contact", lib.RollingDisc(radius=0.5))
+    for joint in (guide, contact):
+        scene.connect(ground.frame, joint.a)
+        scene.connect(joint.b, disc.frame)
+    scene.start["disc.spin.y"] = 1.0
+    return scene
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_disc_that_is_kept_upright_has_one_freedom(form: str) -> None:
+    made = simulate(upright(), form=form, rtol=1e-11)
+    assert report(upright()).states["reduced"] == 2
+    assert report(upright()).integrated == ("contact.rolling",)
+    run = np.hypot(
+        made["disc.position.x"] - made["disc.position.x"][0], made["disc.position.z"] - made["disc.position.z"][0]
+    )
+    assert np.max(np.abs(run - np.abs(0.5 * made.time - 0.5 * G * np.sin(0.2) / 1.5 * made.time**2))) < 1e-8
+
+
+class Blade(Component):
+    """It moves along its x axis only."""
+
+    frame: Frame = connector(Frame, "The blade.")
+
+    @constraint(reaction="side_force", unit="N", doc="Force on the frame, across the blade.")
+    def edge(self) -> Scalar:
+        """Return the velocity across the blade."""
+        z = self.frame.axes[2]
+        return self.frame.velocity.x * z.x + self.frame.velocity.z * z.z
+
+
+def on_blades(count: int) -> Scene:
+    """Return a link with a blade at one end or at both: together they keep it from turning."""
+    scene = Scene(t_end=1.0)
+    link = scene.add("link", lib.Link(length=1.0, mass=2.0))
+    for number, end in enumerate((link.a, link.b)[:count]):
+        blade = scene.add(f"blade{number}", Blade())
+        scene.connect(end, blade.frame)
+    scene.start.update({"link.position.x": 0.0, "link.position.z": 0.0, "link.angle": -0.5, "link.velocity.x": 0.0})
+    return scene
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_constraints_can_be_integrable_together_only(form: str) -> None:
+    made = simulate(on_blades(2), form=form, rtol=1e-10)
+    along = 0.5 * G * np.sin(0.5) * made.time**2
+    assert np.max(np.abs(made["link.position.x"] - along * np.cos(0.5))) < 1e-8
+    assert np.max(np.abs(made["link.angle"] + 0.5)) < 1e-12
+    for path in ("blade0.side_force", "blade1.side_force"):
+        assert np.max(np.abs(made[path] - G * np.cos(0.5))) < 1e-8
+    assert report(on_blades(2)).states["reduced"] == 2
+
+
+def test_one_blade_is_not_integrable() -> None:
+    found = report(on_blades(1))
+    assert found.integrated == ()
+    assert found.degrees_of_freedom == 2
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_other_values_and_another_start_give_other_constants(form: str) -> None:
+    first = assemble(wheel_on_a_slope(), form=form)
+    for values, start in (({"contact.radius": 0.4, "wheel.radius": 0.4}, {}), ({}, {"wheel.angle": 1.7})):
+        again = simulate(first.with_values(values, start=start), rtol=1e-10)
+        radius = values.get("contact.radius", 0.5)
+        turned = again["wheel.angle"] - start.get("wheel.angle", 0.2)
+        assert np.max(np.abs(radius * turned + again["contact.displacement"] - 0.3)) < 1e-9
+        assert np.ptp(again["wheel.angle"]) > 1.0
+
+
+def test_a_sweep_takes_each_start_by_itself() -> None:
+    angles = [0.2, 0.9, 1.6]
+    found = sweep(
+        wheel_on_a_slope(), start={"wheel.angle": angles}, rtol=1e-10, outputs=3, quantities=["wheel", "contact"]
+    )
+    alone = simulate(wheel_on_a_slope(), rtol=1e-10, outputs=3)
+    turned = alone["wheel.angle"] - 0.2
+    assert np.max(np.abs(found["wheel.angle"] - np.array(angles)[:, None] - turned)) < 1e-9
+    assert np.max(np.abs(found["contact.displacement"] - alone["contact.displacement"])) < 1e-9
+    wide = sweep(wheel_on_a_slope(), {"wheel.mass": [1.0, 4.0]}, rtol=1e-10, outputs=3, quantities=["contact"])
+    assert np.max(np.abs(wide["contact.displacement"] - alone["contact.displacement"])) < 1e-9
+
+
+def test_a_constant_that_is_zero_is_another_start_too() -> None:
+    scene = wheel_on_a_slope()
+    scene.start.update({"contact.displacement": 0.0, "wheel.angle": 0.0})
+    again = simulate(assemble(scene).with_values(start={"wheel.angle": 1.0}), outputs=3)
+    assert abs(again["wheel.angle"][0] - 1.0) < 1e-12
+    assert abs(again["contact.displacement"][0]) < 1e-12
