@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Frame, Scalar, Vector, atan2, cross, dot, normals, sqrt
+from atwood import Frame, Point, Scalar, Vector, atan2, cross, dot, normals, sqrt
 
 __all__ = [
     "angle_about",
@@ -78,8 +78,8 @@ def rate_about(a: Frame, b: Frame, axis: Vector) -> Scalar:
     return dot(b.angular_velocity - a.angular_velocity, a.to_world(axis))
 
 
-def rate_along(a: Frame, b: Frame, axis: Vector) -> Scalar:
-    """Return the speed of frame b along an axis of frame a, as seen from frame a, m/s."""
+def rate_along(a: Frame, b: Point, axis: Vector) -> Scalar:
+    """Return the speed of b along an axis of frame a, as seen from frame a, m/s."""
     seen = b.velocity - a.velocity - cross(a.angular_velocity, b.position - a.position)
     return dot(seen, a.to_world(axis))
 

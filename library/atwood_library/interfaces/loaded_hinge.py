@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, Load, Scalar, dissipation, force, is_zero, maximum, minimum, parameter, potential, signal
+from atwood import Component, Load, Scalar, dissipation, force, is_zero, parameter, potential, signal
+from atwood_library.interfaces.loads import damper_function, elastic_energy
 
 
 class LoadedHinge(Component):
@@ -28,26 +29,14 @@ class LoadedHinge(Component):
     def spring_energy(self) -> Scalar:
         """Return the energy in the spring and in the stops."""
         joint: Any = self
-        energy: Scalar = 0.0
-        if not is_zero(self.stiffness):
-            twist = joint.angle() - self.natural_angle
-            energy = energy + 0.5 * self.stiffness * twist * twist
-        if self.lower_stop is not None:
-            below = minimum(joint.angle() - self.lower_stop, 0.0)
-            energy = energy + 0.5 * self.stop_stiffness * below * below
-        if self.upper_stop is not None:
-            above = maximum(joint.angle() - self.upper_stop, 0.0)
-            energy = energy + 0.5 * self.stop_stiffness * above * above
-        return energy
+        stops = self.stop_stiffness, self.lower_stop, self.upper_stop
+        return elastic_energy(joint.angle, (self.stiffness, self.natural_angle), stops)
 
     @dissipation
     def damper_function(self) -> Scalar:
-        """Return half the power of the damper (Rayleigh's function; Goldstein, section 1.5)."""
-        if is_zero(self.damping):
-            return 0.0
+        """Return half the power of the damper."""
         joint: Any = self
-        rate = joint.angular_velocity()
-        return 0.5 * self.damping * rate * rate
+        return damper_function(lambda: (joint.angular_velocity(),), self.damping)
 
     @force
     def motor_torque(self) -> Iterable[Load]:

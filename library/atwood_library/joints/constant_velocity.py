@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from atwood import FREE, Component, Frame, Placement, Scalar, Vector, connector, constraint, dot, joint
+from atwood import FREE, Frame, Placement, Scalar, Vector, connector, constraint, dot, joint
+from atwood_library.interfaces.loaded_ball import LoadedBall
 
 
-class ConstantVelocity(Component):
+class ConstantVelocity(LoadedBall):
     """A constant-velocity joint between two shafts along z: they bend against each other and turn equally fast.
 
     Bent about any axis square to both shafts, frame b is frame a turned by that bend alone. Its `force` is what it
-    exerts on frame b, `shaft_torque` the torque that it passes on. A part of space.
+    exerts on frame b, `shaft_torque` the torque that it passes on. It can carry a spring, a damper and
+    motors against the bend, and a cone as a stop. A part of space.
     """
 
     a: Frame = connector(Frame, "The frame that carries the joint.")

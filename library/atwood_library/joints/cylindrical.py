@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from atwood import (
-    Component,
     Frame,
     Placement,
     Scalar,
+    Shaft,
+    Slide,
+    Vector,
     as_vector,
     connector,
     constraint,
@@ -17,14 +19,25 @@ from atwood import (
     turn,
 )
 from atwood_library.interfaces.bearings import angle_about, axes_parallel, rate_about, rate_along, sideways
+from atwood_library.interfaces.loaded_slide import LoadedSlide
+from atwood_library.interfaces.loaded_twist import LoadedTwist
 
 
-class Cylindrical(Component):
-    """A shaft in a bush: frame b turns about an axis of frame a and slides along it. A part of space."""
+class Cylindrical(LoadedSlide, LoadedTwist):
+    """A shaft in a bush: frame b turns about an axis of frame a and slides along it. A part of space.
+
+    Along the axis and about it, it can carry springs, dampers, an actuator, a motor and stops.
+    """
 
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis, in both frames.")
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")
+    shaft: Shaft = connector(Shaft, "The angle, where gears take hold of it.", of="angle")
+    carriage: Slide = connector(Slide, "The displacement, where gears take hold of it.", of="displacement")
+
+    def axis_in_world(self) -> Vector:
+        """Return the axis in world axes."""
+        return self.a.to_world(as_vector(self.axis))
 
     @constraint(
         reaction=("guide_1", "guide_2"),

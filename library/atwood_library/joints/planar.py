@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from atwood import (
-    Component,
     Frame,
     Placement,
     Scalar,
+    Vector,
     as_vector,
     connector,
     constraint,
@@ -17,18 +17,25 @@ from atwood import (
     parameter,
     turn,
 )
-from atwood_library.interfaces.bearings import angle_about, axes_parallel, rate_about
+from atwood_library.interfaces.bearings import angle_about, axes_parallel, rate_about, rate_along
+from atwood_library.interfaces.loaded_plate import LoadedPlate
+from atwood_library.interfaces.loaded_twist import LoadedTwist
 
 
-class Planar(Component):
+class Planar(LoadedPlate, LoadedTwist):
     """A plate on a table: frame b slides on a plane through frame a, and turns about its normal. A part of space.
 
-    Displacements are along the two directions that make a right-handed set with the normal.
+    Displacements are along the two directions that make a right-handed set with the normal. It can carry a
+    spring to the origin, dampers, actuators, a rim, and whatever acts on the angle.
     """
 
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Normal, in both frames.")
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")
+
+    def axis_in_world(self) -> Vector:
+        """Return the axis in world axes."""
+        return self.a.to_world(as_vector(self.axis))
 
     @constraint(
         reaction="normal_force",
@@ -63,15 +70,27 @@ class Planar(Component):
         first, second = normals(axis)
         return Placement(first * displacement_1 + second * displacement_2, turn(axis, angle), axes="a")
 
-    @observable(unit="m", doc="Displacement along the first direction of the plane.", spaces=("space",))
+    @observable(unit="m", doc="Displacement along the first direction of the plane.", rate="speed_1", spaces=("space",))
     def displacement_1(self) -> Scalar:
         """Return the displacement."""
         return dot(self.b.position - self.a.position, self.a.to_world(normals(as_vector(self.axis))[0]))
 
-    @observable(unit="m", doc="Displacement along the second direction of the plane.", spaces=("space",))
+    @observable(
+        unit="m", doc="Displacement along the second direction of the plane.", rate="speed_2", spaces=("space",)
+    )
     def displacement_2(self) -> Scalar:
         """Return the displacement."""
         return dot(self.b.position - self.a.position, self.a.to_world(normals(as_vector(self.axis))[1]))
+
+    @observable(unit="m/s", doc="Rate of the first displacement.", spaces=("space",))
+    def speed_1(self) -> Scalar:
+        """Return the rate, as seen from frame a."""
+        return rate_along(self.a, self.b, normals(as_vector(self.axis))[0])
+
+    @observable(unit="m/s", doc="Rate of the second displacement.", spaces=("space",))
+    def speed_2(self) -> Scalar:
+        """Return the rate, as seen from frame a."""
+        return rate_along(self.a, self.b, normals(as_vector(self.axis))[1])
 
     @observable(
         unit="rad", doc="Angle of frame b about the normal.", periodic=True, rate="angular_velocity", spaces=("space",)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from atwood import (
-    Component,
     Frame,
+    Load,
     Placement,
     Point,
     Scalar,
@@ -15,16 +17,22 @@ from atwood import (
     cos,
     cross,
     dot,
+    force,
+    is_zero,
     joint,
     normals,
     observable,
     parameter,
     sin,
 )
+from atwood_library.interfaces.loaded_hinge import LoadedHinge
 
 
-class PointOnCircle(Component):
-    """A point that slides on a circle fixed in a frame, about the frame's origin. A part of space."""
+class PointOnCircle(LoadedHinge):
+    """A point that slides on a circle fixed in a frame, about the frame's origin. A part of space.
+
+    It can carry a spring, a damper, a motor and stops of the angle.
+    """
 
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis of the circle, in frame a.")
     radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius of the circle.")
@@ -48,7 +56,7 @@ class PointOnCircle(Component):
         first, second = normals(as_vector(self.axis))
         return Placement((first * cos(angle) + second * sin(angle)) * self.radius, axes="a")
 
-    @observable(unit="rad", doc="Angle on the circle.", periodic=True, rate="rate", spaces=("space",))
+    @observable(unit="rad", doc="Angle on the circle.", periodic=True, rate="angular_velocity", spaces=("space",))
     def angle(self) -> Scalar:
         """Return the angle from the first normal of the axis."""
         first, second = normals(as_vector(self.axis))
@@ -56,8 +64,18 @@ class PointOnCircle(Component):
         return atan2(dot(arm, self.a.to_world(second)), dot(arm, self.a.to_world(first)))
 
     @observable(unit="rad/s", doc="Rate of the angle.", spaces=("space",))
-    def rate(self) -> Scalar:
+    def angular_velocity(self) -> Scalar:
         """Return the rate of the angle as seen from frame a."""
         arm = self.b.position - self.a.position
         seen = self.b.velocity - self.a.velocity - cross(self.a.angular_velocity, arm)
         return dot(cross(arm, seen), self.a.to_world(as_vector(self.axis))) / (self.radius * self.radius)
+
+    @force
+    def motor_torque(self) -> Iterable[Load]:
+        """Return the force of the motor along the circle, and its reaction: together the motor's torque."""
+        if is_zero(self.motor):
+            return
+        arm = self.b.position - self.a.position
+        push = cross(self.a.to_world(as_vector(self.axis)), arm) * (self.motor / (self.radius * self.radius))
+        yield Load(self.b, force=push)
+        yield Load(self.a, force=-push, torque=cross(arm, -push))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from atwood import (
-    Component,
     Frame,
     Placement,
     Point,
     Scalar,
+    Vector,
     as_vector,
     connector,
     constraint,
@@ -17,14 +17,23 @@ from atwood import (
     observable,
     parameter,
 )
+from atwood_library.interfaces.bearings import rate_along
+from atwood_library.interfaces.loaded_slide import LoadedSlide
 
 
-class PointOnLine(Component):
-    """A point that slides on a straight line fixed in a frame. A part of space; in a plane, see `Slider`."""
+class PointOnLine(LoadedSlide):
+    """A point that slides on a straight line fixed in a frame. A part of space; in a plane, see `Slider`.
+
+    It can carry a spring, a damper, an actuator and stops.
+    """
 
     axis: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction, in frame a.")
     a: Frame = connector(Frame, "The frame that carries the line; its origin is on it.")
     b: Point = connector(Point, "The point.")
+
+    def axis_in_world(self) -> Vector:
+        """Return the axis in world axes."""
+        return self.a.to_world(as_vector(self.axis))
 
     @constraint(
         reaction=("side_force_1", "side_force_2"),
@@ -43,7 +52,12 @@ class PointOnLine(Component):
         """Place the point on the line."""
         return Placement(as_vector(self.axis) * displacement, axes="a")
 
-    @observable(unit="m", doc="Distance along the line.", spaces=("space",))
+    @observable(unit="m", doc="Distance along the line.", rate="speed", spaces=("space",))
     def displacement(self) -> Scalar:
         """Return the displacement."""
         return dot(self.b.position - self.a.position, self.a.to_world(as_vector(self.axis)))
+
+    @observable(unit="m/s", doc="Rate of the displacement.", spaces=("space",))
+    def speed(self) -> Scalar:
+        """Return the rate of the displacement, as seen from frame a."""
+        return rate_along(self.a, self.b, as_vector(self.axis))

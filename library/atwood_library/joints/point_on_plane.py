@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from atwood import (
-    Component,
     Frame,
     Placement,
     Point,
@@ -17,12 +16,15 @@ from atwood import (
     observable,
     parameter,
 )
+from atwood_library.interfaces.bearings import rate_along
+from atwood_library.interfaces.loaded_plate import LoadedPlate
 
 
-class PointOnPlane(Component):
+class PointOnPlane(LoadedPlate):
     """A point that slides on a plane fixed in a frame. A part of space.
 
-    Displacements are along the two directions that make a right-handed set with the normal.
+    Displacements are along the two directions that make a right-handed set with the normal. It can carry a
+    spring to the origin, a damper, actuators and a rim.
     """
 
     axis: tuple[float, float, float] = parameter(
@@ -47,12 +49,24 @@ class PointOnPlane(Component):
         first, second = normals(as_vector(self.axis))
         return Placement(first * displacement_1 + second * displacement_2, axes="a")
 
-    @observable(unit="m", doc="Displacement along the first direction of the plane.", spaces=("space",))
+    @observable(unit="m", doc="Displacement along the first direction of the plane.", rate="speed_1", spaces=("space",))
     def displacement_1(self) -> Scalar:
         """Return the displacement."""
         return dot(self.b.position - self.a.position, self.a.to_world(normals(as_vector(self.axis))[0]))
 
-    @observable(unit="m", doc="Displacement along the second direction of the plane.", spaces=("space",))
+    @observable(
+        unit="m", doc="Displacement along the second direction of the plane.", rate="speed_2", spaces=("space",)
+    )
     def displacement_2(self) -> Scalar:
         """Return the displacement."""
         return dot(self.b.position - self.a.position, self.a.to_world(normals(as_vector(self.axis))[1]))
+
+    @observable(unit="m/s", doc="Rate of the first displacement.", spaces=("space",))
+    def speed_1(self) -> Scalar:
+        """Return the rate, as seen from frame a."""
+        return rate_along(self.a, self.b, normals(as_vector(self.axis))[0])
+
+    @observable(unit="m/s", doc="Rate of the second displacement.", spaces=("space",))
+    def speed_2(self) -> Scalar:
+        """Return the rate, as seen from frame a."""
+        return rate_along(self.a, self.b, normals(as_vector(self.axis))[1])

@@ -5,10 +5,11 @@ from __future__ import annotations
 from math import pi
 
 from atwood import (
-    Component,
     Frame,
     Placement,
     Scalar,
+    Shaft,
+    Vector,
     as_vector,
     connector,
     constraint,
@@ -22,15 +23,24 @@ from atwood import (
     turn,
 )
 from atwood_library.interfaces.bearings import angle_about, axes_parallel, rate_about, rate_along, sideways
+from atwood_library.interfaces.loaded_hinge import LoadedHinge
 
 
-class Screw(Component):
-    """A nut on a thread: frame b moves along an axis of frame a by `pitch` for each turn about it. A part of space."""
+class Screw(LoadedHinge):
+    """A nut on a thread: frame b moves along an axis of frame a by `pitch` for each turn about it. A part of space.
+
+    It can carry a spring, a damper, a motor and stops of the angle.
+    """
 
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis, in both frames.")
     pitch: float = parameter(0.01, unit="m", doc="Displacement for one turn; negative for a left-handed thread.")
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")
+    shaft: Shaft = connector(Shaft, "The angle, where gears take hold of it.", of="angle")
+
+    def axis_in_world(self) -> Vector:
+        """Return the axis in world axes."""
+        return self.a.to_world(as_vector(self.axis))
 
     @constraint(
         reaction=("guide_1", "guide_2"),

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from atwood import FREE, Component, Frame, Placement, Vector, connector, constraint, joint
+from atwood import FREE, Frame, Placement, Vector, connector, constraint, joint
+from atwood_library.interfaces.loaded_ball import LoadedBall
 
 
-class Spherical(Component):
+class Spherical(LoadedBall):
     """A ball and socket: the two frames share their position and turn against each other in every way.
 
-    In a plane it is a hinge. Its `force` is what it exerts on frame b.
+    In a plane it is a hinge. Its `force` is what it exerts on frame b. It can carry a spring, a damper,
+    motors and a cone as a stop.
     """
 
     a: Frame = connector(Frame, "The frame that carries the joint.")

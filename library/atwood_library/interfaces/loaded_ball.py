@@ -1,0 +1,78 @@
+"""LoadedBall: what a joint that turns in every way can carry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from atwood import (
+    Component,
+    Load,
+    Scalar,
+    Vector,
+    as_vector,
+    cos,
+    dissipation,
+    dot,
+    force,
+    is_zero,
+    parameter,
+    potential,
+    signal,
+)
+from atwood_library.interfaces.loads import beyond_bend, damper_function
+
+
+class LoadedBall(Component):
+    """A joint between frames a and b that turn against each other about more than one axis.
+
+    The spring has the energy ``k (1 - cos x)`` with the angle x of the whole turn, so its torque is ``k sin x`` about
+    the axis of that turn, and it knows no direction. The damper's torque is against the relative angular velocity.
+    The stop is a cone about an axis of frame a, in which the same axis of frame b stays.
+    """
+
+    stiffness: float = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring for one small radian.")
+    damping: float = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper for one radian a second.")
+    stop_stiffness: float = parameter(
+        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the stop for one radian beyond it."
+    )
+    stop_axis: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 1.0), direction=True, doc="Axis of the cone in frame a, and what stays within it in frame b."
+    )
+    bend_stop: float | None = parameter(
+        None, unit="rad", above=0.0, doc="Angle between the axes at which the stop acts, below pi; none if not given."
+    )
+    motor_x: float = signal(0.0, unit="N*m", doc="Torque on frame b along x of frame a, and against frame a.")
+    motor_y: float = signal(0.0, unit="N*m", doc="Torque on frame b along y of frame a, and against frame a.")
+    motor_z: float = signal(0.0, unit="N*m", doc="Torque on frame b along z of frame a, and against frame a.")
+
+    @potential
+    def spring_energy(self) -> Scalar:
+        """Return the energy in the spring and in the stop."""
+        joint: Any = self
+        a, b = joint.a, joint.b
+        energy: Scalar = 0.0
+        if not is_zero(self.stiffness):
+            # The trace of a turn by x is 1 + 2 cos x.
+            turned = 0.5 * (sum(map(dot, a.axes, b.axes)) - 1.0) if self.in_space else cos(b.angle - a.angle)
+            energy = energy + self.stiffness * (1.0 - turned)
+        axis = as_vector(self.stop_axis)
+        return energy + beyond_bend(
+            lambda: dot(a.to_world(axis), b.to_world(axis)), self.stop_stiffness, self.bend_stop
+        )
+
+    @dissipation
+    def damper_function(self) -> Scalar:
+        """Return half the power of the damper."""
+        joint: Any = self
+        return damper_function(lambda: tuple(joint.b.angular_velocity - joint.a.angular_velocity), self.damping)
+
+    @force
+    def motor_torque(self) -> Iterable[Load]:
+        """Return the torque of the motors on both frames."""
+        if all(is_zero(motor) for motor in (self.motor_x, self.motor_y, self.motor_z)):
+            return
+        joint: Any = self
+        torque = joint.a.to_world(Vector(self.motor_x, self.motor_y, self.motor_z))
+        yield Load(joint.b, torque=torque)
+        yield Load(joint.a, torque=-torque)

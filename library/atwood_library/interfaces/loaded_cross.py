@@ -1,0 +1,63 @@
+"""LoadedCross: what the two hinges of a universal joint can carry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from atwood import Component, Load, Scalar, as_vector, dissipation, force, is_zero, parameter, potential, signal
+from atwood_library.interfaces.loads import damper_function, elastic_energy
+
+
+class LoadedCross(Component):
+    """A joint with `angle_a` and `rate_a` about `axis_a` of frame a, and `angle_b` and `rate_b` about `axis_b` of b."""
+
+    stiffness_a: float = parameter(
+        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring about the first axis for one radian."
+    )
+    natural_angle_a: float = parameter(0.0, unit="rad", doc="First angle at which its spring has no torque.")
+    damping_a: float = parameter(
+        0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper about the first axis for one radian a second."
+    )
+    lower_stop_a: float | None = parameter(None, unit="rad", doc="First angle below which a stop acts, if any.")
+    upper_stop_a: float | None = parameter(None, unit="rad", doc="First angle above which a stop acts, if any.")
+    motor_a: float = signal(0.0, unit="N*m", doc="Torque of the motor about the first axis on frame b, against a.")
+    stiffness_b: float = parameter(
+        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring about the second axis for one radian."
+    )
+    natural_angle_b: float = parameter(0.0, unit="rad", doc="Second angle at which its spring has no torque.")
+    damping_b: float = parameter(
+        0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper about the second axis for one radian a second."
+    )
+    lower_stop_b: float | None = parameter(None, unit="rad", doc="Second angle below which a stop acts, if any.")
+    upper_stop_b: float | None = parameter(None, unit="rad", doc="Second angle above which a stop acts, if any.")
+    motor_b: float = signal(0.0, unit="N*m", doc="Torque of the motor about the second axis on frame b, against a.")
+    stop_stiffness: float = parameter(
+        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of a stop for one radian beyond it."
+    )
+
+    @potential
+    def spring_energy(self) -> Scalar:
+        """Return the energy in the springs and in the stops."""
+        joint: Any = self
+        stops_a = self.stop_stiffness, self.lower_stop_a, self.upper_stop_a
+        stops_b = self.stop_stiffness, self.lower_stop_b, self.upper_stop_b
+        first = elastic_energy(joint.angle_a, (self.stiffness_a, self.natural_angle_a), stops_a)
+        return first + elastic_energy(joint.angle_b, (self.stiffness_b, self.natural_angle_b), stops_b)
+
+    @dissipation
+    def damper_function(self) -> Scalar:
+        """Return half the power of the dampers."""
+        joint: Any = self
+        first = damper_function(lambda: (joint.rate_a(),), self.damping_a)
+        return first + damper_function(lambda: (joint.rate_b(),), self.damping_b)
+
+    @force
+    def motor_torques(self) -> Iterable[Load]:
+        """Return the torques of the motors; the axes are square, so each works on its own angle alone."""
+        joint: Any = self
+        for frame, axis, motor in ((joint.a, joint.axis_a, self.motor_a), (joint.b, joint.axis_b, self.motor_b)):
+            if not is_zero(motor):
+                torque = frame.to_world(as_vector(axis)) * motor
+                yield Load(joint.b, torque=torque)
+                yield Load(joint.a, torque=-torque)

@@ -1,0 +1,54 @@
+"""LoadedTwist: what a joint that also moves otherwise can carry about its axis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from atwood import Component, Load, Scalar, dissipation, force, is_zero, parameter, potential, signal
+from atwood_library.interfaces.loads import damper_function, elastic_energy
+
+
+class LoadedTwist(Component):
+    """A joint with `angle` and `angular_velocity` about an axis, beside displacements with loads of their own."""
+
+    torsional_stiffness: float = parameter(
+        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the torsion spring for one radian."
+    )
+    natural_angle: float = parameter(0.0, unit="rad", doc="Angle at which the torsion spring has no torque.")
+    torsional_damping: float = parameter(
+        0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the torsion damper for one radian a second."
+    )
+    angle_stop_stiffness: float = parameter(
+        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of a stop of the angle for one radian beyond it."
+    )
+    lower_angle_stop: float | None = parameter(
+        None, unit="rad", doc="Angle below which a stop acts; none if not given."
+    )
+    upper_angle_stop: float | None = parameter(
+        None, unit="rad", doc="Angle above which a stop acts; none if not given."
+    )
+    motor: float = signal(0.0, unit="N*m", doc="Torque of the motor on frame b, and against frame a.")
+
+    @potential
+    def torsion_energy(self) -> Scalar:
+        """Return the energy in the torsion spring and in the stops of the angle."""
+        joint: Any = self
+        stops = self.angle_stop_stiffness, self.lower_angle_stop, self.upper_angle_stop
+        return elastic_energy(joint.angle, (self.torsional_stiffness, self.natural_angle), stops)
+
+    @dissipation
+    def torsion_damper_function(self) -> Scalar:
+        """Return half the power of the torsion damper."""
+        joint: Any = self
+        return damper_function(lambda: (joint.angular_velocity(),), self.torsional_damping)
+
+    @force
+    def motor_torque(self) -> Iterable[Load]:
+        """Return the torque of the motor on both frames."""
+        if is_zero(self.motor):
+            return
+        joint: Any = self
+        torque = joint.axis_in_world() * self.motor
+        yield Load(joint.b, torque=torque)
+        yield Load(joint.a, torque=-torque)

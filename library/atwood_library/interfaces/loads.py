@@ -1,0 +1,102 @@
+"""Formulas of what joints carry: springs, stops, dampers, each of one coordinate; all are zero where not asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from atwood import Scalar, Vector, cos, dot, is_zero, maximum, minimum, sin
+
+__all__ = ["beyond_bend", "beyond_rim", "damper_function", "elastic_energy"]
+
+
+def elastic_energy(
+    coordinate: Callable[[], Scalar],
+    spring: tuple[float, float],
+    stops: tuple[float, float | None, float | None],
+) -> Scalar:
+    """Return the energy in a linear spring and in two elastic stops, J, each of which may be missing.
+
+    Parameters
+    ----------
+    coordinate
+        Gives displacement, m, or angle, rad; asked only where something acts on it, since what is read must be known.
+    spring
+        Force or torque for one unit of the coordinate, and the coordinate at which the spring is at rest.
+    stops
+        Force or torque of a stop for one unit beyond it, and where the lower and the upper stop are.
+    """
+    stiffness, natural = spring
+    stop_stiffness, lower, upper = stops
+    energy: Scalar = 0.0
+    if not is_zero(stiffness):
+        stretch = coordinate() - natural
+        energy = energy + 0.5 * stiffness * stretch * stretch
+    if lower is not None:
+        below = minimum(coordinate() - lower, 0.0)
+        energy = energy + 0.5 * stop_stiffness * below * below
+    if upper is not None:
+        above = maximum(coordinate() - upper, 0.0)
+        energy = energy + 0.5 * stop_stiffness * above * above
+    return energy
+
+
+def damper_function(rates: Callable[[], Sequence[Scalar]], damping: float) -> Scalar:
+    """Return half the power of a linear damper, W (Rayleigh's function; Goldstein, section 1.5).
+
+    Parameters
+    ----------
+    rates
+        Gives rates along square directions; asked only where there is a damper.
+    damping
+        Force or torque for a rate of one.
+    """
+    if is_zero(damping):
+        return 0.0
+    total: Scalar = 0.0
+    for rate in rates():
+        total = total + rate * rate
+    return 0.5 * damping * total
+
+
+def beyond_rim(arm: Vector, stiffness: float, rim: float | None) -> Scalar:
+    """Return the energy in an elastic rim, J, that a point pushes against from within.
+
+    What counts is ``(r^2 - R^2)/(2 R)``, which is the distance beyond the rim while that is small, and has no corner
+    at the centre.
+
+    Parameters
+    ----------
+    arm
+        From the centre to the point, m.
+    stiffness
+        Force for one metre beyond the rim, N/m.
+    rim
+        Radius of the rim, m; none if not given.
+    """
+    if rim is None:
+        return 0.0
+    beyond = maximum((dot(arm, arm) - rim * rim) / (2.0 * rim), 0.0)
+    energy: Scalar = 0.5 * stiffness * beyond * beyond
+    return energy
+
+
+def beyond_bend(cosine: Callable[[], Scalar], stiffness: float, limit: float | None) -> Scalar:
+    """Return the energy in an elastic cone, J, that an axis pushes against from within.
+
+    What counts is ``(cos L - cos x)/sin L``, which is the angle beyond the cone while that is small, and has no corner
+    where the axes are parallel.
+
+    Parameters
+    ----------
+    cosine
+        Gives the cosine of the angle x between the axes; asked only where there is a limit.
+    stiffness
+        Torque for one radian beyond the cone, N m/rad.
+    limit
+        Half the opening L of the cone, rad, between 0 and pi; none if not given.
+    """
+    if limit is None:
+        return 0.0
+    beyond = maximum((cos(limit) - cosine()) / sin(limit), 0.0)
+    energy: Scalar = 0.5 * stiffness * beyond * beyond
+    return energy
