@@ -109,6 +109,20 @@ def test_shells_that_face_the_wrong_way_are_refused():
     assert closed_mesh(np.concatenate([outer, inner[:, ::-1], core])).volume == pytest.approx(63.125)
 
 
+def test_a_mesh_that_cuts_through_itself_is_refused():
+    box = meshes.box_mesh(2, 2, 2)
+    corner = np.add(meshes.box_mesh(1, 1, 1), 1.0)  # an eighth of it overlaps, and would count twice
+    assert "cuts through itself" in message(np.concatenate([box, corner]))
+    beside = np.add(meshes.box_mesh(1, 1, 1), (2.0, 0.0, 0.0))
+    assert closed_mesh(np.concatenate([box, beside])).volume == pytest.approx(9)
+    ball = meshes.ellipsoid_mesh(1, 1, 1, 24)
+    assert "cuts through itself" in message(np.concatenate([ball, np.add(ball, (1.2, 0.3, 0.1))]))
+    # one shell that goes through itself: a ring whose hole was pushed beyond its own outside
+    twisted = meshes.ellipsoid_mesh(1, 1, 1, 24)
+    twisted[..., 2] *= np.where(np.hypot(twisted[..., 0], twisted[..., 1]) < 0.5, -1.0, 1.0)
+    assert "cuts through itself" in message(twisted)
+
+
 def test_winding_numbers():
     mesh = closed_mesh(meshes.ellipsoid_mesh(1, 1, 1, 16))
     assert winding_number(mesh.vertices, mesh.triangles, np.array([0.3, 0.2, -0.4])) == pytest.approx(1)

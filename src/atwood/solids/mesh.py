@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atwood.errors import ParameterError
-from atwood.solids.shells import check_shells, signed_volume, split_shells
+from atwood.solids.shells import check_overlap, check_shells, signed_volume, split_shells
 from atwood.solids.welding import weld
 
 __all__ = ["TriangleMesh", "closed_mesh"]
@@ -57,7 +57,7 @@ def closed_mesh(corners: ArrayLike, *, tolerance: float = _WELD, where: str = ""
 
     Corners that are equal become one vertex. Where that leaves open edges, corners closer than the tolerance become
     one too. Triangles that collapse thereby are dropped, and a mesh that faces inward is turned round; both leave a
-    note. That a mesh does not cut through itself is not checked.
+    note. Whether the mesh cuts through itself is looked at in up to 256 places.
 
     Parameters
     ----------
@@ -76,8 +76,8 @@ def closed_mesh(corners: ArrayLike, *, tolerance: float = _WELD, where: str = ""
     ------
     ParameterError
         If the mesh is not closed (with the number of open edges and the place of the first), has edges where more than
-        two triangles meet or where neighbours face opposite ways, encloses no volume, or has a shell that faces the
-        wrong way.
+        two triangles meet or where neighbours face opposite ways, encloses no volume, has a shell that faces the
+        wrong way, or cuts through itself.
     """
     soup = _soup(corners, where)
     if not 0 <= tolerance < 0.1:
@@ -107,6 +107,7 @@ def closed_mesh(corners: ArrayLike, *, tolerance: float = _WELD, where: str = ""
         triangles = triangles[:, ::-1].copy()
         notes.append("the triangles faced inward and were turned round")
     check_shells(vertices, triangles, split_shells(triangles), where)
+    check_overlap(vertices, triangles, where)
     for array in (vertices, triangles):
         array.setflags(write=False)
     return TriangleMesh(vertices, triangles, tuple(notes))

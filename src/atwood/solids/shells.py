@@ -7,13 +7,19 @@ from numpy.typing import NDArray
 
 from atwood.errors import ParameterError
 
-__all__ = ["check_shells", "signed_volume", "split_shells", "winding_number"]
+__all__ = ["check_overlap", "check_shells", "signed_volume", "split_shells", "winding_number"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _PROBES = 7
 """How many triangles of a shell are asked on which side of the other shells they are."""
+
+_WORK, _FEWEST, _MOST = 1_000_000, 8, 256
+"""So many triangles are looked at from all points together; and the number of points."""
+
+_INSIDE = 1e-5
+"""How far inside of a triangle a point is asked about, relative to the triangle's size."""
 
 
 def signed_volume(vertices: FloatArray, triangles: IntArray) -> float:
@@ -76,6 +82,53 @@ def check_shells(vertices: FloatArray, triangles: IntArray, shells: list[IntArra
             where=where,
             advice="Bodies must face outward and cavities inward; bodies that overlap must be joined first.",
         )
+
+
+def check_overlap(vertices: FloatArray, triangles: IntArray, where: str) -> None:
+    """Check that just inside of a triangle the mesh encloses a point once: elsewhere its volume counts twice, or not.
+
+    Points are spread evenly over the triangles, several on each of a small mesh and on some of a large one: where only
+    a small share of the surface lies inside another part, it can be missed.
+
+    Raises
+    ------
+    ParameterError
+        If the mesh cuts through itself, with a place.
+    """
+    count = int(np.clip(_WORK // len(triangles), _FEWEST, _MOST))
+    number = np.arange(count)
+    chosen = number % len(triangles) if count > len(triangles) else number * len(triangles) // count
+    corners = vertices[triangles[chosen]]
+    sides = np.roll(corners, -1, axis=1) - corners
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    areas = np.linalg.norm(normals, axis=1)
+    around = np.sum(np.linalg.norm(sides, axis=2), axis=1)
+    points = np.einsum("ij,ijk->ik", _within_triangles(number), corners)
+    wrong = []
+    for point, normal, area, length in zip(points, normals, areas, around, strict=True):
+        if area > 1e-6 * length**2:  # what is all but a line has no clear inside
+            inside = point - normal / area * (_INSIDE * area / length)
+            if round(winding_number(vertices, triangles, inside)) != 1:
+                wrong.append(point)
+    if wrong:
+        place = ", ".join(f"{value:.6g}" for value in wrong[0])
+        raise ParameterError(
+            f"the mesh cuts through itself: of {count} points on its surface {len(wrong)} lie inside another part of "
+            f"it, such as ({place}) m",
+            where=where,
+            advice="Join what overlaps into one body where the mesh was made.",
+        )
+
+
+def _within_triangles(number: IntArray) -> FloatArray:
+    """Return weights of the corners for points that fill a triangle evenly, and keep away from its edges.
+
+    The sequence of M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018), folded into a half.
+    """
+    pair = np.mod(0.5 + np.outer(number, [0.7548776662466927, 0.5698402909980532]), 1.0)
+    pair = np.where(np.sum(pair, axis=1, keepdims=True) > 1.0, 1.0 - pair, pair)
+    weights = np.column_stack([pair, 1.0 - np.sum(pair, axis=1)])
+    return 0.1 / 3.0 + 0.9 * weights
 
 
 def winding_number(vertices: FloatArray, triangles: IntArray, point: FloatArray) -> float:
