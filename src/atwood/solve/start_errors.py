@@ -230,11 +230,13 @@ def wrong_way_round(failed: Failed, part: str) -> StartError:
         Path of the joint.
     """
     loop = _loop_through(failed.assembly, part)
+    fixed = [f"{one.path} = {one.value:g}" for one in failed.level.fixed]
     return StartError(
         "the loop closes near the guess only with this joint the wrong way round: its two frames would be half a turn "
         "away from how it joins them" + (f" (the loop of {', '.join(loop)})" if loop else ""),
         where=part,
-        advice="Turn its axis round, or the frame that it is fixed to, or guess a start in which it is the right way.",
+        advice="Turn its axis round, or the frame that it is fixed to, or guess a start in which it is the right way"
+        + (f", or give up {' or '.join(fixed[:_SHOWN])}." if fixed else "."),
     )
 
 
@@ -298,9 +300,10 @@ def contradiction(fixed: Sequence[Target], missing: FloatArray, freedom: int, re
     """
     failing = [target for target, miss in zip(fixed, missing, strict=True) if not abs(miss) <= MET]
     names = [f"{target.path} = {target.value:g}" for target in failing or fixed]
+    count = f"The mechanism has {freedom} free coordinate{'s' if freedom != 1 else ''}"
     return StartError(
         f"the start values contradict each other or the constraints: {', '.join(names)} cannot all hold{remark}",
         where=(failing or fixed)[0].path if fixed else "",
-        advice=f"The mechanism has {freedom} free coordinate{'s' if freedom != 1 else ''}; "
+        advice=f"{count if freedom else 'Nothing in the mechanism can move'}; "
         "fix fewer values, or give some as guesses (on the command line: --start PATH=free).",
     )
