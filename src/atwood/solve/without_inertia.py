@@ -62,10 +62,12 @@ def _without_inertia(assembly: Assembly, moving: FloatArray) -> StartError:
     names = [name for name, size in zip(every, moving, strict=True) if size > 0.1 * np.max(moving)]
     units = dict(zip(every, (one.unit for one in assembly.equations.speed_names), strict=True))
     turns = all(units[name] == "rad/s" for name in names)
+    where = _part_of(assembly, names[0])
+    acting = _acting_on(assembly, where)
     return StartError(
         f"something without inertia is free to move along {', '.join(names)}: "
-        "a force would accelerate it without bound",
-        where=_part_of(assembly, names[0]),
+        "a force would accelerate it without bound" + (f", as {' and '.join(acting)} would" if acting else ""),
+        where=where,
         advice=f"Give it a {'moment of inertia' if turns else 'mass'}, or hold it with a joint.",
     )
 
@@ -75,3 +77,16 @@ def _part_of(assembly: Assembly, name: str) -> str:
     path = name.rpartition(".")[0]
     head, _, last = path.rpartition(".")
     return head if last in ("position", "velocity", "spin") and head else path
+
+
+def _acting_on(assembly: Assembly, where: str) -> list[str]:
+    """Return the parts whose forces act on a body without inertia: it has this name, or hangs on the joint that has."""
+    graph, bodies = assembly.mechanism.graph, assembly.mechanism.bodies
+    hanging = {bodies.body_of[node] for joint in graph.joints if joint.part == where for node in (joint.a, joint.b)}
+    own = {one.index for one in bodies.bodies if one.name == where or one.index in hanging} - {0}
+    found: dict[str, None] = {}
+    for (path, _), node in graph.node_of.items():
+        local = assembly.mechanism.locals_[path]
+        if bodies.body_of[node] in own and (local.loads or local.potentials or local.dissipations):
+            found[path] = None
+    return list(found)
