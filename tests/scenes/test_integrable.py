@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import atwood_library as lib
-from atwood import Component, Frame, Scalar, Scene, connector, constraint, report, simulate, sweep
+from atwood import Component, Frame, Point, Scalar, Scene, connector, constraint, parameter, report, simulate, sweep
 from atwood.pipeline import assemble
 
 from ..helpers.runs import FORMS
@@ -164,3 +164,93 @@ def test_a_constant_that_is_zero_is_another_start_too() -> None:
     again = simulate(assemble(scene).with_values(start={"wheel.angle": 1.0}), outputs=3)
     assert abs(again["wheel.angle"][0] - 1.0) < 1e-12
     assert abs(again["contact.displacement"][0]) < 1e-12
+
+
+class Radial(Component):
+    """A point moves towards the world's origin or away from it only: ``x z' - z x' = 0``, so that z/x is constant."""
+
+    point: Point = connector(Point, "The point.")
+    turning: float = parameter(1.0, unit="1", doc="Share of the first term: with 1 it is integrable.")
+
+    @constraint(reaction="across", unit="N/m", doc="Multiplier.")
+    def straight(self) -> Scalar:
+        """Return the rate of the area that is swept."""
+        p, v = self.point.position, self.point.velocity
+        return p.x * v.z - self.turning * p.z * v.x
+
+
+class Contact(Component):
+    """The contact form ``z' - y x' = 0``, which is the textbook's case of what cannot be integrated."""
+
+    point: Point = connector(Point, "The point.")
+    twist: float = parameter(1.0, unit="1/m", doc="Factor of y; zero makes it integrable.")
+
+    @constraint(reaction="force", unit="N", doc="Multiplier.", spaces=("space",))
+    def form(self) -> Scalar:
+        """Return the form along the velocity."""
+        v = self.point.velocity
+        return v.z - self.twist * self.point.position.y * v.x
+
+
+def held_point(part: Component, space: str) -> Scene:
+    scene = Scene(space=space, t_end=0.5)
+    mass, held = scene.add("mass", lib.PointMass()), scene.add("held", part)
+    scene.connect(mass.point, held.point)
+    scene.start.update({"mass.position.x": 1.0, "mass.position.z": -0.5})
+    return scene
+
+
+def test_what_is_integrable_without_a_simple_integral_is_said() -> None:
+    scene = held_point(Radial(), "plane")
+    found = report(scene)
+    assert found.on_surfaces == ("held.straight",)
+    assert "stay on surfaces" in str(found)
+    assert found.integrated == ()
+    for form in FORMS:
+        made = simulate(scene, form=form, rtol=1e-10)
+        assert np.max(np.abs(made["mass.position.z"] / made["mass.position.x"] + 0.5)) < 1e-8
+    # In space one form in three coordinates, times a function, is a differential only if it is radial.
+    assert report(held_point(Radial(), "space")).on_surfaces == ("held.straight",)
+    assert report(held_point(Contact(), "space")).on_surfaces == ()
+    assert report(held_point(Contact(twist=0.0), "space")).integrated == ("held.form",)
+
+
+def test_rolling_is_not_integrable() -> None:
+    """Neither a disc's rolling nor a ball's is, with orientations as coordinates."""
+    from atwood.forms.starting import starting
+    from atwood.mechanics.frobenius import integrable_together
+    from atwood_library.scenes import RollingBall, RollingDiscScene
+
+    for scene, expected in ((RollingDiscScene(), False), (RollingBall(), False), (on_blades(1), False)):
+        made = starting(assemble(scene))
+        assert integrable_together(made.mechanism, made.reduced) is expected
+    for scene in (wheel_on_a_slope(), upright(), on_blades(2)):
+        made = starting(assemble(scene))
+        assert integrable_together(made.mechanism, made.reduced) is True
+
+
+def test_two_wheels_keep_a_cart_level_and_leave_one_freedom() -> None:
+    """A cart in the plane on two wheels: both contacts, both rollings and its angle come down to one coordinate."""
+    scene = Scene(t_end=1.0)
+    ground, cart = (
+        scene.add("ground", lib.Ground(angle=-0.2)),
+        scene.add("cart", lib.Box(length_x=1.0, length_z=0.2, mass=5.0)),
+    )
+    for name, place in (("back", -0.4), ("front", 0.4)):
+        wheel = scene.add(name, lib.Wheel(radius=0.2, mass=0.5, axial=0.01, transverse=0.005))
+        end = scene.add(f"{name}_end", lib.Weld(displacement=(place, 0.0, 0.0)))
+        scene.connect(cart.frame, end.a)
+        scene.connect(end.b, wheel.axle)
+        scene.connect(ground.frame, wheel.ground)
+    scene.start.update({"back.contact.displacement": 0.0, "back.contact.speed": 0.3, "back.bearing.angle": 0.0})
+    scene.start["front.bearing.angle"] = 0.0
+    assert report(scene).states["reduced"] == 2
+    pull = 6.0 * G * np.sin(0.2) / (6.0 + 2.0 * 0.01 / 0.2**2)
+    for form in FORMS:
+        made = simulate(scene, form=form, rtol=1e-11)
+        run = 0.3 * made.time + 0.5 * pull * made.time**2
+        assert np.max(np.abs(made["front.contact.displacement"] - 0.8 - run)) < 1e-9
+        assert np.max(np.abs(made["front.bearing.angle"] - run / 0.2)) < 2e-8
+        assert np.max(np.abs(made["front.contact.friction"] + 0.01 / 0.2**2 * pull)) < 1e-8
+        weight = made["front.contact.normal_force"] + made["back.contact.normal_force"]
+        assert np.max(np.abs(weight - 6.0 * G * np.cos(0.2))) < 1e-8

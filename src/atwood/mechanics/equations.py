@@ -73,11 +73,14 @@ class Integral:
         What stays zero, of time and coordinates.
     constant
         The constant that the start gives: a parameter, or zero.
+    on_velocities
+        Whether they are constraints on velocities, and not one on a single coordinate, which then stays where it is.
     """
 
     keys: tuple[tuple[str, str, int], ...]
     value: Expression
     constant: Expression
+    on_velocities: bool = True
 
 
 @dataclass(frozen=True)

@@ -18,18 +18,19 @@ from numpy.typing import NDArray
 
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, evaluate, jacobian, substitute
+from atwood.mechanics.equations import Equations
 from atwood.mechanics.mechanism import Mechanism, decide, extent
 from atwood.mechanics.motion import Movement
 from atwood.model.local import LocalConstraint
 
-__all__ = ["Form", "Places", "constant_pivot", "is_idle", "linear_integrals", "pfaffian_forms"]
+__all__ = ["NEEDED", "Form", "Places", "constant_pivot", "is_idle", "linear_integrals", "pfaffian_forms"]
 
 FloatArray = NDArray[np.float64]
 
 _SAME = 1e-11
 """Coefficients that differ by less, in terms of the largest of their form, are the same but for rounding."""
 
-_ASKED, _NEEDED = 7, 4
+_ASKED, NEEDED = 7, 4
 """At so many places coefficients are looked at, and at so many they must have values."""
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
@@ -58,7 +59,7 @@ class Form:
     drift: Expression
 
 
-def pfaffian_forms(state: Movement, rates: Sequence[tuple[str, LocalConstraint, Expression]]) -> list[Form]:
+def pfaffian_forms(state: Movement | Equations, rates: Sequence[tuple[str, LocalConstraint, Expression]]) -> list[Form]:
     """Return constraints on velocities as forms.
 
     Parameters
@@ -86,12 +87,12 @@ class Places:
     Attributes
     ----------
     state
-        The movement.
+        The coordinates and speeds.
     time
         The symbol of time.
     """
 
-    state: Movement
+    state: Movement | Equations
     time: Expression
 
     def sizes(self, mechanism: Mechanism) -> FloatArray:
@@ -135,7 +136,7 @@ def is_idle(mechanism: Mechanism, places: Places, form: Form) -> bool:
 
     def how(mechanism: Mechanism) -> bool:
         values = _scaled(places, form, mechanism)
-        return len(values) >= _NEEDED and not np.max(np.abs(values)) > _SAME
+        return len(values) >= NEEDED and not np.max(np.abs(values)) > _SAME
 
     return all(c.is_zero for c in (*form.slopes, form.drift)) or decide(mechanism, how)
 
@@ -164,7 +165,7 @@ def constant_pivot(
 
     def how(mechanism: Mechanism) -> int | None:
         values = _scaled(places, form, mechanism)
-        if len(values) < _NEEDED:
+        if len(values) < NEEDED:
             return None
         largest = float(np.max(np.abs(values)))
         even = np.max(values, axis=0) - np.min(values, axis=0) <= _SAME * largest
@@ -228,7 +229,7 @@ def linear_integrals(mechanism: Mechanism, places: Places, forms: Sequence[Form]
     return [(members, {i: graph.constant(c) for i, c in entries}) for members, entries in combined]
 
 
-def _integrable_speeds(state: Movement) -> tuple[int, ...]:
+def _integrable_speeds(state: Movement | Equations) -> tuple[int, ...]:
     """Return the numbers of the speeds that are the rates of coordinates."""
     rates = set(state.rates)
     return tuple(i for i, speed in enumerate(state.speeds) if speed in rates)
@@ -237,7 +238,7 @@ def _integrable_speeds(state: Movement) -> tuple[int, ...]:
 def _is_constant(places: Places, form: Form, own: Sequence[int], mechanism: Mechanism) -> bool:
     """Return whether the coefficients of a form are in the same ratios everywhere."""
     values = _scaled(places, form, mechanism)
-    if len(values) < _NEEDED:
+    if len(values) < NEEDED:
         return False
     least = np.min(np.abs(values), axis=0)
     pivot = max(own, key=lambda i: float(least[i]), default=None)

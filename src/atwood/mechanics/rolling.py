@@ -11,16 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
-from atwood.expr import Expression, depends_on, evaluate, substitute
+import numpy as np
+
+from atwood.expr import Expression, depends_on, evaluate, jacobian, jvp, substitute
 from atwood.mechanics.constraints import Values
 from atwood.mechanics.elimination import SOLVED, eliminate_linear
 from atwood.mechanics.equations import Integral, put_in_place
 from atwood.mechanics.forces import Site, local_map
 from atwood.mechanics.inertia import Masses
-from atwood.mechanics.mechanism import Mechanism
+from atwood.mechanics.mechanism import Mechanism, decide
 from atwood.mechanics.motion import Motion, Movement
-from atwood.mechanics.pfaffian import Form, Places, constant_pivot, is_idle, linear_integrals, pfaffian_forms
+from atwood.mechanics.pfaffian import NEEDED, Form, Places, constant_pivot, is_idle, linear_integrals, pfaffian_forms
 from atwood.model.local import LocalConstraint
 from atwood.topology.forest import Forest
 
@@ -77,6 +80,7 @@ def take_up(
     found, left = dict(solution), list(rolling)
     integrals: list[Integral] = []
     while left:
+        integrals += _held_still(mechanism, motion, found, values, len(integrals))
         state = motion.finish(found)
         places = Places(state, mechanism.time)
         forms = _forms(mechanism, site, state, left)
@@ -102,6 +106,59 @@ def take_up(
         integrals += [one for (members, _), one in zip(new, made, strict=True) if members[-1] in used]
         left = [one for i, one in enumerate(left) if i not in used]
     return Taken(found, {}, tuple(integrals), ())
+
+
+def _held_still(
+    mechanism: Mechanism,
+    motion: Motion,
+    solution: dict[Expression, Expression],
+    values: Values,
+    count: int,
+) -> list[Integral]:
+    """Eliminate coordinates that a constraint on positions keeps where they start, as both wheels do a cart's angle.
+
+    Such a constraint depends on one coordinate alone, which is at a root of it that stands by itself.
+    """
+    table = mechanism.table
+    made: list[Integral] = []
+    assert mechanism.places is not None
+    start = {**table.values, **mechanism.places["reduced"]}
+    for number, (path, one, given) in enumerate(values):
+        if given is SOLVED:
+            continue
+        value = substitute([given], solution)[0] if solution else given
+        state = motion.finish(solution)
+        alone = decide(mechanism, partial(_depends_on_one, Places(state, mechanism.time), value))
+        if alone is None:
+            continue
+        symbol = state.coordinates[alone]
+        (slope,) = jvp([value], {symbol: 1.0})
+        near, away = (evaluate([slope], {**start, symbol: start[symbol] + far})[0] for far in (0.0, 0.5))
+        if not abs(near) > 1e-3 * abs(away):
+            continue
+        constant = table.graph.convert(table.scalar(f"place {count + len(made)}", start[symbol]))
+        solution.update({s: substitute([e], {symbol: constant})[0] for s, e in solution.items()})
+        solution[symbol] = constant
+        values[number] = (path, one, SOLVED)
+        made.append(Integral(((path, one.law.name, one.index),), symbol - constant, constant, False))
+        start = {**start, **table.values}
+    return made
+
+
+def _depends_on_one(places: Places, value: Expression, mechanism: Mechanism) -> int | None:
+    """Return the number of the only coordinate that a value depends on; None if it is not one with a speed of its own.
+
+    What cancels but for rounding, as the product of two directions at a right angle, is no dependence.
+    """
+    state = places.state
+    found = jacobian([value], [*state.coordinates, mechanism.time])
+    numbers = np.abs(places.values(mechanism, found.entries))
+    if len(numbers) < NEEDED or not found.columns:
+        return None
+    sizes = np.max(numbers, axis=0)
+    which = [column for column, size in zip(found.columns, sizes, strict=True) if size > 1e-11 * np.max(sizes)]
+    alone = which[0] if len(which) == 1 else len(state.coordinates)
+    return alone if alone < len(state.coordinates) and state.rates[alone] in set(state.speeds) else None
 
 
 def _holds(value: Expression, solution: Mapping[Expression, Expression], state: Movement) -> bool:

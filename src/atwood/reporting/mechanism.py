@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from atwood.forms.assembly import Assembly
+from atwood.mechanics.frobenius import integrable_together
 from atwood.model.composite import Model
 from atwood.pipeline import assemble, assemble_flat
 from atwood.reporting.offers import Offer, find_offers
@@ -60,6 +61,9 @@ class MechanismReport:
         Coordinates that linear constraints gave as functions of the others.
     integrated
         Constraints on velocities that turned out to hold positions, by themselves or together.
+    on_surfaces
+        Constraints on velocities that are integrable together, though their integrals are not known, so that all
+        motions stay on surfaces.
     solved_speeds
         Rates of coordinates that constraints on velocities gave as functions of the speeds.
     dependent
@@ -120,6 +124,7 @@ class MechanismReport:
     free_speeds: tuple[str, ...]
     repeated: tuple[str, ...]
     integrated: tuple[str, ...]
+    on_surfaces: tuple[str, ...]
     solved_speeds: tuple[str, ...]
     placement: Placement
     immobile: Immobile | None
@@ -157,6 +162,7 @@ class MechanismReport:
             "coordinates": list(self.coordinates),
             "eliminated": list(self.eliminated),
             "integrated": list(self.integrated),
+            "on_surfaces": list(self.on_surfaces),
             "solved_speeds": list(self.solved_speeds),
             "dependent": list(self.dependent),
             "loop_joints": list(self.loop_joints),
@@ -241,7 +247,8 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
         free_coordinates=start.free_coordinates,
         free_speeds=start.free_speeds,
         repeated=start.repeated,
-        integrated=tuple(dict.fromkeys(f"{k[0]}.{k[1]}" for one in reduced.reduced.integrals for k in one.keys)),
+        integrated=_integrated(reduced),
+        on_surfaces=_on_surfaces(reduced),
         solved_speeds=reduced.reduced.solved_speeds,
         placement=find_placement(reduced, start),
         immobile=find_immobile(reduced, len(reduced.reduced.speeds) - plans["reduced"].finding.rank, start),
@@ -250,6 +257,20 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
         offers=find_offers(reduced, start),
         parameters=list_parameters(reduced, None if isinstance(scene, Assembly) else scene),
     )
+
+
+def _integrated(reduced: Assembly) -> tuple[str, ...]:
+    """Return the constraints on velocities that hold positions."""
+    found = [one for one in reduced.reduced.integrals if one.on_velocities]
+    return tuple(dict.fromkeys(f"{path}.{law}" for one in found for path, law, _ in one.keys))
+
+
+def _on_surfaces(reduced: Assembly) -> tuple[str, ...]:
+    """Return the constraints on velocities that are left, if they could be integrated together."""
+    left = [one for one in reduced.reduced.constraints if one.value is None]
+    if not left or not integrable_together(reduced.mechanism, reduced.reduced):
+        return ()
+    return tuple(dict.fromkeys(f"{one.key[0]}.{one.key[1]}" for one in left))
 
 
 def _plan(assembly: Assembly, start: Start) -> Plan:

@@ -109,6 +109,9 @@ def _what_became(report: MechanismReport) -> Iterator[tuple[str, str]]:
     if report.integrated:
         one = "it holds" if len(report.integrated) == 1 else "they hold"
         yield "integrated", f"{shorten(report.integrated)}: {one} positions too, where the start has put them"
+    if report.on_surfaces:
+        text = "integrable, so that motions stay on surfaces, but no simple integral was found"
+        yield "on surfaces", f"{shorten(report.on_surfaces)}: {text}"
     if report.solved_speeds:
         rates = (f"{name}'" for name in report.solved_speeds)
         yield "rolling", f"{shorten(rates)} follow from the other speeds, and only these are states"
