@@ -176,3 +176,16 @@ def test_random_expressions_keep_their_values(recipe, values):
     at = dict(zip(names, values, strict=True))
     np.testing.assert_allclose(ex.evaluate(collected, at), ex.evaluate(outputs, at), rtol=1e-9, atol=1e-9)
     assert cost(collected, names[2:]) <= cost(outputs, names[2:])
+
+
+def test_a_parameter_times_an_angle_is_no_multiple_of_it():
+    """As where a gear turns a wheel: neither whole nor known, so the cosine stays as it is."""
+    graph = ex.Graph()
+    a, b, u, ratio, length = (graph.symbol(name) for name in ("a", "b", "u", "ratio", "length"))
+    geared = a + ratio * b
+    rows = [
+        (length * ex.cos(geared) * u) * ex.cos(a) + (length * ex.sin(geared) * u) * ex.sin(a) + ex.sin(ratio * b),
+        ex.cos(ratio * b) * u - ex.cos(2.0 * b + a) * ex.cos(ratio * a + ratio * b),
+    ]
+    collected = collect(rows, [a, b], [ratio, length])
+    assert_same_values(rows, collected)

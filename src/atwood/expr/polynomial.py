@@ -251,7 +251,7 @@ def _expand_wave(expansion: Expansion, kind: str, argument: Expression, polynomi
     counts = dict.fromkeys(expansion.angles, 0)
     for monomial, coefficient in polynomial.items():
         count = coefficient.get(ONE, 0.0)
-        if len(coefficient) != 1 or not count.is_integer() or len(monomial) != 1 or monomial[0][1] != 1:
+        if len(coefficient) != 1 or not (count and count.is_integer()) or len(monomial) != 1 or monomial[0][1] != 1:
             return _single(expansion.number(Atom(kind, argument)))
         atom = expansion.atoms[monomial[0][0]]
         if atom.kind != "node" or atom.argument not in counts:
