@@ -122,13 +122,16 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
 
 
 def _passages(result: Result) -> Iterator[tuple[str, str]]:
-    """Yield the singular positions that a run passed through: the first, and when it came to others."""
-    if result.passages:
-        yield "singular", result.passages[0].describe()
-        if len(result.passages) > 1:
-            later = [f"{one.time:.6g}" for one in result.passages[1:6]]
-            more = len(result.passages) - 1 - len(later)
-            yield "", f"and in the same way at t = {', '.join(later)}{f' s and {more} more times' if more else ' s'}"
+    """Yield the singular positions of a run: the first of each kind, and when it came to others like it."""
+    for through in (True, False):
+        found = [one for one in result.passages if (one.ways > 0) == through]
+        if not found:
+            continue
+        yield "singular" if through else "not sure", found[0].describe()
+        if len(found) > 1:
+            later = ", ".join(f"{one.time:.6g}" for one in found[1:6])
+            more = count_of(len(found) - 6, "more time") if len(found) > 6 else ""
+            yield "", f"and again at t = {later} s" + (f", and {more}" if more else "")
 
 
 def _energy(result: Result) -> str:

@@ -92,7 +92,7 @@ class Result:
 
     @property
     def passages(self) -> tuple[Passage, ...]:
-        """Singular positions that the run passed through, in order."""
+        """Singular positions that the run passed through, or came too close to, in order."""
         return self.run.passages
 
     @property
@@ -250,8 +250,9 @@ class Result:
         found, clear = np.zeros_like(segment.speeds), np.ones(len(segment.time), dtype=bool)
         for passage in segment.passages:
             inside = passage.has_in_its_middle(segment.time)
-            found[:, inside] = passage.arc.at(segment.time[inside])[2]
-            clear &= ~inside
+            if passage.path is not None:
+                found[:, inside] = passage.path.at(segment.time[inside])[2]
+                clear &= ~inside
         state = segment.time[clear], segment.coordinates[:, clear], segment.speeds[:, clear]
         found[:, clear] = solver.own_accelerations(*state, kept)
         return found

@@ -8,6 +8,7 @@ repeated integration, with each state projected onto the constraints before forc
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -20,12 +21,15 @@ from atwood.solve.problem import Plan
 from atwood.solve.projection import project_safely, project_states
 from atwood.solve.reactions import accelerations_and_multipliers
 
-__all__ = ["Arc", "find_arc"]
+__all__ = ["Arc", "Path", "find_arc", "follow"]
 
 _POINTS, _FEWER = 12, 10
 """Of the polynomials, and of those that they are compared with."""
 
 _SWEEPS = 60
+_PATIENCE = 8
+"""In so many sweeps changes must become clearly smaller."""
+
 _SETTLED = 1e-14
 _ROUNDED = 1e-8
 """Relative to the scene's sizes: changes that are smaller and do not shrink any more are those of rounding."""
@@ -57,6 +61,36 @@ class Arc:
         slope = legendre.legder(self.speeds) * (2.0 / (self.end - self.start))
         q, u, a = (legendre.legval(x, one) for one in (self.coordinates, self.speeds, slope))
         return np.asarray(q), np.asarray(u), np.asarray(a)
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A motion as arcs, each beginning where the one before ends."""
+
+    arcs: tuple[Arc, ...]
+
+    @property
+    def start(self) -> float:
+        """When it begins, s."""
+        return self.arcs[0].start
+
+    @property
+    def end(self) -> float:
+        """When it ends, s."""
+        return self.arcs[-1].end
+
+    def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return coordinates, speeds and accelerations at times, each of shape (number, times)."""
+        t = np.asarray(t, dtype=float)
+        if len(self.arcs) == 1:
+            return self.arcs[0].at(t)
+        which = np.clip(np.searchsorted([one.start for one in self.arcs], t, side="right") - 1, 0, None)
+        shapes = (self.arcs[0].coordinates.shape[1], self.arcs[0].speeds.shape[1], self.arcs[0].speeds.shape[1])
+        found = tuple(np.zeros((number, len(t))) for number in shapes)
+        for i in np.unique(which):
+            for all_of, some in zip(found, self.arcs[i].at(t[which == i]), strict=True):
+                all_of[:, which == i] = some
+        return found[0], found[1], found[2]
 
 
 def find_arc(plan: Plan, t: float, q: FloatArray, u: FloatArray, end: float) -> Arc | None:
@@ -109,8 +143,8 @@ def _settle(
     x, integral = _points(count)
     half = 0.5 * (end - t)
     times, reach = t + half * (x + 1.0), legendre.legvander(x, count)
-    last = np.inf
-    (places, speeds) = guess
+    last, sizes = np.inf, []
+    places, speeds = guess
     for _ in range(_SWEEPS):
         rates, accelerations = _rates(plan, times, places, speeds)
         moved, turned = half * (integral @ rates.T), half * (integral @ accelerations.T)
@@ -121,6 +155,9 @@ def _settle(
         places, speeds = now
         if not np.isfinite(change) or change > 1e3:
             return None
+        sizes.append(change)
+        if len(sizes) > _PATIENCE and change > 0.3 * sizes[-_PATIENCE] and change > _ROUNDED:
+            return None
         if change < _SETTLED or (change < _ROUNDED and change >= 0.5 * last):
             return Arc(t, end, moved, turned, change)
         last = change
@@ -129,10 +166,12 @@ def _settle(
 
 def _rates(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives of coordinates and speeds at states near the constraints."""
-    made = project_states(plan, t, q, u)
-    q, u = made.coordinates, made.speeds
-    for i in np.flatnonzero(made.doubtful | ~np.all(np.isfinite(q), axis=0) | ~np.all(np.isfinite(u), axis=0)):
-        q[:, i], u[:, i] = project_safely(plan, float(t[i]), q[:, i], u[:, i])
+    if plan.balance.constraints:
+        made = project_states(plan, t, q, u)
+        q, u = made.coordinates, made.speeds
+        bad = made.doubtful | ~np.all(np.isfinite(q), axis=0) | ~np.all(np.isfinite(u), axis=0)
+        for i in np.flatnonzero(bad):
+            q[:, i], u[:, i] = project_safely(plan, float(t[i]), q[:, i], u[:, i])
     kept = np.asarray(plan.finding.kept, dtype=np.intp)
     accelerations = accelerations_and_multipliers(plan.assembly, plan.assembly.form, t, q, u, kept)[0]
     turning = plan.balance.turning
@@ -145,3 +184,62 @@ def _size(plan: Plan, q: FloatArray, u: FloatArray) -> float:
     """Return the size of a difference of states, relative to the scene's sizes."""
     places = np.max(np.abs(q) / plan.coordinate_sizes[:, None], initial=0.0)
     return float(max(places, np.max(np.abs(u) * plan.scales.time / plan.sizes[:, None], initial=0.0)))
+
+
+_SMALLEST = 1e-9
+"""Arcs of this length, relative to the whole, are not tried."""
+
+_TRIES = 600
+
+_NOISE = 1e-13
+"""Rounding, which grows with how near a singular position is."""
+
+
+def follow(
+    plan: Plan,
+    state: tuple[float, FloatArray, FloatArray],
+    end: float,
+    tolerance: float,
+    measure: Callable[[FloatArray, FloatArray], FloatArray],
+) -> Path | None:
+    """Return how a motion goes on past a singular position that it comes close to; None if it cannot be followed.
+
+    Arcs become so short that none of them leaps over what it should turn away from: a measure of how near the position
+    is falls on none of them to less than a half.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    state
+        Time, coordinates and speeds, which fulfil the constraints.
+    end
+        When the path is to end.
+    tolerance
+        The error of an arc, relative to the scene's sizes, where rounding leaves room for it.
+    measure
+        Gives the measure at times and places.
+    """
+    t, q, u = state
+    whole, arcs = end - t, []
+    h = 0.25 * whole
+    far = here = float(measure(np.array([t]), q[:, None])[0])
+    x = _points(_POINTS)[0]
+    for _ in range(_TRIES):
+        h = min(h, end - t)
+        arc = find_arc(plan, t, q, u, t + h)
+        if arc is not None and arc.error < max(tolerance, _NOISE * far / here):
+            times = np.append(t + 0.5 * h * (x + 1.0), arc.end)
+            away = measure(times, arc.at(times)[0])
+            if np.min(away) >= 0.5 * here:
+                arcs.append(arc)
+                if arc.end >= end:
+                    return Path(tuple(arcs))
+                q, u, _ = (one[:, 0] for one in arc.at(np.array([arc.end])))
+                q, u = project_safely(plan, arc.end, q, u)
+                t, here, h = arc.end, float(away[-1]), 1.6 * h
+                continue
+        h *= 0.4
+        if h < _SMALLEST * whole:
+            return None
+    return None

@@ -34,8 +34,9 @@ def checked_state(size: int, t: float, y: FloatArray, yp: FloatArray) -> State:
 
 def is_finite(y: FloatArray, yp: FloatArray) -> bool:
     """Tell whether all values are finite; a sum of squares says so quickly, unless it overflows."""
-    if np.dot(y, y) + np.dot(yp, yp) < inf:
-        return True
+    with np.errstate(over="ignore"):
+        if np.dot(y, y) + np.dot(yp, yp) < inf:
+            return True
     return bool(np.isfinite(y).all() and np.isfinite(yp).all())
 
 

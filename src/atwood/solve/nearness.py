@@ -19,14 +19,14 @@ from atwood.solve.matrices import scaled, to_array
 from atwood.solve.problem import Plan
 from atwood.solve.projection import ConstraintsAt, constraints_at
 
-__all__ = ["Loss", "Nearness", "crossing", "find_loss"]
+__all__ = ["Loss", "Nearness", "crossing", "find_loss", "nearly_lost"]
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
 _LOST = 1e-5
 """The measure at a singular position, relative to that a little away from it: what is left is that of rounding."""
 
-_HOLDS = 1e-10
+_HOLDS = 5e-10
 """Relative to the scene's sizes: what a place that constraints admit may miss them by.
 
 Where links nearly fit, two ways of moving come close to each other and do not meet; a motion turns from one into the
@@ -45,10 +45,13 @@ class Loss:
         kept depend on each other, and some that were left out take their places.
     constraints
         Numbers of constraints that follow from those before them there, and nowhere near.
+    gap
+        By how much the place misses the constraints, relative to the scene's sizes.
     """
 
     rank: int
     constraints: tuple[int, ...]
+    gap: float = 0.0
 
 
 class Nearness:
@@ -176,7 +179,15 @@ def find_loss(measure: Nearness, arc: Arc, t: float, away: float) -> Loss | None
     if lost <= 0:
         return Loss(0, ())
     left = set(_independent(slope, least))
-    return Loss(lost, tuple(i for i in kept if i not in left))
+    return Loss(lost, tuple(i for i in kept if i not in left), float(np.max(misses, initial=0.0)))
+
+
+def nearly_lost(measure: Nearness, t: float, q: FloatArray) -> int:
+    """Return the number of the constraint that most nearly follows from the others at a place."""
+    slope, _ = measure.slope_at(t, measure.plan.balance.turning.normalized(q))
+    kept = list(measure.plan.finding.kept)
+    left = np.linalg.svd(slope[kept])[0]
+    return kept[int(np.argmax(np.abs(left[:, -1])))]
 
 
 def _independent(slope: FloatArray, least: float) -> list[int]:

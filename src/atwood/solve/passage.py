@@ -1,121 +1,104 @@
-"""Singular positions on the way of a run: seen when they come near, and passed through smoothly.
+"""Singular positions that a run passed through, or came close to.
 
 Where all bars of a row of parallelograms lie in one line some constraints follow from the others, and how the
-mechanism goes on is not determined by where it is. Its motion until then goes on smoothly in one way only, which is
-found as polynomials over the place (`atwood.solve.collocation`). A solver that takes steps would come to grief there at
-small tolerances, and at large ones it could leap into another way to move without a complaint.
+mechanism goes on is not determined by where it is. Its motion until then goes on smoothly in one way only.
 """
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import AtwoodError
-from atwood.solve.collocation import Arc, find_arc
-from atwood.solve.driver import Advance, FloatArray, Status
+from atwood.solve.collocation import Path
+from atwood.solve.driver import FloatArray
 from atwood.solve.event_watch import EventWatch, Root, State
 from atwood.solve.modes import EventProbe
-from atwood.solve.nearness import Nearness, crossing, find_loss
 from atwood.solve.problem import Plan
-from atwood.solve.projection import project_safely
 
-__all__ = ["Guard", "Passage", "events_on", "guard_of"]
+__all__ = ["Passage", "events_on"]
 
-_MOVE = 0.3
-"""Between two looks nothing moves by more of its size; an angle by so many radians."""
-
-_REVIEW = 8
-"""So many looks are judged together."""
-
-_LOW = 0.3
-"""Only where the measure is so small, relative to the largest so far, is it looked at more closely."""
-
-_CLOSE = 0.05
-"""The same on the finer look."""
-
-_REACH = 0.2
-"""An arc begins so far before the place, in what moves most, if it can."""
-
-_CENTRED = 0.06
-"""So far from its middle an arc may pass the place, relative to half its length; its points keep twice that away."""
-
-_FINE = 17
-
-_AGREES = 30.0
-"""Times the tolerance: a solver whose states behind the place differ by less from the arc has gone the same way."""
+_PIECES = 8
+"""In so many pieces a path is searched for events."""
 
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """A singular position that a run passed through.
+    """A singular position that a run passed through, or came close to.
 
     Attributes
     ----------
     time
         When, s.
     ways
-        How many more degrees of freedom the mechanism has there than near by.
+        How many more degrees of freedom the mechanism has there than near by; zero where it only comes close.
     constraints
         What follows from the other constraints there, and nowhere near.
     parts
         The parts that these belong to.
-    arc
-        The motion over the place.
+    path
+        The motion over the place or past it; None where it could not be told.
+    gap
+        By how much the constraints do not quite hold there, relative to the scene's sizes.
     """
 
     time: float
     ways: int
     constraints: tuple[str, ...]
     parts: tuple[str, ...]
-    arc: Arc
+    path: Path | None
+    gap: float = 0.0
+
+    @property
+    def is_told(self) -> bool:
+        """Whether there is something to tell: not where a motion only came close, and could be followed."""
+        return self.ways > 0 or self.path is None
 
     def has_in_its_middle(self, t: FloatArray) -> NDArray[np.bool_]:
-        """Return which times are so near that states are better taken from the arc than projected."""
-        return np.asarray(np.abs(t - self.time) < 0.1 * (self.arc.end - self.time))
+        """Return which times are so near that states are better taken from the path than projected."""
+        return np.asarray(np.abs(t - self.time) < 0.1 * self._half)
 
     def leaves_open(self, t: FloatArray) -> NDArray[np.bool_]:
         """Return at which times reactions are not determined, within rounding."""
-        return np.asarray(np.abs(t - self.time) < 1e-6 * (self.arc.end - self.time))
+        return np.asarray(np.abs(t - self.time) < 1e-6 * self._half) if self.ways else np.zeros(len(t), dtype=bool)
+
+    @property
+    def _half(self) -> float:
+        return 0.0 if self.path is None else self.path.end - self.time
 
     def describe(self) -> str:
         """Return it as a sentence."""
-        said = ", ".join(self.constraints[:3]) + (
-            f" and {len(self.constraints) - 3} more" * (len(self.constraints) > 3)
-        )
+        more = len(self.constraints) - 3
+        said = ", ".join(self.constraints[:3]) + (f" and {more} more" if more > 0 else "")
         follow = "follows" if len(self.constraints) == 1 else "follow"
+        if self.path is None:
+            return (
+                f"t = {self.time:.6g} s: came so close to a singular position, where {said} nearly {follow} from the "
+                "other constraints, that it could not be told which way the mechanism goes on: do not rely on what "
+                "comes after"
+            )
         return (
             f"t = {self.time:.6g} s: passed through a singular position, where {said} {follow} from the other "
             f"constraints and there {'is one more way' if self.ways == 1 else f'are {self.ways} more ways'} to move; "
-            "went on smoothly"
+            f"went on smoothly{self._fit}"
         )
 
-
-def guard_of(plan: Plan, tolerance: float, advance: Advance) -> Guard | None:
-    """Return what looks out for singular positions; None where there can be none: without loops.
-
-    Without projection (plain index 1) drift is to be seen, and nothing is looked out for.
-
-    Parameters
-    ----------
-    plan, tolerance, advance
-        See `Guard`.
-    """
-    if not plan.is_projected or not plan.assembly.reduced.constraints:
-        return None
-    return Guard(plan, tolerance, advance)
+    @property
+    def _fit(self) -> str:
+        """What is to be said of lengths that do not quite fit."""
+        if self.gap < 1e-12:
+            return ""
+        return f" (lengths fit there to {self.gap:.0e} of the scene's size, which was taken for exactly)"
 
 
-def events_on(arc: Arc, plan: Plan, probe: EventProbe) -> Root | None:
-    """Return the first event on the way of an arc; None if there is none.
+def events_on(path: Path, plan: Plan, probe: EventProbe) -> Root | None:
+    """Return the first event on a path; None if there is none.
 
     Parameters
     ----------
-    arc
+    path
         The motion.
     plan, probe
         The scene in its mode, and what is watched.
@@ -125,243 +108,14 @@ def events_on(arc: Arc, plan: Plan, probe: EventProbe) -> Root | None:
     size, n, m = plan.program.size, plan.program.coordinates, len(plan.sizes)
 
     def at(t: float) -> State:
-        q, u, a = (one[:, 0] for one in arc.at(np.array([t])))
+        q, u, a = (one[:, 0] for one in path.at(np.array([t])))
         y, yp = np.zeros(size), np.zeros(size)
         y[:n], y[n : n + m], yp[n : n + m] = plan.balance.turning.normalized(q), u, a
         yp[:n] = plan.balance.turning.rates(t, y[:n], u)
         return t, y, yp
 
-    watch = EventWatch(plan.problem(probe.function(), probe.directions), arc.end - arc.start)
-    watch.restart(at(arc.start))
-    times = np.linspace(arc.start, arc.end, _REVIEW + 1).tolist()
+    watch = EventWatch(plan.problem(probe.function(), probe.directions), path.end - path.start)
+    watch.restart(at(path.start))
+    times = np.linspace(path.start, path.end, _PIECES + 1).tolist()
     found = (watch.search(one, other, at) for one, other in pairwise(times))
     return next((root for root in found if root is not None), None)
-
-
-@dataclass(frozen=True, eq=False)
-class _Look:
-    t: float
-    y: FloatArray
-    yp: FloatArray
-
-
-class Guard:
-    """Looks out for singular positions while a scene runs.
-
-    When it looks depends on the motion alone, so that outputs change nothing.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    tolerance
-        The relative tolerance of the run.
-    advance
-        The state at its start.
-
-    Attributes
-    ----------
-    seconds
-        Time spent.
-    agreed
-        Passages that the solver made by itself, and well; whoever takes them into a record empties the list.
-    """
-
-    def __init__(self, plan: Plan, tolerance: float, advance: Advance) -> None:
-        self.plan, self.tolerance = plan, tolerance
-        self.seconds = 0.0
-        self.agreed: list[Passage] = []
-        self._n, self._m = plan.program.coordinates, len(plan.sizes)
-        self._looks: list[_Look] = []
-        self._away: list[float] = []
-        self._judged = -np.inf
-        self._largest = 0.0
-        self._measures = Nearness(plan)
-        self.restart(advance)
-
-    def restart(self, advance: Advance) -> None:
-        """Begin again from a state."""
-        self._looks, self._away = [], []
-        self._judged = advance.t
-        self.note(advance)
-
-    def note(self, advance: Advance) -> None:
-        """Take up a state, and decide when to look again."""
-        if self._looks and advance.t <= self._looks[-1].t:
-            return
-        self._looks.append(_Look(advance.t, advance.y, advance.yp))
-        self.next = advance.t + self._stride(advance)
-
-    def _stride(self, advance: Advance) -> float:
-        """Return the time in which something moves as far as it may."""
-        u, a = advance.y[self._n : self._n + self._m], advance.yp[self._n : self._n + self._m]
-        speed, pull = float(np.max(np.abs(u) / self.plan.sizes)), float(np.max(np.abs(a) / self.plan.sizes))
-        if not np.isfinite(speed + pull):
-            return np.inf
-        # the root of pull/2 h^2 + speed h = move, without cancellation
-        below = speed + np.sqrt(speed * speed + 2.0 * pull * _MOVE)
-        return 2.0 * _MOVE / below if below > 0.0 else np.inf
-
-    def look(self, advance: Advance, between: bool, at_end: bool) -> Passage | None:
-        """Take up what a solver gave, and return the first singular position over which it must be helped.
-
-        Parameters
-        ----------
-        advance
-            Where the solver is, or where and why it ended.
-        between
-            Whether this is where the guard wanted to look, and not an output.
-        at_end
-            Whether the run is to end here.
-        """
-        ended = advance.status is not Status.REACHED
-        if not (between or at_end or ended):
-            return None
-        self.note(advance)
-        if len(self._looks) - len(self._away) < _REVIEW and not (at_end or ended):
-            return None
-        began = time.perf_counter()
-        try:
-            self._measure()
-            found = self._first_minimum(at_end or ended)
-            if found is None and advance.status is Status.FAILED:
-                found = self._ahead()
-            self._forget()
-            return found
-        finally:
-            self.seconds += time.perf_counter() - began
-
-    def _ahead(self) -> Passage | None:
-        """Return the singular position towards which the motion was going when a solver failed; None if to none."""
-        times, away = [one.t for one in self._looks], self._away
-        for last in (len(away) - 1, len(away) - 2):
-            if last < 1 or not 0.0 <= away[last] < away[last - 1]:
-                continue
-            step = times[last] - times[last - 1]
-            t = times[last] + step * away[last] / (away[last - 1] - away[last])
-            found = self._pass(t) if t < times[last] + 3.0 * step else None
-            if found is not None:
-                return found
-        return None
-
-    def _measure(self) -> None:
-        new = self._looks[len(self._away) :]
-        if new:
-            t = np.array([one.t for one in new])
-            q = np.stack([one.y[: self._n] for one in new], axis=1)
-            self._measures.learn(t, q)
-            self._away += self._measures.at(t, q).tolist()
-            self._largest = max(self._largest, float(np.nanmax(self._away[-len(new) :])))
-
-    def _forget(self) -> None:
-        """Drop looks that are not needed any more."""
-        cut = len(self._looks) - 6
-        if cut > 0:
-            del self._looks[:cut], self._away[:cut]
-
-    def _first_minimum(self, at_end: bool) -> Passage | None:
-        away = self._away
-        for i in range(len(away) if at_end else len(away) - 1):
-            t = self._looks[i].t
-            if t <= self._judged:
-                continue
-            self._judged = t
-            before = away[i - 1] if i else np.inf
-            behind = away[i + 1] if i + 1 < len(away) else np.inf
-            if away[i] > before or away[i] > behind or away[i] > _LOW * self._largest:
-                continue
-            near = self._closest(max(i - 1, 0), min(i + 1, len(away) - 1))
-            found = None if near is None else self._pass(near)
-            if found is None:
-                continue
-            if not self._went_along(found):
-                return found
-            self.agreed.append(found)
-        return None
-
-    def _went_along(self, passage: Passage) -> bool:
-        """Return whether the solver went over a singular position by itself, the same way and as accurately."""
-        arc, n, m = passage.arc, self._n, self._m
-        behind = passage.time + 0.1 * (arc.end - passage.time)
-        looks = [one for one in self._looks if behind < one.t <= arc.end]
-        if not looks:
-            return False
-        q, u, _ = arc.at(np.array([one.t for one in looks]))
-        y = np.stack([one.y for one in looks], axis=1)
-        turning = self.plan.balance.turning
-        places = (turning.normalized(y[:n]) - turning.normalized(q)) / self.plan.coordinate_sizes[:, None]
-        speeds = (y[n : n + m] - u) / self.plan.sizes[:, None] * self.plan.scales.time
-        apart = max(float(np.max(np.abs(places))), float(np.max(np.abs(speeds))))
-        return apart < _AGREES * self.tolerance and passage.time not in {one.time for one in self.agreed}
-
-    def _closest(self, first: int, last: int) -> float | None:
-        """Return when the motion between some looks is closest to a singular position, if that is close."""
-        times, places = [], []
-        for one, other in zip(self._looks[first:last], self._looks[first + 1 : last + 1], strict=True):
-            h = other.t - one.t
-            s = np.linspace(0.0, 1.0, _FINE)
-            # the cubic through both states with their rates
-            a, b = one.y[: self._n, None], other.y[: self._n, None]
-            v, w = h * one.yp[: self._n, None], h * other.yp[: self._n, None]
-            places.append(a + s * v + s**2 * (3.0 * (b - a) - 2.0 * v - w) + s**3 * (2.0 * (a - b) + v + w))
-            times.append(one.t + h * s)
-        if not times:
-            return None
-        t, q = np.concatenate(times), np.concatenate(places, axis=1)
-        away = self._measures.at(t, q)
-        if not np.all(np.isfinite(away)):
-            return None
-        least = int(np.argmin(away))
-        if away[least] > _CLOSE * self._largest or least in (0, len(t) - 1):
-            return None
-        return float(t[least])
-
-    def _pass(self, near: float) -> Passage | None:
-        """Return the passage near a time; None where there is no singular position."""
-        for reach in (1.0, 2.0, 0.5):
-            begin = self._begin(near, reach)
-            if begin is None:
-                continue
-            found = self._over(near, *begin)
-            if found is not None:
-                return found
-        return None
-
-    def _begin(self, near: float, reach: float) -> tuple[float, FloatArray, FloatArray] | None:
-        """Return a state from which an arc may start."""
-        one = next((one for one in reversed(self._looks) if self._is_before(one, near, reach)), None)
-        if one is None:
-            one = self._looks[0] if self._looks[0].t < near else None
-        if one is None:
-            return None
-        q, u = one.y[: self._n], one.y[self._n : self._n + self._m]
-        try:
-            return one.t, *project_safely(self.plan, one.t, q, u)
-        except AtwoodError:
-            return None
-
-    def _is_before(self, one: _Look, near: float, reach: float) -> bool:
-        u = one.y[self._n : self._n + self._m]
-        return float(np.max(np.abs(u) / self.plan.sizes)) * (near - one.t) >= reach * _REACH
-
-    def _over(self, near: float, t: float, q: FloatArray, u: FloatArray) -> Passage | None:
-        """Return the way over a singular position near a time, from a state."""
-        plan = self.plan
-        for _ in range(6):
-            arc = find_arc(plan, t, q, u, 2.0 * near - t)
-            if arc is None or not arc.error < max(self.tolerance, 1e-7):
-                return None
-            found = crossing(self._measures, arc)
-            if found is None or found[0] <= t:
-                return None
-            now, away = found
-            if abs(now - near) > _CENTRED * (near - t):
-                near = now
-                continue
-            loss = find_loss(self._measures, arc, now, away)
-            if loss is None:
-                return None
-            constraints = [plan.assembly.equations.constraints[i] for i in loss.constraints]
-            parts = tuple(dict.fromkeys(one.key[0] for one in constraints))
-            return Passage(now, loss.rank, tuple(one.label for one in constraints), parts, arc)
-        return None

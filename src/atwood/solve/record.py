@@ -133,15 +133,16 @@ class Recorder:
         Parameters
         ----------
         passage
-            The passage.
+            The passage, with its path.
         t, shown
             Sample times on its way, and which of them are outputs.
         """
-        self._rewind(passage.arc.start)
+        assert passage.path is not None
+        self._rewind(passage.path.start)
         self.settle()
         self.passages.append(passage)
         if len(t):
-            q, u, _ = passage.arc.at(t)
+            q, u, _ = passage.path.at(t)
             q = self.plan.balance.turning.normalized(q)
             self._add(_Block(t, q, u, shown.copy(), misses_of(self.plan, t, q, u)))
 
@@ -152,8 +153,8 @@ class Recorder:
             self.passages.append(passage)
             for block in self._samples[0]:
                 inside = passage.has_in_its_middle(block.time)
-                if inside.any():
-                    q, u, _ = passage.arc.at(block.time[inside])
+                if passage.path is not None and inside.any():
+                    q, u, _ = passage.path.at(block.time[inside])
                     block.q[:, inside], block.u[:, inside] = self.plan.balance.turning.normalized(q), u
 
     def _rewind(self, t: float) -> None:

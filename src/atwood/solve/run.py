@@ -69,8 +69,8 @@ class Run:
 
     @property
     def passages(self) -> tuple[Passage, ...]:
-        """Singular positions that it passed through, in order."""
-        return tuple(one for segment in self.segments for one in segment.passages if one.ways)
+        """Singular positions that it passed through, or came too close to, in order."""
+        return tuple(one for segment in self.segments for one in segment.passages if one.is_told)
 
     @property
     def solver(self) -> str:

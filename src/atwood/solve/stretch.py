@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,11 +12,12 @@ from atwood.errors import SolveError
 from atwood.solve.choice import Choice, stiffness_of, turned_stiff
 from atwood.solve.driver import Advance, Budget, FloatArray, Session, Statistics, Status
 from atwood.solve.explicit_session import ExplicitSession
+from atwood.solve.guard import Guard, guard_of
 from atwood.solve.missing import find_missing, states_ahead
 from atwood.solve.modes import EventProbe, Happening
 from atwood.solve.opening import Order, open_explicit_session, open_implicit_session
 from atwood.solve.options import RunOptions
-from atwood.solve.passage import Guard, Passage, events_on, guard_of
+from atwood.solve.passage import Passage, events_on
 from atwood.solve.problem import Plan, pack_state
 from atwood.solve.projection import project_safely
 from atwood.solve.record import Recorder
@@ -274,6 +276,9 @@ class _Runner:
                 continue
             if guard is not None and guard.agreed:
                 recorder.note(guard.agreed)
+                for one in guard.agreed:
+                    if one.path is None:
+                        warnings.warn(one.describe(), stacklevel=2)
                 guard.agreed.clear()
             if advance.status is not Status.REACHED:
                 return done, advance
@@ -291,22 +296,23 @@ class _Runner:
 
     def _pass_over(self, session: Session, passage: Passage) -> tuple[int, Advance | None]:
         """Take a passage into the record and go on behind it, unless something happens on its way."""
-        stretch, plan, arc = self.stretch, self.stretch.plan, passage.arc
+        stretch, plan, path = self.stretch, self.stretch.plan, passage.path
+        assert path is not None
         times = stretch.times
-        root = events_on(arc, plan, stretch.probe)
-        end = arc.end if root is None else min(arc.end, root.state[0])
-        first, done = (int(np.searchsorted(times, one, side="right")) for one in (arc.start, end))
+        root = events_on(path, plan, stretch.probe)
+        end = path.end if root is None else min(path.end, root.state[0])
+        first, done = (int(np.searchsorted(times, one, side="right")) for one in (path.start, end))
         self.recorder.pass_over(passage, times[first:done], stretch.shown[first:done])
         if root is not None and root.state[0] <= stretch.end:
             return done, Advance(*root.state, Status.EVENT, root.events)
         if done < len(times):
-            q, u, _ = (one[:, 0] for one in arc.at(np.array([arc.end])))
-            q, u = project_safely(plan, arc.end, q, u)
-            plan.review_dependent(arc.end, q)
-            y, yp = pack_state(plan, arc.end, q, u)
-            session.reinitialize(arc.end, y, yp)
+            q, u, _ = (one[:, 0] for one in path.at(np.array([path.end])))
+            q, u = project_safely(plan, path.end, q, u)
+            plan.review_dependent(path.end, q)
+            y, yp = pack_state(plan, path.end, q, u)
+            session.reinitialize(path.end, y, yp)
             assert self.guard is not None
-            self.guard.restart(Advance(arc.end, y, yp, Status.REACHED))
+            self.guard.restart(Advance(path.end, y, yp, Status.REACHED))
         return done, None
 
     def _chose_anew(self, session: Session, advance: Advance) -> bool:
