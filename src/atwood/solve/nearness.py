@@ -86,6 +86,8 @@ class Nearness:
         share = now.rows / self.rows
         if now.normal is None:
             slopes = (now.slope * share[:, :, None])[:, now.kept]
+            if not slopes.shape[1]:
+                return np.ones(len(t))  # what constraints there are follow from what is eliminated
             if not np.all(np.isfinite(slopes)):
                 return np.full(len(t), np.nan)
             return np.asarray(np.linalg.svd(slopes, compute_uv=False)[:, -1])
