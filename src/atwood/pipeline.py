@@ -16,6 +16,7 @@ from atwood.errors import StartError, UsageError, suggestion
 from atwood.expr import Graph
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import LEVELS
+from atwood.forms.places import regular_to_maximal
 from atwood.forms.source import Source
 from atwood.forms.starting import with_places
 from atwood.mechanics.build import Mechanism, check_closures, make_gravity
@@ -32,6 +33,7 @@ from atwood.solve.run import run
 from atwood.solve.sides import actual_sides, sides_differ
 from atwood.solve.start import find_start
 from atwood.topology.bodies import find_bodies
+from atwood.topology.charts import Orientation, check_orientation
 from atwood.topology.graph import build_graph
 from atwood.topology.sides import find_sides
 
@@ -40,7 +42,14 @@ __all__ = ["Assembly", "assemble", "assemble_flat", "simulate"]
 FORMS = ("reduced", "dae")
 
 
-def assemble(scene: Model, *, form: str = "reduced", level: str = "ggl", name: str | None = None) -> Assembly:
+def assemble(
+    scene: Model,
+    *,
+    form: str = "reduced",
+    level: str = "ggl",
+    orientation: str = "quaternion",
+    name: str | None = None,
+) -> Assembly:
     """Assemble a scene in one form.
 
     Parameters
@@ -52,6 +61,11 @@ def assemble(scene: Model, *, form: str = "reduced", level: str = "ggl", name: s
         stay, with Lagrange multipliers.
     level
         Of the dae form: ``"ggl"``, ``"index1-projected"`` or ``"index1"``.
+    orientation
+        In which coordinates the reduced form has orientations in space: ``"quaternion"``, ``"rodrigues"`` (modified
+        Rodrigues parameters), ``"rotation-vector"``, or Euler angles such as ``"euler-zyz"``, in any of the twelve
+        conventions, as turns about axes of the frame that the turns before have made. Three coordinates are restated
+        along a run before they become singular. The speeds are the angular velocity in the axes of the body in all.
     name
         What to call the scene.
 
@@ -65,7 +79,7 @@ def assemble(scene: Model, *, form: str = "reduced", level: str = "ggl", name: s
     AtwoodError
         If the scene is not sound; the error names the part.
     """
-    made = assemble_flat(flatten(scene, name), form=form, level=level)
+    made = assemble_flat(flatten(scene, name), form=form, level=level, orientation=orientation)
     return replace(made, source=Source(_assemble_like, scene.copy()))
 
 
@@ -74,6 +88,7 @@ def assemble_flat(
     *,
     form: str = "reduced",
     level: str = "ggl",
+    orientation: str = "quaternion",
     modes: Mapping[str, str] | None = None,
     sides: Mapping[tuple[str, str, str], float] | None = None,
 ) -> Assembly:
@@ -83,7 +98,7 @@ def assemble_flat(
     ----------
     flat
         The scene.
-    form, level
+    form, level, orientation
         See `assemble`.
     modes
         Mode of each part that has modes; the usual one where it is not given.
@@ -94,6 +109,7 @@ def assemble_flat(
         raise UsageError(f"there is no form {form!r}", advice=suggestion(form, FORMS))
     if level not in LEVELS:
         raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
+    check_orientation(orientation, form)
     all_modes = {
         path: str(part.values.get(part.component.mode_parameter, part.component.modes[0]))
         for path, part in flat.parts.items()
@@ -102,7 +118,9 @@ def assemble_flat(
     all_modes.update(modes or {})
     mechanism = read_mechanism(flat, all_modes, sides)
     chosen: Any = form
-    made = Assembly(flat, mechanism, chosen, level if form == "dae" else "", all_modes, Source(_assemble_like))
+    level = level if form == "dae" else ""
+    source, charts = Source(_assemble_like), Orientation(orientation)
+    made = Assembly(flat, mechanism, chosen, level, all_modes, source, orientation=charts)
     return made if all_modes or not holds_velocities(mechanism) else _with_start(made)
 
 
@@ -112,8 +130,8 @@ def _with_start(assembly: Assembly) -> Assembly:
     Where parts have modes, another mode could begin with other constants, and everything stays as it is.
     """
     start = find_start(assembly)
-    reduced, maximal = assembly.reduced, assembly.maximal
-    q, _ = assembly.kernel(assembly.to_maximal)([start.time], start.coordinates, start.speeds)
+    reduced, maximal = assembly.regular, assembly.maximal
+    q, _ = assembly.kernel(regular_to_maximal(assembly))([start.time], start.coordinates, start.speeds)
     time = {assembly.mechanism.time: start.time}
     places = {
         "reduced": {**time, **dict(zip(reduced.coordinates, start.coordinates.tolist(), strict=True))},
@@ -128,7 +146,8 @@ def _assemble_like(
     modes: Mapping[str, str] | None = None,
     sides: Mapping[tuple[str, str, str], float] | None = None,
 ) -> Assembly:
-    return assemble_flat(flat, form=like.form, level=like.level or "ggl", modes=modes, sides=sides)
+    kind, level = like.orientation.kind, like.level or "ggl"
+    return assemble_flat(flat, form=like.form, level=level, orientation=kind, modes=modes, sides=sides)
 
 
 def read_mechanism(
@@ -177,6 +196,7 @@ def simulate(
     *,
     form: str = "reduced",
     level: str = "ggl",
+    orientation: str = "quaternion",
     t_end: float | None = None,
     rtol: float = 1e-8,
     outputs: Any = 201,
@@ -193,7 +213,7 @@ def simulate(
     ----------
     scene
         The scene, or an assembly of it, which then says the form.
-    form, level
+    form, level, orientation
         See `assemble`.
     t_end
         Time of the end, s; the scene's own if not given.
@@ -230,7 +250,9 @@ def simulate(
     SolveError
         If the solver fails.
     """
-    assembly = scene if isinstance(scene, Assembly) else assemble(scene, form=form, level=level)
+    assembly = (
+        scene if isinstance(scene, Assembly) else assemble(scene, form=form, level=level, orientation=orientation)
+    )
     flat = assembly.flat
     options = RunOptions(
         t_end=flat.t_end if t_end is None else float(t_end),

@@ -246,7 +246,7 @@ def test_states_pass_between_modes(form: str) -> None:
     assert [one.law for one in ordinary.happenings][:2] == ["comes_taut", "goes_slack"]
     assembly = with_directions(rod_on_a_rope(), form)
 
-    def reassemble(modes: Mapping[str, str], sides: Mapping[tuple[str, str, str], float]) -> Assembly:
+    def reassemble(modes: Mapping[str, str], sides: Mapping[tuple[str, str, str], float], _: object) -> Assembly:
         return turn_directed(assemble_flat(assembly.flat, form=form, modes=modes, sides=sides))
 
     options = RunOptions(t_end=1.5, relative_tolerance=1e-9, outputs=31)

@@ -68,15 +68,27 @@ def list_command(as_json: bool) -> None:
     list_scenes(as_json)
 
 
+_ORIENTATION = click.option(
+    "--orientation",
+    default="quaternion",
+    show_default=True,
+    metavar="NAME",
+    help="Coordinates of orientations in space: quaternion, rodrigues, rotation-vector, euler-zyz and its like.",
+)
+
+
 @main.command("info", short_help="Say what a scene is made of, before any run.", epilog=_SCENE_HELP)
 @_scene_options
 @click.option("--moved", is_flag=True, help="Show in full what the start moved from where it was guessed.")
+@_ORIENTATION
 @reporting_errors
-def info_command(scene: str, settings: tuple[str, ...], starts: tuple[str, ...], as_json: bool, moved: bool) -> None:
+def info_command(
+    scene: str, settings: tuple[str, ...], starts: tuple[str, ...], as_json: bool, moved: bool, orientation: str
+) -> None:
     """Say what SCENE is made of: bodies, joints, freedom, constraints, and what its equations cost."""
     from atwood.cli.info import show_info
 
-    show_info(scene, settings, starts, as_json, moved)
+    show_info(scene, settings, starts, as_json, moved, orientation)
 
 
 _FORM = click.Choice(["reduced", "dae"])
@@ -91,6 +103,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option(
     "--level", type=_LEVEL, default="ggl", show_default=True, help="Level of the constraints of the dae form."
 )
+@_ORIENTATION
 @click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
 @click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative tolerance of the solver.")
 @click.option(

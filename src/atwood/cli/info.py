@@ -15,7 +15,14 @@ if TYPE_CHECKING:
 __all__ = ["show_info"]
 
 
-def show_info(scene: str, settings: Sequence[str], starts: Sequence[str], as_json: bool, moved: bool = False) -> None:
+def show_info(
+    scene: str,
+    settings: Sequence[str],
+    starts: Sequence[str],
+    as_json: bool,
+    moved: bool = False,
+    orientation: str = "quaternion",
+) -> None:
     """Show what a scene is made of.
 
     Parameters
@@ -26,11 +33,13 @@ def show_info(scene: str, settings: Sequence[str], starts: Sequence[str], as_jso
         Whether to write JSON.
     moved
         Whether to show, instead of the parameters, all that the start moved.
+    orientation
+        See `atwood.assemble`.
     """
     from atwood.reporting import report
 
     model, name = prepare(scene, settings, starts)
-    found = report(model, name)
+    found = report(model, name, orientation=orientation)
     if as_json:
         print_json(found.to_dict())
     else:

@@ -32,6 +32,7 @@ class RunRequest:
     starts: tuple[str, ...] = ()
     form: str = "reduced"
     level: str = "ggl"
+    orientation: str = "quaternion"
     t_end: float | None = None
     rtol: float = 1e-8
     solver: str = "auto"
@@ -59,7 +60,7 @@ def run_scene(request: RunRequest) -> None:
     scene, name = prepare(request.scene, request.settings, request.starts)
     from atwood.pipeline import assemble, simulate
 
-    assembly = assemble(scene, form=request.form, level=request.level, name=name)
+    assembly = assemble(scene, form=request.form, level=request.level, orientation=request.orientation, name=name)
     if request.view is not None:
         from atwood.view.camera import check_view
 

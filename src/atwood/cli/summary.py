@@ -106,6 +106,11 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         yield "ended early", f"{said}: {result.message}" if result.message else said
     yield from (("event", one.describe()) for one in result.happenings if one.target != "stop")
     yield from _passages(result)
+    if result.restated:
+        times = sorted({one.time for one in result.restated})
+        often = count_of(len(result.restated), "time")
+        span = f"at t = {times[0]:.6g} s" if len(times) == 1 else f"from t = {times[0]:.6g} to {times[-1]:.6g} s"
+        yield "orientation", f"{result.assembly.orientation.kind}, restated {often} {span}"
     yield (
         "solver",
         f"{solver_name(result)}, {count_of(statistics.steps, 'step')}, {statistics.residual_evaluations} residuals, "

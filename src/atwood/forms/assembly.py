@@ -14,6 +14,7 @@ from atwood.errors import ParameterError, UsageError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.collect import collect
 from atwood.forms.dae import dae_form, keep_constraints
+from atwood.forms.places import maximal_program
 from atwood.forms.program import (
     BalanceProgram,
     FormProgram,
@@ -31,11 +32,14 @@ from atwood.mechanics.equations import Equations
 from atwood.mechanics.observables import Observable, Reaction, energies, list_reactions
 from atwood.mechanics.reading import observe
 from atwood.model.flatten import FlatScene, flatten
+from atwood.topology.charts import Orientation
 from atwood.topology.forest import grow_forest
 
 __all__ = ["Assembly", "FormName"]
 
 FormName = Literal["reduced", "dae"]
+Coordinates = Literal["reduced", "regular", "dae"]
+"""Those of the reduced form, the same with quaternions for orientations, and those of the dae form."""
 FloatArray = NDArray[np.float64]
 
 _BY_HAND = 12
@@ -64,6 +68,8 @@ class Assembly:
         Why other values needed equations of their own; empty for what they did not.
     shared
         What all assemblies of this structure share: equations, programs and their code.
+    orientation
+        In which coordinates the reduced form has orientations in space.
     """
 
     flat: FlatScene
@@ -74,6 +80,7 @@ class Assembly:
     source: Source | None = field(default=None, repr=False)
     why_new: str = ""
     shared: Shared = field(default_factory=Shared, repr=False)
+    orientation: Orientation = field(default_factory=Orientation)
     _kernels: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     # -- equations ------------------------------------------------------------------------------------------------
@@ -81,21 +88,34 @@ class Assembly:
     @property
     def reduced(self) -> Equations:
         """The equations in generalized coordinates."""
-        return self.shared.get("reduced", lambda: self._equations("reduced"))
+        return self.shared.get("reduced", lambda: self._equations("reduced", self.orientation))
+
+    @property
+    def regular(self) -> Equations:
+        """The same with quaternions for orientations, which are regular everywhere: here starts are found."""
+        if self.orientation == Orientation():
+            return self.reduced
+        return self.shared.get("regular", lambda: self._equations("reduced", Orientation()))
 
     @property
     def maximal(self) -> Equations:
-        """The equations in maximal coordinates, with every joint a constraint."""
-        return self.shared.get("maximal", lambda: self._equations("dae"))
+        """The equations in maximal coordinates, with every joint a constraint; orientations are quaternions."""
+        return self.shared.get("maximal", lambda: self._equations("dae", Orientation()))
+
+    def in_coordinates(self, form: Coordinates) -> Equations:
+        """Return the equations in one kind of coordinates."""
+        if form == "dae":
+            return self.maximal
+        return self.reduced if form == "reduced" else self.regular
 
     @property
     def equations(self) -> Equations:
         """The equations in the form of this assembly."""
         return self.reduced if self.form == "reduced" else self.maximal
 
-    def _equations(self, form: FormName) -> Equations:
+    def _equations(self, form: FormName, orientation: Orientation) -> Equations:
         mechanism = self.mechanism
-        forest = grow_forest(form, mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space)
+        forest = grow_forest(form, mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space, orientation)
         return build_equations(mechanism, forest)
 
     @property
@@ -199,31 +219,37 @@ class Assembly:
         mechanism, reason = self._moved(flat)
         if mechanism is None:
             return None, reason
-        return Assembly(flat, mechanism, self.form, self.level, self.modes, source, "", self.shared), ""
+        return replace(self, flat=flat, mechanism=mechanism, source=source, why_new="", _kernels={}), ""
 
-    def other_mode(self, modes: Mapping[str, str], sides: Mapping[tuple[str, str, str], float]) -> Assembly:
+    def other_mode(
+        self,
+        modes: Mapping[str, str],
+        sides: Mapping[tuple[str, str, str], float],
+        orientation: Orientation | None = None,
+    ) -> Assembly:
         """Return the scene in other modes, with lengths on a line signed as given; what was made before is used again.
 
         Parameters
         ----------
-        modes
-            Mode of each part that has modes.
-        sides
-            On a line, the sign of lengths.
+        modes, sides
+            Mode of each part that has modes; on a line, the sign of lengths.
+        orientation
+            In which coordinates orientations are; the same if not given.
         """
         if self.source is None:
             raise UsageError("it was assembled from leaves, so that it has no other modes", where=self.flat.name)
-        source = self.source
+        source, charts = self.source, orientation or self.orientation
 
         def make() -> Assembly:
             made = source.assemble(self.flat, self, modes, sides)
-            return replace(made, source=source, shared=Shared(self.shared.family))
+            return replace(made, source=source, shared=Shared(self.shared.family), orientation=charts)
 
-        known = self.shared.family.get(("mode", tuple(sorted(modes.items())), tuple(sorted(sides.items()))), make)
+        key = ("mode", tuple(sorted(modes.items())), tuple(sorted(sides.items())), charts)
+        known = self.shared.family.get(key, make)
         mechanism, _ = known._moved(self.flat)
         if mechanism is None:
             return make()
-        return Assembly(self.flat, mechanism, self.form, self.level, known.modes, source, "", known.shared)
+        return replace(known, flat=self.flat, mechanism=mechanism, source=source, why_new="", _kernels={})
 
     def _moved(self, flat: FlatScene) -> tuple[Mechanism | None, str]:
         """Return the mechanism with the values of another scene; None, and why, if its structure is another."""
@@ -267,21 +293,13 @@ class Assembly:
 
     def balance(self, form: FormName) -> BalanceProgram:
         """Return the balance of forces in the coordinates of either form."""
+        parts = f"{self.flat.name} ({form})", self.in_coordinates(form), self.parameters
+        return self.shared.get(("balance", form), lambda: balance_program(*parts))
 
-        def make() -> BalanceProgram:
-            equations = self.reduced if form == "reduced" else self.maximal
-            return balance_program(f"{self.flat.name} ({form})", equations, self.parameters)
-
-        return self.shared.get(("balance", form), make)
-
-    def rates(self, form: FormName) -> RatesProgram:
-        """Return how the coordinates of either form move with its speeds."""
-
-        def make() -> RatesProgram:
-            equations = self.reduced if form == "reduced" else self.maximal
-            return rates_program(f"{self.flat.name} ({form})", equations, self.parameters)
-
-        return self.shared.get(("rates", form), make)
+    def rates(self, form: Coordinates) -> RatesProgram:
+        """Return how the coordinates move with their speeds."""
+        parts = f"{self.flat.name} ({form})", self.in_coordinates(form), self.parameters
+        return self.shared.get(("rates", form), lambda: rates_program(*parts))
 
     def kernel(self, program: Program, vectorized: bool = False) -> BoundKernel:
         """Return a program with the parameters of this scene, ready to run."""
@@ -314,9 +332,9 @@ class Assembly:
     @property
     def start_observables(self) -> Mapping[str, Observable]:
         """Every quantity in terms of generalized coordinates, in which the start is solved."""
-        if self.form == "reduced":
+        if self.equations is self.regular:
             return self.observables
-        return self.shared.get("start", lambda: self._observe(self.reduced))
+        return self.shared.get("start", lambda: self._observe(self.regular))
 
     def _observe(self, equations: Equations) -> Mapping[str, Observable]:
         return observe(self.mechanism, equations, self.reactions, self.shared.lock)
@@ -379,27 +397,5 @@ class Assembly:
     @property
     def to_maximal(self) -> Program:
         """The program of (t, q, u) of the reduced form that gives maximal coordinates and speeds."""
-        return self.shared.get("to maximal", self._to_maximal)
-
-    def _to_maximal(self) -> Program:
-        reduced, forest = self.reduced, self.maximal.forest
-        positions: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.coordinates)
-        speeds: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.speeds)
-        kinematics = reduced.kinematics
-        for one in forest.attachments:
-            for k, (coordinate, speed) in enumerate(zip(one.coordinates, one.speeds, strict=True)):
-                positions[coordinate] = kinematics.placements.references[one.body][k]
-                speeds[speed] = kinematics.reference_velocities[one.body][k]
-            for k, number in enumerate(one.chart):
-                positions[number] = kinematics.placements.quaternions[one.body][k]
-            for k, number in enumerate(one.spin):
-                speeds[number] = kinematics.angular_velocities[one.body][k]
-        for turn in forest.orientations:
-            if turn.coordinate is not None:
-                positions[turn.coordinate] = kinematics.placements.angles[turn.body]
-                speeds[turn.coordinate] = kinematics.angular_velocities[turn.body][0]
-        for symbol, (coordinate, speed) in forest.counted.items():
-            positions[coordinate] = kinematics.placements.joint_coordinates[symbol]
-            speeds[speed] = kinematics.joint_rates[symbol]
-        outputs = (OutputGroup("q", tuple(positions)), OutputGroup("u", tuple(speeds)))
-        return Program(f"{self.flat.name} to maximal coordinates", state_groups(reduced), self.parameters, outputs)
+        parts = f"{self.flat.name} to maximal coordinates", self.reduced, self.maximal, self.parameters
+        return self.shared.get("to maximal", lambda: maximal_program(*parts))

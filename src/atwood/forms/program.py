@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
+from operator import add
 from typing import Any, Literal
 
 import numpy as np
@@ -208,7 +209,7 @@ def rows_along_speeds(equations: Equations) -> list[Expression]:
 
     With loops, the row of a speed that follows from the constraints is left out, and a constraint takes its place. That
     is as good a choice for the coordinates as for the speeds: for a chart the rows are ``B^T q' = B^T B u``, where
-    B^T B is a multiple of one, and one more keeps the size of its coordinates.
+    B^T B is a multiple of one for a quaternion, and one more keeps its size.
 
     Parameters
     ----------
@@ -220,15 +221,18 @@ def rows_along_speeds(equations: Equations) -> list[Expression]:
     rows: dict[int, Expression] = {}
     more: list[Expression] = []
     for chart in equations.charts:
-        own = [equations.coordinates[i] for i in chart.coordinates]
         rates = [symbols[i] for i in chart.coordinates]
         speeds = [equations.speeds[i] for i in chart.speeds]
         found = jacobian([equations.rates[i] for i in chart.coordinates], speeds)
         entries = list(zip(found.rows, found.columns, found.entries, strict=True))
+        if not chart.is_homogeneous:
+            misses = [rate - equations.rates[i] for i, rate in zip(chart.coordinates, rates, strict=True)]
+            rows |= {i: _sum([e * misses[r] for r, c, e in entries if c == k]) for k, i in enumerate(chart.speeds)}
+            continue
         square = _sum([e * e for _, column, e in entries if column == 0])
         for k, i in enumerate(chart.speeds):
             rows[i] = _sum([e * rates[r] for r, column, e in entries if column == k]) - square * speeds[k]
-        more.append(_sum([q * rate for q, rate in zip(own, rates, strict=True)]))
+        more.append(_sum([equations.coordinates[i] * symbols[i] for i in chart.coordinates]))
     in_charts = {i for chart in equations.charts for i in chart.coordinates}
     for i, (symbol, rate) in enumerate(zip(symbols, equations.rates, strict=True)):
         if i not in in_charts:
@@ -237,10 +241,7 @@ def rows_along_speeds(equations: Equations) -> list[Expression]:
 
 
 def _sum(terms: Sequence[Expression]) -> Expression:
-    total = terms[0]
-    for term in terms[1:]:
-        total = total + term
-    return total
+    return reduce(add, terms)
 
 
 def kinematic_rows(equations: Equations, shift: Sequence[Expression] | None = None) -> list[Expression]:

@@ -26,7 +26,7 @@ def starting(assembly: Assembly) -> Assembly:
     values = {symbol: assembly.mechanism.table.values[symbol] for symbol in known}
     table = replace(assembly.mechanism.table, values=values)
     mechanism = replace(assembly.mechanism, table=table, places=None)
-    return Assembly(assembly.flat, mechanism, assembly.form, assembly.level, assembly.modes, shared=shared)
+    return replace(assembly, mechanism=mechanism, source=None, why_new="", shared=shared, _kernels={})
 
 
 def with_places(assembly: Assembly, places: Mapping[str, Mapping[Expression, float]]) -> Assembly:

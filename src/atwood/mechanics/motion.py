@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from atwood.expr import Expression, jvp, substitute
+from atwood.mechanics.charts import chart_rates
 from atwood.mechanics.kinematics import (
     BodyShape,
     Components,
@@ -17,7 +18,6 @@ from atwood.mechanics.kinematics import (
     place,
 )
 from atwood.mechanics.mechanism import Mechanism
-from atwood.mechanics.orientation import quaternion_rates
 from atwood.mechanics.spatial import Course, move_in_space
 from atwood.topology.charts import Chart
 from atwood.topology.forest import Coordinate, Forest
@@ -118,18 +118,17 @@ def _left(mechanism: Mechanism, forest: Forest, solution: Solution, solved: Solu
     u = tuple(graph.symbol(f"u:{stem}") for stem in stems)
     a = tuple(graph.symbol(f"a:{stem}") for stem in stems)
     charts = tuple(
-        Chart(
-            one.kind,
-            tuple(kept.index(i) for i in one.coordinates),
-            tuple(kept_speeds.index(i) for i in one.speeds),
-            one.body,
+        replace(
+            one,
+            coordinates=tuple(kept.index(i) for i in one.coordinates),
+            speeds=tuple(kept_speeds.index(i) for i in one.speeds),
         )
         for one in forest.charts
     )
     q = tuple(every[i] for i in kept)
     rates: dict[int, Expression] = {}
     for chart in charts:
-        parts = quaternion_rates([q[i] for i in chart.coordinates], [u[i] for i in chart.speeds])
+        parts = chart_rates(chart, [q[i] for i in chart.coordinates], [u[i] for i in chart.speeds])
         rates.update(zip(chart.coordinates, (graph.convert(part) for part in parts), strict=True))
     own = [graph.symbol(f"u:{forest.coordinates[i].name}") for i in kept]
     return _Symbols(

@@ -127,7 +127,7 @@ class Places:
         """Return a place without turns and displacements."""
         place = dict.fromkeys((*self.state.coordinates, self.time), 0.0)
         for chart in self.state.charts:
-            place[self.state.coordinates[chart.coordinates[0]]] = 1.0
+            place |= {self.state.coordinates[i]: x for i, x in zip(chart.coordinates, chart.reference, strict=True)}
         return place
 
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute
+from atwood.mechanics.charts import chart_axes, chart_quaternion
 from atwood.mechanics.joint_shift import Turned, displaced, reads_axes
 from atwood.mechanics.kinematics import BodyShape, Components, Kinematics, Placements
 from atwood.mechanics.orientation import (
     Quaternion,
     node_quaternions,
-    quaternion_axes,
     quaternion_product,
     rotation_quaternion,
 )
@@ -174,11 +174,12 @@ class _Walk:
         """Work out how a body is turned, from its own chart or across its joint."""
         joint, child = attachment.joint, attachment.body
         if attachment.chart:
-            quaternion = [self.course.values[i] for i in attachment.chart]
+            chart = next(one for one in self.forest.charts if one.coordinates == attachment.chart)
+            values = [self.course.values[i] for i in chart.coordinates]
             spin = Vector(*(self.course.spins[i] for i in attachment.spin))
             spin_rate = Vector(*(self.course.spin_rates[i] for i in attachment.spin))
-            w, x, y, z = quaternion
-            self.turnings[child] = _Turning(quaternion_axes(quaternion), spin, spin_rate, (w, x, y, z))
+            axes, quaternion = chart_axes(chart, values), chart_quaternion(chart, values)
+            self.turnings[child] = _Turning(axes, spin, spin_rate, quaternion)
         elif joint is not None and attachment.turns_with_joint:
             rotation = as_rotation(joint.local.placement.rotation)
             near, far = (joint.b, joint.a) if attachment.backwards else (joint.a, joint.b)

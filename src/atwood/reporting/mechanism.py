@@ -30,7 +30,7 @@ from atwood.solve.immobile import Immobile, find_immobile
 from atwood.solve.placement import Placement, find_placement
 from atwood.solve.problem import Plan, make_plan
 from atwood.solve.scales import motion_names
-from atwood.solve.start import Start, find_start, own_state
+from atwood.solve.start import Start, find_start, own_state, settle
 
 __all__ = [
     "BodyEntry",
@@ -194,7 +194,7 @@ def _plain(value: object) -> object:
     return list(value) if isinstance(value, tuple) else value
 
 
-def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
+def report(scene: Model | Assembly, name: str | None = None, *, orientation: str = "quaternion") -> MechanismReport:
     """Report what became of a scene: bodies, joints, degrees of freedom, constraints, and why.
 
     Parameters
@@ -203,6 +203,9 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
         The scene, or an assembly of it.
     name
         What to call the scene.
+    orientation
+        In which coordinates the reduced form has orientations in space; see `atwood.assemble`. An assembly says so
+        itself.
 
     Returns
     -------
@@ -214,8 +217,8 @@ def report(scene: Model | Assembly, name: str | None = None) -> MechanismReport:
     AtwoodError
         If the scene cannot be simulated; the error says why and names the part.
     """
-    given = scene if isinstance(scene, Assembly) else assemble(scene, name=name)
-    reduced = assemble_flat(given.flat, form="reduced")
+    given = scene if isinstance(scene, Assembly) else assemble(scene, orientation=orientation, name=name)
+    reduced = assemble_flat(given.flat, form="reduced", orientation=given.orientation.kind)
     dae = assemble_flat(given.flat, form="dae", level=given.level or "ggl")
     start = find_start(reduced)
     plans = {"reduced": _plan(reduced, start), "dae": _plan(dae, start)}
@@ -275,7 +278,8 @@ def _on_surfaces(reduced: Assembly) -> tuple[str, ...]:
 
 def _plan(assembly: Assembly, start: Start) -> Plan:
     span = max(assembly.flat.t_end - start.time, 1e-3)
-    return make_plan(assembly, start.time, *own_state(assembly, start), start.length, span)
+    assembly, q, u = settle(assembly, start, assembly.other_mode)
+    return make_plan(assembly, start.time, q, u, start.length, span)
 
 
 def _not_unique(assembly: Assembly, plan: Plan, start: Start) -> tuple[str, ...]:

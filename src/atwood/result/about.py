@@ -63,6 +63,8 @@ def describe_run(result: Result) -> dict[str, Any]:
             {"time": one.time, "ways": one.ways, "parts": list(one.parts), "what": one.describe()}
             for one in result.passages
         ],
+        "orientation": result.assembly.orientation.kind,
+        "restated": [{"time": one.time, "body": one.body} for one in result.restated],
         "solver": {
             "name": solver_name(result),
             "why": result.run.why,

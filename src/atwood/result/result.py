@@ -20,6 +20,7 @@ from atwood.mechanics.power import applied_power
 from atwood.model.quantities import Quantity
 from atwood.result.angles import unwrap
 from atwood.result.energy import EnergyLedger, make_ledger
+from atwood.solve.charts import Restated
 from atwood.solve.driver import Statistics
 from atwood.solve.immobile import Immobile, find_immobile
 from atwood.solve.modes import Happening
@@ -94,6 +95,11 @@ class Result:
     def passages(self) -> tuple[Passage, ...]:
         """Singular positions that the run passed through, or came too close to, in order."""
         return self.run.passages
+
+    @property
+    def restated(self) -> tuple[Restated, ...]:
+        """When which orientation went on in other coordinates, since its own came near to where they are singular."""
+        return self.run.restated
 
     @property
     def solver(self) -> str:

@@ -125,6 +125,8 @@ class ImplicitProblem:
         The number of events.
     event_directions
         For each event +1 (rising values only), -1 (falling values only) or 0 (both).  Empty: all 0.
+    event_rough
+        Numbers of the events whose exact time does not matter: they happen at the end of a step.
     native
         ``native(linear_solver)``: compiled forms of the residual and the Jacobian for a matrix that is dense or
         sparse.  Each session asks once, and must not share its answer with another one.  Drivers that cannot use
@@ -139,6 +141,7 @@ class ImplicitProblem:
     events: Callable[[float, FloatArray, FloatArray], Values] | None = None
     event_count: int = 0
     event_directions: tuple[int, ...] = ()
+    event_rough: tuple[int, ...] = ()
     native: Callable[[LinearSolver], NativeCallbacks] | None = None
 
     def __post_init__(self) -> None:

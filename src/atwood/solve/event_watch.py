@@ -9,7 +9,8 @@ The rules, which decide the cases on the edge:
 - arriving at zero exactly is an event; leaving zero is not;
 - what has just happened at a restart does not happen again there: its sign is read a little later;
 - a change within rounding of a restart belongs to the restart;
-- events within rounding of each other happen together.
+- events within rounding of each other happen together;
+- what needs no exact time happens at the end of the step in which its sign changed, unless something else does before.
 """
 
 from __future__ import annotations
@@ -57,6 +58,8 @@ class EventWatch:
         assert problem.events is not None
         self._function = problem.events
         self._directions = np.array(problem.event_directions or (0,) * problem.event_count, dtype=np.intp)
+        self._rough = np.zeros(problem.event_count, dtype=bool)
+        self._rough[list(problem.event_rough)] = True
         self._moment = 100 * ROUNDING * horizon
         self._set_signs(np.zeros(problem.event_count, dtype=np.intp))
         self._fired = np.zeros(problem.event_count, dtype=bool)
@@ -142,6 +145,9 @@ class EventWatch:
                 # A zero that is not an event keeps the sign it came with.
                 self._set_signs(np.where(signs != 0, signs, self._signs))
                 return None
+            if not np.any(crossed & ~self._rough):
+                self._set_signs(np.where(signs != 0, signs, self._signs))
+                return Root(at(end), tuple(int(sign) for sign in np.where(crossed, signs, 0)))
             time = self._narrow(begin, end, values, at, tolerance)
             # What follows within rounding belongs to the same moment.
             after = min(time + moment, end)

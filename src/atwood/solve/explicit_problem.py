@@ -104,6 +104,8 @@ class ExplicitProblem:
         The number of events.
     event_directions
         For each event +1 (rising values only), -1 (falling values only) or 0 (both).  Empty: all 0.
+    event_rough
+        Numbers of the events whose exact time does not matter: they happen at the end of a step.
     compiled
         ``compiled()``: a compiled form of `rates`.  Each session asks once, and must not share it with another one.
     compiled_events
@@ -115,6 +117,7 @@ class ExplicitProblem:
     events: Callable[[float, FloatArray, FloatArray], Values] | None = None
     event_count: int = 0
     event_directions: tuple[int, ...] = ()
+    event_rough: tuple[int, ...] = ()
     compiled: Callable[[], CompiledRates] | None = None
     compiled_events: Callable[[], CompiledEvents | None] | None = None
 

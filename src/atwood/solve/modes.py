@@ -5,7 +5,7 @@ An event maps (mode, q, u) to (mode, q, u). States pass between modes through ma
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +16,10 @@ from atwood.errors import SolveError
 from atwood.expr import OutputGroup, Program, depends_on, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import event_program
+from atwood.forms.places import regular_to_maximal
 from atwood.mechanics.watches import Watch, list_watches
 from atwood.solve.balance import Balance, BalanceValues, balance_of, least_norm
+from atwood.solve.charts import CHART, Reassemble, chart_watches, enter_charts
 from atwood.solve.matrices import is_full, to_array
 from atwood.solve.problem import Plan
 from atwood.solve.reactions import ReactionSolver, maximal_state
@@ -67,7 +69,10 @@ def find_watches(assembly: Assembly) -> tuple[Watch, ...]:
     """Return what is watched in the modes of an assembly."""
     return assembly.shared.get(
         "watches",
-        lambda: list_watches(assembly.mechanism, assembly.equations, assembly.reactions, assembly.modes),
+        lambda: (
+            *list_watches(assembly.mechanism, assembly.equations, assembly.reactions, assembly.modes),
+            *chart_watches(assembly.equations),  # last: of what happens at the same time, the others come first
+        ),
     )
 
 
@@ -128,6 +133,11 @@ class EventProbe:
     def directions(self) -> tuple[int, ...]:
         """Direction of each event."""
         return tuple(one.direction for one in self.watches)
+
+    @property
+    def rough(self) -> tuple[int, ...]:
+        """Numbers of the events whose exact time does not matter."""
+        return tuple(i for i, one in enumerate(self.watches) if one.target == CHART)
 
     def values(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return the value of each event at a state, shifted where it starts at zero."""
@@ -213,7 +223,7 @@ def enter_mode(
     state: tuple[float, FloatArray, FloatArray],
     assembly: Assembly,
     happening: Happening,
-    reassemble: Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float]], Assembly],
+    reassemble: Reassemble,
     length: float,
 ) -> tuple[Assembly, FloatArray, FloatArray]:
     """Return the scene in the mode that an event leads to, with its state.
@@ -227,14 +237,14 @@ def enter_mode(
     happening
         The event.
     reassemble
-        Gives the scene in other modes.
+        Gives the scene in other modes and charts.
     length
         Extent of the scene, m.
     """
     t, q, u = state
     big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
     sides = actual_sides(assembly, t, q, u, assembly.form)
-    after = reassemble({**assembly.modes, happening.part: happening.target}, sides)
+    after = reassemble({**assembly.modes, happening.part: happening.target}, sides, assembly.orientation)
     sizes = motion_scales(after.maximal, length)
     balance = balance_of(after, "dae")
     if happening.impact:
@@ -244,7 +254,8 @@ def enter_mode(
         big_q = met
     if after.form == "dae":
         return after, big_q, big_u
-    return after, *_to_reduced(assembly, after, t, (q, u), (big_q, big_u), length, happening)
+    q, u = _to_reduced(assembly, after, t, (q, u), (big_q, big_u), length, happening)
+    return *enter_charts(after, q, reassemble), u
 
 
 _IN_PLACE = 1e-5
@@ -309,9 +320,9 @@ def _to_reduced(
     length: float,
     happening: Happening,
 ) -> tuple[FloatArray, FloatArray]:
-    """Find the generalized coordinates of a mode that give the same maximal coordinates and speeds."""
-    equations = after.reduced
-    own_turning, turning = turning_of(after, "reduced"), turning_of(after, "dae")
+    """Find the generalized coordinates, with quaternions, that give the same maximal coordinates and speeds."""
+    equations = after.regular
+    own_turning, turning = turning_of(after, "regular"), turning_of(after, "dae")
     program, rows, columns = after.shared.get("change of mode", lambda: _maximal_places(after))
     kernel = after.kernel(program)
     names = tuple(c.name for c in equations.names)
@@ -350,7 +361,8 @@ def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[in
 
     Speeds of bodies change with generalized speeds as their places do with displacements along these.
     """
-    to_maximal, equations = after.to_maximal, after.reduced
+    equations = after.regular
+    to_maximal = regular_to_maximal(after)
     slope = jacobian(list(to_maximal.outputs[1].expressions), list(equations.speeds))
     outputs = (*to_maximal.outputs, OutputGroup("slopes", tuple(slope.entries)))
     program = Program(f"{after.flat.name} change of mode", to_maximal.inputs, after.parameters, outputs)

@@ -80,14 +80,19 @@ def open_implicit_session(order: Order, solver: str, t: float, y: FloatArray, yp
     """
     plan, probe, settings = order.plan, order.probe, order.settings(t)
     if solver == "ida":
-        problem = _with_events(plan.problem(probe.function(), probe.directions), probe)
+        problem = _with_events(_implicit_problem(order), probe)
         from atwood.solve import ida_native
 
         tuning = ida_native.IdaTuning(angle_like=plan.angles, stop_time=order.end)
         return ida_native.open_session(problem, settings, t, y, yp, order.budget, tuning)
     from atwood.solve.ida_sundae import open_session
 
-    return open_session(plan.problem(probe.function(), probe.directions), settings, t, y, yp, order.budget)
+    return open_session(_implicit_problem(order), settings, t, y, yp, order.budget)
+
+
+def _implicit_problem(order: Order) -> ImplicitProblem:
+    probe = order.probe
+    return replace(order.plan.problem(probe.function(), probe.directions), event_rough=probe.rough)
 
 
 def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem:
@@ -140,6 +145,7 @@ def open_explicit_session(
             where=assembly.flat.name,
             advice="Use the solver 'ida'.",
         )
+    problem = replace(problem, event_rough=probe.rough)
     found = None if problem.events is None else probe.compiled(for_ida=False)
     if found is not None:
         own = CompiledEvents(found.explicit, found.address, found.count, found)

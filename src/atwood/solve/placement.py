@@ -149,7 +149,7 @@ def find_placement(assembly: Assembly, start: Start) -> Placement:
     start
         Its start, as `find_start` gives it.
     """
-    equations, t = assembly.reduced, start.time
+    equations, t = assembly.regular, start.time
     guesses = _guesses(assembly, equations, start)
     if np.array_equal(start.rough, start.coordinates):
         return Placement((), guesses, (), start.length)
@@ -292,7 +292,7 @@ class _Bodies:
         if not slopes.shape[0]:
             return dict.fromkeys(wanted, ())
         slopes = scaled(slopes, scales, row_scales(slopes, scales))
-        way = turning_of(self.assembly, "reduced").difference(t, start.rough, q) / scales
+        way = turning_of(self.assembly, "regular").difference(t, start.rough, q) / scales
         weights = np.linalg.lstsq(slopes.T, way, rcond=1e-9)[0]
         names = [one.key[0] for one in self.equations.constraints if one.value is not None]
         names += [target.path for target in level.fixed]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from atwood.errors import AtwoodError, SolveError, StartError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.solve.breaks import find_breaks
+from atwood.solve.charts import CHART, Reassemble, Restated, enter_charts, to_regular
 from atwood.solve.choice import Choice, check_solver, choose, describe_choices
 from atwood.solve.driver import Statistics
 from atwood.solve.inputs import samples_needed
@@ -21,13 +21,12 @@ from atwood.solve.passage import Passage
 from atwood.solve.problem import Plan, make_plan
 from atwood.solve.record import Recorder, Segment
 from atwood.solve.scales import scene_length
-from atwood.solve.start import Start, own_state
+from atwood.solve.start import Start, settle
 from atwood.solve.stretch import Outcome, Stretch, run_stretch
 
 __all__ = ["Run", "run"]
 
 FloatArray = NDArray[np.float64]
-Reassemble = Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float]], Assembly]
 
 _CHATTER = 50
 """So many changes of mode without time passing end a run."""
@@ -56,6 +55,8 @@ class Run:
         What was asked for.
     choices
         What solved it and why, one after the other.
+    restated
+        When which orientation went on in other coordinates, since these came near to where they are singular.
     """
 
     segments: tuple[Segment, ...]
@@ -66,6 +67,7 @@ class Run:
     start: Start
     options: RunOptions
     choices: tuple[Choice, ...]
+    restated: tuple[Restated, ...] = ()
 
     @property
     def passages(self) -> tuple[Passage, ...]:
@@ -93,7 +95,7 @@ def run(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reass
     options
         How.
     reassemble
-        Gives the scene in other modes, with lengths on a line signed as given.
+        Gives the scene in other modes and charts, with lengths on a line signed as given.
 
     Raises
     ------
@@ -126,7 +128,7 @@ class _Walk:
         times: FloatArray,
         shown: NDArray[np.bool_],
     ) -> None:
-        self.assembly, self.start, self.options, self.reassemble = assembly, start, options, reassemble
+        self.start, self.options, self.reassemble = start, options, reassemble
         self.times, self.shown = times, shown
         self.breaks = find_breaks(assembly, start.time, options.t_end)
         self.segments: list[Segment] = []
@@ -134,7 +136,8 @@ class _Walk:
         self.choices: list[Choice] = []
         self.statistics = Statistics(error_test_failures=0, convergence_failures=0)
         self.t = start.time
-        self.q, self.u = own_state(assembly, start)
+        self.assembly, self.q, self.u = settle(assembly, start, reassemble)
+        self.restated: list[Restated] = []
         self.impact, self.show = False, bool(shown[0])
         self.plan: Plan | None = None
 
@@ -159,13 +162,15 @@ class _Walk:
                     self._pass_switch(recorder)
                     continue
                 return self._made(outcome.status, outcome.message, outcome)
-            self.happenings.append(outcome.happening)
+            is_chart = outcome.happening.target == CHART
+            if not is_chart:
+                self.happenings.append(outcome.happening)
             if outcome.happening.target == "stop":
                 return self._made("stopped", outcome.happening.describe(), outcome)
             if chatter > _CHATTER:
                 endless = f"{outcome.happening.part} changes its mode endlessly at t = {self.t:.9g}"
                 return self._made("failed", endless, outcome)
-            self._enter(outcome.happening, recorder)
+            self._change_chart(outcome.happening, recorder) if is_chart else self._enter(outcome.happening, recorder)
             if self.t >= self.options.t_end:
                 return self._made("finished", "", outcome)
 
@@ -183,6 +188,7 @@ class _Walk:
         outcome = run_stretch(stretch, recorder, t, q, u)
         self.segments.append(recorder.segment(self.impact))
         self.statistics = self.statistics + outcome.statistics
+        self.restated += outcome.restated
         for choice in outcome.choices:
             if not self.choices or choice.solver != self.choices[-1].solver:
                 self.choices.append(choice)
@@ -207,10 +213,23 @@ class _Walk:
 
     def _pass_switch(self, recorder: Recorder) -> None:
         """Go on behind a law that switches by the clock."""
+        _, self.q, self.u, _ = recorder.last()
+        self.impact = False
+        self._go_behind()
+
+    def _go_behind(self) -> None:
         behind = float(self.breaks[self.breaks[:, 0] == self.t, 1][0])
         self.show = bool(np.any(self.shown[(self.times > self.t) & (self.times <= behind)]))
-        _, self.q, self.u, _ = recorder.last()
-        self.t, self.impact = behind, False
+        self.t = behind
+
+    def _change_chart(self, happening: Happening, recorder: Recorder) -> None:
+        """Go on in other coordinates of an orientation."""
+        _, q, self.u, _ = recorder.last()
+        self.assembly, self.q = enter_charts(self.assembly, to_regular(self.assembly, q), self.reassemble)
+        self.plan, self.impact, self.show = None, False, False
+        self.restated.append(Restated(self.t, happening.part))
+        if np.any(self.breaks[:, 0] == self.t):  # at the same time as a law that switches by the clock
+            self._go_behind()
 
     def _enter(self, happening: Happening, recorder: Recorder) -> None:
         """Enter the mode that an event leads to."""
@@ -235,7 +254,7 @@ class _Walk:
 
     def _run_so_far(self, status: str, message: str) -> Run:
         parts = (tuple(self.segments), tuple(self.happenings), self.statistics, status, message)
-        return Run(*parts, self.start, self.options, tuple(self.choices))
+        return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.restated))
 
 
 def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:

@@ -56,7 +56,11 @@ def scene_length(assembly: Assembly) -> float:
 
 def coordinate_scales(equations: Equations, length: float) -> FloatArray:
     """Return the size of each coordinate: the extent for a length, one radian for an angle, else one."""
-    return np.array([length if one.unit == "m" else 1.0 for one in equations.names])
+    sizes = np.array([length if one.unit == "m" else 1.0 for one in equations.names])
+    for chart in equations.charts:
+        if chart.kind == "rodrigues":
+            sizes[list(chart.coordinates)] = 0.25  # the tangent of a quarter of an angle
+    return sizes
 
 
 def motion_scales(equations: Equations, length: float) -> FloatArray:

@@ -15,14 +15,16 @@ from numpy.typing import NDArray
 from atwood.errors import StartError
 from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
+from atwood.forms.places import regular_to_maximal
 from atwood.forms.starting import starting
+from atwood.solve.charts import Reassemble, enter_charts, from_regular, own_names
 from atwood.solve.scales import motion_scales, scene_length
 from atwood.solve.start_positions import solve_positions
 from atwood.solve.start_speeds import solve_speeds
 from atwood.solve.start_targets import sort_targets
 from atwood.solve.turning import turning_of
 
-__all__ = ["Start", "find_start", "maximal_state", "own_state"]
+__all__ = ["Start", "find_start", "maximal_state", "own_state", "settle"]
 
 FloatArray = NDArray[np.float64]
 
@@ -36,7 +38,7 @@ class Start:
     time
         s.
     coordinates, speeds
-        Of the reduced form.
+        Of the reduced form, with orientations as quaternions.
     length
         Extent of the scene, m.
     free_coordinates, free_speeds
@@ -61,13 +63,30 @@ class Start:
 
 def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
     """Return a start in the coordinates of the form of an assembly."""
-    return (start.coordinates, start.speeds) if assembly.form == "reduced" else maximal_state(assembly, start)
+    if assembly.form == "reduced":
+        return from_regular(assembly, start.coordinates), start.speeds
+    return maximal_state(assembly, start)
 
 
 def maximal_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
     """Return a start in maximal coordinates, whatever the form of an assembly."""
-    q, u = assembly.kernel(assembly.to_maximal)([start.time], start.coordinates, start.speeds)
+    q, u = assembly.kernel(regular_to_maximal(assembly))([start.time], start.coordinates, start.speeds)
     return turning_of(assembly, "dae").normalized(np.asarray(q, dtype=float)), np.asarray(u, dtype=float)
+
+
+def settle(assembly: Assembly, start: Start, reassemble: Reassemble) -> tuple[Assembly, FloatArray, FloatArray]:
+    """Return an assembly in charts that are regular at a start, with the start in its coordinates.
+
+    Parameters
+    ----------
+    assembly, start
+        The scene and its start.
+    reassemble
+        Gives the scene in other charts.
+    """
+    if assembly.form == "reduced":
+        return *enter_charts(assembly, start.coordinates, reassemble), start.speeds
+    return assembly, *own_state(assembly, start)
 
 
 def find_start(assembly: Assembly) -> Start:
@@ -86,7 +105,7 @@ def find_start(assembly: Assembly) -> Start:
     before = starting(assembly)
     if before is not assembly:
         return _taken_up(assembly, before, find_start(before))
-    equations, length = assembly.reduced, scene_length(assembly)
+    equations, length = assembly.regular, scene_length(assembly)
     if not 1e-100 < length < 1e100:
         raise StartError(
             f"its extent, {length:g} m, is beyond what can be computed with",
@@ -98,7 +117,8 @@ def find_start(assembly: Assembly) -> Start:
     t = assembly.flat.t_start
     at = solve_positions(assembly, equations, positions, scales, length, t)
     u, free_u, repeated_u = solve_speeds(assembly, equations, speeds, scales, t, at.coordinates)
-    return Start(t, at.coordinates, u, length, at.free, free_u, (*at.repeated, *repeated_u), at.rough)
+    free = own_names(assembly, at.free)
+    return Start(t, at.coordinates, u, length, free, free_u, (*at.repeated, *repeated_u), at.rough)
 
 
 def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
@@ -109,7 +129,7 @@ def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
     StartError
         If the equations were made for another start, which gave their constants of integration.
     """
-    before, after = starting.reduced, assembly.reduced
+    before, after = starting.regular, assembly.regular
     q = dict(zip(before.coordinates, start.coordinates.tolist(), strict=True))
     u = dict(zip(before.speeds, start.speeds.tolist(), strict=True))
     place = {**assembly.mechanism.table.values, before.time: start.time, **q}

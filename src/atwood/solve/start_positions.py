@@ -70,7 +70,7 @@ def solve_positions(
         If a loop cannot close, or what is fixed contradicts itself or the constraints.
     """
     every = [*level.guessed, *level.fixed]
-    turning = turning_of(assembly, "reduced")
+    turning = turning_of(assembly, "regular")
     q, is_direct = said(equations.coordinates, every, resting_place(equations))
     q = _turned(equations, turning, q)
     if not is_direct:

@@ -92,7 +92,7 @@ class System:
         of_speeds: bool = False,
     ) -> None:
         made = start_conditions(assembly, equations, targets, constrained, of_speeds)
-        self.turning = None if of_speeds else turning_of(assembly, "reduced")
+        self.turning = None if of_speeds else turning_of(assembly, "regular")
         self.program = made.program
         self.kernel = assembly.kernel(made.program)
         self.rows, self.columns, self.shape = made.rows, made.columns, made.shape

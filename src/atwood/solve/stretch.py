@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import SolveError
+from atwood.solve.charts import CHART, Restated, restated
 from atwood.solve.choice import Choice, stiffness_of, turned_stiff
 from atwood.solve.driver import Advance, Budget, FloatArray, Session, Statistics, Status
 from atwood.solve.explicit_session import ExplicitSession
@@ -81,6 +82,8 @@ class Outcome:
         What solved it, one after the other.
     error
         What went wrong, where that names a part.
+    restated
+        Orientations that went on in other coordinates.
     """
 
     t: float
@@ -90,6 +93,7 @@ class Outcome:
     choices: tuple[Choice, ...]
     happening: Happening | None = None
     error: SolveError | None = None
+    restated: tuple[Restated, ...] = ()
 
 
 def run_stretch(stretch: Stretch, recorder: Recorder, t: float, q: FloatArray, u: FloatArray) -> Outcome:
@@ -140,20 +144,22 @@ class _Runner:
         self.before = Statistics(error_test_failures=0, convergence_failures=0)
         self.session: Session | None = None
         self.guard: Guard | None = None
+        self.restated: list[Restated] = []
 
     def run(self, t: float, y: FloatArray, yp: FloatArray) -> Outcome:
         """Go from sample to sample; change the solver where the scene turns out stiff."""
         done = 0
         try:
+            session = self._open(t, y, yp)
             while True:
-                session = self._open(t, y, yp)
                 if isinstance(session, ExplicitSession):
                     done, advance = self._sample(session, done)
                 else:
                     done, advance = self._advance(session, done)
-                if advance is None or advance.status is not Status.STIFF:
+                if advance is not None and advance.status is Status.STIFF:
+                    session = self._open(*self._change_solver(advance))
+                elif advance is None or not self._restates(session, advance):
                     break
-                t, y, yp = self._change_solver(advance)
             return self._outcome(advance)
         except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
             t = self.recorder.close()
@@ -162,7 +168,7 @@ class _Runner:
             return replace(self._ended(self.recorder.end, "failed", error.message), error=error)
 
     def _ended(self, t: float, status: str, message: str) -> Outcome:
-        return Outcome(t, status, message, self._cost(), tuple(self.choices))
+        return Outcome(t, status, message, self._cost(), tuple(self.choices), restated=tuple(self.restated))
 
     def _cost(self) -> Statistics:
         cost = self.before if self.session is None else self.before + self.session.statistics
@@ -174,13 +180,31 @@ class _Runner:
             self.recorder.settle()
             return self._ended(self.stretch.end, "finished", "")
         if advance.status is Status.EVENT:
-            self.recorder.take(advance.t, advance.y, True)
             happening = self.stretch.probe.name(advance.t, advance.events)
+            if happening.target != CHART:
+                self.recorder.take(advance.t, advance.y, True)
+            elif advance.t > self.recorder.end:
+                stretch = self.stretch
+                self.recorder.take(advance.t, advance.y, bool(np.any(stretch.shown[stretch.times == advance.t])))
             return replace(self._ended(advance.t, "event", ""), happening=happening)
         if advance.t > self.recorder.end:
             self.recorder.take(advance.t, advance.y, True)
         ended = self._ended(advance.t, advance.status.value, advance.message)
         return ended if advance.status is not Status.FAILED else replace(ended, error=self._explain(advance))
+
+    def _restates(self, session: Session, advance: Advance) -> bool:
+        """After an event, go on in other coordinates of an orientation, if that is all that has happened."""
+        stretch = self.stretch
+        plan = stretch.plan
+        if advance.status is not Status.EVENT or stretch.probe.name(advance.t, advance.events).target != CHART:
+            return False
+        q, u = (part.copy() for part in plan.program.split(advance.y))
+        q, bodies = restated(plan.assembly, q)
+        if not bodies:
+            return False
+        session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
+        self.restated += [Restated(advance.t, body) for body in bodies]
+        return True
 
     def _explain(self, advance: Advance) -> SolveError | None:
         """Return an error that names what has no value; None if everything has one."""
@@ -238,7 +262,7 @@ class _Runner:
         """Let an explicit method fill tables; return how many samples are done, and why it stopped early."""
         stretch, progress = self.stretch, self.stretch.options.progress
         turning = stretch.plan.balance.turning
-        whole = progress is None and turning.is_plain
+        whole = progress is None and not turning.can_stray
         block = len(stretch.times) if whole else -(-len(stretch.times) // _BLOCKS)
         while done < len(stretch.times):
             times = stretch.times[done : done + block]

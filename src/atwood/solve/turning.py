@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.expr import Program
-from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.assembly import Assembly, Coordinates
 from atwood.forms.program import RatesProgram
 from atwood.kernels import BoundKernel
 from atwood.mechanics.equations import Equations
@@ -37,12 +37,19 @@ class Turning:
 
     def __init__(self, program: RatesProgram, kernel: Callable[[Program, bool], BoundKernel]) -> None:
         self.program, self._kernel = program, kernel
-        self._charts = [np.asarray(chart.coordinates, dtype=np.intp) for chart in program.charts]
+        homogeneous = [chart for chart in program.charts if chart.is_homogeneous]
+        self._charts = [np.asarray(chart.coordinates, dtype=np.intp) for chart in homogeneous]
+        self._kinds = [chart.kind for chart in homogeneous]
 
     @property
     def is_plain(self) -> bool:
         """Whether the rates are the speeds."""
         return self.program.program is None
+
+    @property
+    def can_stray(self) -> bool:
+        """Whether there are coordinates whose size means nothing."""
+        return bool(self._charts)
 
     def rates(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return the derivatives of the coordinates."""
@@ -79,7 +86,7 @@ class Turning:
         if self.is_plain:
             return other - q
         target = other.copy()
-        for chart, kind in zip(self._charts, (one.kind for one in self.program.charts), strict=True):
+        for chart, kind in zip(self._charts, self._kinds, strict=True):
             target[chart] *= float(np.linalg.norm(q[chart])) / float(np.linalg.norm(other[chart]))
             if kind == "quaternion" and q[chart] @ other[chart] < 0.0:  # either sign is the same orientation
                 target[chart] *= -1.0
@@ -103,7 +110,7 @@ def resting_place(equations: Equations) -> FloatArray:
     """Return coordinates of zero, with orientations that are not turned."""
     q = np.zeros(len(equations.coordinates))
     for chart in equations.charts:
-        q[chart.coordinates[0]] = 1.0
+        q[list(chart.coordinates)] = chart.reference
     return q
 
 
@@ -161,6 +168,6 @@ def _orientations() -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(float(value) for value in row) for row in (*cube, *turned))
 
 
-def turning_of(assembly: Assembly, form: FormName) -> Turning:
-    """Return how the coordinates of a scene move in either form."""
+def turning_of(assembly: Assembly, form: Coordinates) -> Turning:
+    """Return how the coordinates of a scene move."""
     return Turning(assembly.rates(form), assembly.kernel)

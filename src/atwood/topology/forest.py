@@ -16,7 +16,7 @@ from atwood.expr import Expression
 from atwood.model.local import LocalPart
 from atwood.model.space import Space
 from atwood.topology.bodies import Bodies, reads_position
-from atwood.topology.charts import Chart
+from atwood.topology.charts import Chart, Orientation, coordinates_of
 from atwood.topology.graph import Joint, MechanismGraph
 from atwood.topology.groups import connected_groups
 
@@ -60,7 +60,7 @@ class Attachment:
     speeds
         Numbers of their speeds.
     chart
-        In space: numbers of the quaternion's coordinates, if the body has an orientation of its own.
+        In space: numbers of the coordinates of its orientation, if the body has one of its own.
     spin
         Numbers of the speeds that belong to the chart.
     turns_with_joint
@@ -147,6 +147,7 @@ def grow_forest(
     bodies: Bodies,
     locals_: Mapping[str, LocalPart],
     space: Space,
+    orientation: Orientation,
 ) -> Forest:
     """Decide how every body is placed and turned.
 
@@ -156,8 +157,10 @@ def grow_forest(
         Whether joints place bodies (reduced) or stay constraints (dae).
     graph, bodies, locals_, space
         The mechanism.
+    orientation
+        In which coordinates orientations in space are.
     """
-    grower = _Grower(graph, bodies, locals_, space)
+    grower = _Grower(graph, bodies, locals_, space, orientation)
     joints = [joint for joint in graph.joints if not joint.is_rigid and _between(joint, bodies)]
     if form == "reduced":
         grower.attach_by_joints(joints)
@@ -199,8 +202,16 @@ def _between(joint: Joint, bodies: Bodies) -> bool:
 class _Grower:
     """Collects attachments, orientations and coordinates while a forest grows."""
 
-    def __init__(self, graph: MechanismGraph, bodies: Bodies, locals_: Mapping[str, LocalPart], space: Space) -> None:
+    def __init__(
+        self,
+        graph: MechanismGraph,
+        bodies: Bodies,
+        locals_: Mapping[str, LocalPart],
+        space: Space,
+        orientation: Orientation,
+    ) -> None:
         self.graph, self.bodies, self.locals, self.space = graph, bodies, locals_, space
+        self.orientation = orientation
         self.coordinates: list[Coordinate] = []
         self.speeds: list[Coordinate] = []
         self.charts: list[Chart] = []
@@ -289,13 +300,13 @@ class _Grower:
         return len(self.coordinates) - 1, len(self.speeds) - 1
 
     def _chart(self, index: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Add a quaternion and the angular velocity in body axes; return their numbers."""
-        body = self.bodies.bodies[index].name
+        """Add an orientation and the angular velocity in body axes; return the numbers of coordinates and speeds."""
+        body, kind = self.bodies.bodies[index].name, self.orientation.kind
         first, start = len(self.coordinates), len(self.speeds)
-        self.coordinates += [Coordinate(f"{body}.quaternion.{part}", "1") for part in "wxyz"]
+        self.coordinates += [Coordinate(name, unit) for name, unit in coordinates_of(kind, body)]
         self.speeds += [Coordinate(f"{body}.spin.{axis}", "rad/s") for axis in "xyz"]
-        chart, spin = tuple(range(first, first + 4)), tuple(range(start, start + 3))
-        self.charts.append(Chart("quaternion", chart, spin, body))
+        chart, spin = tuple(range(first, len(self.coordinates))), tuple(range(start, start + 3))
+        self.charts.append(Chart(kind, chart, spin, body, int(body in self.orientation.turned)))
         return chart, spin
 
     def attach_free(self) -> None:
