@@ -9,7 +9,8 @@ import pytest
 
 import atwood_library as lib
 from atwood import AtwoodError, ParameterError, Result, Scene, StartError, report, simulate
-from atwood_library.scenes import RollingBall, RollingDiscScene
+from atwood_library.scenes import RollingBall
+from atwood_library.scenes import RollingDisc as RollingDiscScene
 
 from ..references.rolling import RollingDisc as ExactDisc
 from ..references.rolling import TurntableBall, hoop, uniform_disc

@@ -20,7 +20,7 @@ from atwood_library.scenes.lagrange_top import LagrangeTop
 from atwood_library.scenes.mass_spring_chain import MassSpringChain
 from atwood_library.scenes.pendulum_on_cart import PendulumOnCart
 from atwood_library.scenes.rolling_ball import RollingBall
-from atwood_library.scenes.rolling_disc import RollingDiscScene
+from atwood_library.scenes.rolling_disc import RollingDisc
 from atwood_library.scenes.simple_pendulum import SimplePendulum
 from atwood_library.scenes.slider_crank import SliderCrank
 from atwood_library.scenes.spatial_slider_crank import SpatialSliderCrank
@@ -49,7 +49,7 @@ __all__ = [
     "MassSpringChain",
     "PendulumOnCart",
     "RollingBall",
-    "RollingDiscScene",
+    "RollingDisc",
     "SimplePendulum",
     "SliderCrank",
     "SpatialSliderCrank",
@@ -80,7 +80,7 @@ SCENES: dict[str, type[Scene]] = {
     "intermediate-axis": IntermediateAxis,
     "lagrange-top": LagrangeTop,
     "rolling-ball": RollingBall,
-    "rolling-disc": RollingDiscScene,
+    "rolling-disc": RollingDisc,
     "spatial-slider-crank": SpatialSliderCrank,
     "spherical-pendulum": SphericalPendulum,
     "stewart-platform": StewartPlatform,

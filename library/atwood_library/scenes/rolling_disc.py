@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from atwood import ParameterError, Scene, connect, parameter
-from atwood_library.joints.rolling_disc import RollingDisc
+from atwood_library.joints.rolling_disc import RollingDisc as RollingContact
 from atwood_library.parts.disc import Disc
 from atwood_library.parts.ground import Ground
 
 
-class RollingDiscScene(Scene):
+class RollingDisc(Scene):
     """A thin disc rolls on a level table without slipping (Routh, Advanced Rigid Dynamics, art. 244), in one motion.
 
     ``steady``: it leans at a constant angle and rolls along a circle about the origin. ``wobble``: it is set off like
@@ -31,7 +31,7 @@ class RollingDiscScene(Scene):
     t_end = 4.0
 
     ground: Ground = Ground()
-    contact: RollingDisc = RollingDisc(radius=radius, axis=(0.0, 0.0, 1.0))
+    contact: RollingContact = RollingContact(radius=radius, axis=(0.0, 0.0, 1.0))
     disc: Disc = Disc(radius=radius, inner_radius=hole, mass=mass, axis="z")
     connections = [connect(ground.frame, contact.a), connect(contact.b, disc.frame)]
 

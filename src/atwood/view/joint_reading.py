@@ -56,7 +56,7 @@ def read_joint(
     if len(moving) == 2:
         first, second = (_step(mechanism, joint, shift, one, 1.0) for one in moving)
         normal = turn @ np.cross(first, second)
-        return [Joining(path, "plane", (a, b), (normal / np.linalg.norm(normal),))]
+        return [Joining(path, "plane", (a, b), (normal / np.linalg.norm(normal),), reach=_touched(mechanism, path))]
     if len(moving) > 2:
         return []
     if len(moving) == 1:
@@ -73,6 +73,12 @@ def read_joint(
     axis = axis / np.linalg.norm(axis)
     along = _seen_from(reading, a, b) @ axis
     return [Joining(path, "slide", (a, b), (axis,), bool(axes), (float(along.min()), float(along.max())))]
+
+
+def _touched(mechanism: Mechanism, path: str) -> tuple[float, float]:
+    """Return how far from below what moves on a plane it can touch it: by the radius of what rolls."""
+    radius = mechanism.locals_[path].part.values.get("radius", 0.0)
+    return 0.0, float(radius) if isinstance(radius, (int, float)) else 0.0
 
 
 def _depends(expressions: Sequence[Expression], symbol: Expression) -> bool:

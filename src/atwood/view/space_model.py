@@ -257,10 +257,13 @@ def _add_plane(bench: Bench, joining: Joining) -> None:
     seen = np.einsum("tji,tj->ti", pose.axes, reading.place(joining.nodes[1]) - reading.place(node))
     frame = frame_along(joining.axes[0])
     spread = seen @ frame[:, :2]
-    low, high = spread.min(axis=0) - 8.0 * unit, spread.max(axis=0) + 8.0 * unit
+    margin = 8.0 * unit + joining.reach[1]
+    low, high = spread.min(axis=0) - margin, spread.max(axis=0) + margin
     middle = reading.offsets[node] + frame[:, :2] @ (0.5 * (low + high)) - 0.3 * unit * frame[:, 2]
     sides = (float(high[0] - low[0]), float(high[1] - low[1]), 0.5 * unit)
-    bench.surface(reading.body_of[node], box(sides, cells=8).placed(middle, frame), "#eef1f4")
+    bench.surface(
+        reading.body_of[node], box(sides, cells=24 if joining.reach[1] else 8).placed(middle, frame), "#eef1f4"
+    )
 
 
 def _add_curve(bench: Bench, joining: Joining) -> None:

@@ -99,7 +99,7 @@ class SpacePicture:
         some = np.unique(np.linspace(0, count - 1, min(count, 60)).astype(int))
         points = [reading.place(node) for node in reading.used]
         for piece in self.model.pieces:
-            pose, corners = reading.poses[piece.body], piece.corners[:: max(1, len(piece.corners) // 60)]
+            pose, corners = reading.poses[piece.body], _outermost(piece.corners)
             times = some[:1] if piece.body == 0 else some
             placed = pose.origin[times, None] + np.einsum("tij,kj->tki", pose.axes[times], corners)
             points.append(placed.reshape(-1, 3))
@@ -169,6 +169,16 @@ def make_space_picture(result: Result, camera: Camera, traced: Mapping[str, int]
     for number, node in enumerate((traced or {}).values()):
         trails.append(Trail(reading.place(node), COLOURS[(4 + number) % len(COLOURS)]))
     return SpacePicture(model, camera, tuple(trails))
+
+
+def _outermost(corners: FloatArray) -> FloatArray:
+    """Return some sixty of many corners, those that stand out along edges and diagonals of a box among them."""
+    if len(corners) <= 60:
+        return corners
+    ways = np.array([way for way in np.ndindex(3, 3, 3) if way != (1, 1, 1)]) - 1.0
+    chosen = {*range(0, len(corners), len(corners) // 60), *np.argmax(corners @ ways.T, axis=0).tolist()}
+    found: FloatArray = corners[sorted(chosen)]
+    return found
 
 
 def hull(points: FloatArray) -> FloatArray:
