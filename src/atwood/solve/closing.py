@@ -25,6 +25,9 @@ FloatArray = NDArray[np.float64]
 _SHIFTS = (0.1, 0.2, 0.3, 0.5, 0.5, 0.8, 0.8, 1.2, 1.2, 1.8, 1.8, 2.5, 2.5, 3.1, 3.1)
 """How far other places to begin from are, at most: rad, or shares of the scene's size."""
 
+_ALIKE = 3
+"""Where so many other places lead to what was found first, no more are tried."""
+
 
 @dataclass(frozen=True)
 class Nearest:
@@ -167,6 +170,7 @@ def closest_of_all(
         Whether to look no further.
     """
     best: Nearest | None = None
+    alike = 0
     for place in places_around(system, scales, t, q):
         try:
             found = closest(system, units, scales, t, place)
@@ -174,7 +178,9 @@ def closest_of_all(
             continue
         # Of places that miss alike the first is the nearest to the guess.
         if best is None or found.size < best.size * (1.0 - 1e-6) - 1e-13:
-            best = found
-        if is_enough(best):
+            best, alike = found, 0
+        elif found.size < best.size * (1.0 + 1e-6) + 1e-13:
+            alike += 1
+        if is_enough(best) or alike == _ALIKE:
             break
     return best

@@ -189,7 +189,7 @@ def _lengths_that_close(failed: Failed, system: System, best: Nearest) -> list[s
         slope = float((np.asarray(after) / units - missing) @ missing) / (h * best.size)
         if abs(slope) * failed.length > 0.3:
             found.append((abs(slope), symbol.name, values[j], values[j] - best.size / slope))
-    found.sort(key=lambda one: -one[0])
+    found.sort(key=lambda one: -round(one[0] * failed.length, 6))  # in the order of declaration where they do alike
     good = [one for one in found if np.sign(one[2]) == np.sign(one[3])]
     return [f"{name} = {new:.4g} m (it is {old:.4g} m)" for _, name, old, new in good[:shown]]
 
