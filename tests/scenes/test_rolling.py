@@ -9,6 +9,7 @@ import pytest
 
 import atwood_library as lib
 from atwood import AtwoodError, ParameterError, Result, Scene, StartError, report, simulate
+from atwood.pipeline import assemble
 from atwood_library.scenes import RollingBall
 from atwood_library.scenes import RollingDisc as RollingDiscScene
 
@@ -275,3 +276,86 @@ def test_a_wheel_that_cannot_touch_is_refused() -> None:
     for form in ("reduced", "dae"):
         with pytest.raises((StartError, AtwoodError), match=r"wheel\.contact"):
             simulate(scene, form=form)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_disc_that_starts_flat_is_named(form: str) -> None:
+    scene = Scene(space="space")
+    ground, contact = scene.add("ground", lib.Ground()), scene.add("contact", lib.RollingDisc(axis=(0.0, 0.0, 1.0)))
+    disc = scene.add("disc", lib.Disc(axis="z"))
+    scene.connect(ground.frame, contact.a)
+    scene.connect(contact.b, disc.frame)
+    with pytest.raises(StartError, match=r"contact: the law 'rolling' has no value"):
+        simulate(scene, form=form)
+
+
+@pytest.mark.parametrize("orientation", ["rodrigues", "rotation-vector", "euler-zyz"])
+def test_three_coordinates_of_orientation_do_as_well(orientation: str) -> None:
+    made = simulate(assemble(tumbling(), orientation=orientation), rtol=1e-12, outputs=11)
+    motion = uniform_disc(0.5, 2.0).motion(made.time, ANGLES, RATES, (0.1, -0.2))
+    assert len(made.assembly.reduced.coordinates) == 5
+    assert np.max(np.abs(vector(made, "disc.position") - motion.centre)) < 1e-10
+
+
+# -- wheels --------------------------------------------------------------------------------------------------------
+
+
+def cart(lead: float) -> Scene:
+    """Return a cart on two wheels on one axle, its centre of mass before the axle, its nose sliding on the ground."""
+    scene = Scene(space="space", t_end=2.0)
+    ground = scene.add("ground", lib.Ground())
+    body = scene.add("cart", lib.RigidBody(mass=5.0, center=(lead, 0.0, 0.0), moments=(0.2, 0.3, 0.4)))
+    for name, place in (("left", 0.3), ("right", -0.3)):
+        wheel = scene.add(name, lib.Wheel(radius=0.2, mass=0.5, axial=0.01, transverse=0.005))
+        end = scene.add(f"{name}_end", lib.Weld(displacement=(0.0, place, 0.0)))
+        scene.connect(body.frame, end.a)
+        scene.connect(end.b, wheel.axle)
+        scene.connect(ground.frame, wheel.ground)
+    nose, skid = scene.add("nose", lib.Weld(displacement=(0.5, 0.0, -0.2))), scene.add("skid", lib.PointOnPlane())
+    scene.connect(body.frame, nose.a)
+    scene.connect(nose.b, skid.b)
+    scene.connect(ground.frame, skid.a)
+    scene.guess["cart.position.z"] = 0.2
+    scene.start.update({"left.bearing.angular_velocity": 5.0, "right.bearing.angular_velocity": 4.0})
+    return scene
+
+
+def test_a_cart_on_two_wheels_goes_round_when_it_is_balanced() -> None:
+    """Both wheels keep their rates, as they must in a circle: v = r (w_l + w_r)/2, W = r (w_r - w_l)/(2 b)."""
+    for form in ("reduced", "dae"):
+        made = simulate(cart(0.0), form=form, rtol=1e-11, outputs=11)
+        speed, turning = 0.2 * 4.5, 0.2 * (4.0 - 5.0) / 0.6
+        x, y = made["cart.position.x"], made["cart.position.y"]
+        way = turning * made.time + np.arctan2(made["cart.velocity.y"][0], made["cart.velocity.x"][0])
+        assert np.max(np.abs(made["cart.velocity.x"] - speed * np.cos(way))) < 1e-7
+        assert (
+            np.max(
+                np.abs(np.hypot(x - x[0], y - y[0]) - abs(2.0 * speed / turning * np.sin(0.5 * turning * made.time)))
+            )
+            < 1e-7
+        )
+        sideways = made["left.contact.friction_1"] + made["right.contact.friction_1"]
+        assert np.max(np.abs(sideways + 6.0 * speed * turning * np.sin(way))) < 1e-6
+        weight = sum(made[f"{name}.contact.normal_force"] for name in ("left", "right")) + made["skid.normal_force"]
+        assert np.max(np.abs(weight - 6.0 * G)) < 1e-7
+    found = report(cart(0.0))
+    assert found.degrees_of_freedom == 2
+    assert found.integrated == ()
+
+
+def test_a_cart_straightens_like_a_sleigh() -> None:
+    """With its centre of mass before the axle it is Chaplygin's sleigh: ``M v' = m a W^2``, ``J W' = -m a v W``."""
+    from scipy.integrate import solve_ivp
+
+    lead, wheels = 0.1, 2.0 * (0.5 + 0.01 / 0.2**2)
+    inertia = 0.4 + 5.0 * lead**2 + 2.0 * 0.005 + wheels * 0.3**2
+    start = (0.2 * 4.5, 0.2 * (4.0 - 5.0) / 0.6)
+
+    def rates(_: float, y: Any) -> tuple[float, float]:
+        return 5.0 * lead * y[1] ** 2 / (5.0 + wheels), -5.0 * lead * y[0] * y[1] / inertia
+
+    made = simulate(cart(lead), rtol=1e-11, outputs=11)
+    exact = solve_ivp(rates, (0.0, 2.0), start, method="DOP853", t_eval=made.time, rtol=1e-12, atol=1e-13).y
+    assert np.max(np.abs(made["cart.angular_velocity.z"] - exact[1])) < 1e-7
+    forward = 0.1 * (made["left.bearing.angular_velocity"] + made["right.bearing.angular_velocity"])
+    assert np.max(np.abs(forward - exact[0])) < 1e-7

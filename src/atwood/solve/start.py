@@ -12,17 +12,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import StartError
+from atwood.errors import AtwoodError, KernelEvaluationError, StartError
 from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import regular_to_maximal
 from atwood.forms.starting import starting
 from atwood.solve.charts import Reassemble, enter_charts, from_regular, own_names
+from atwood.solve.missing import missing_at
 from atwood.solve.scales import motion_scales, scene_length
 from atwood.solve.start_positions import solve_positions
 from atwood.solve.start_speeds import solve_speeds
 from atwood.solve.start_targets import sort_targets
-from atwood.solve.turning import turning_of
+from atwood.solve.turning import resting_place, turning_of
 
 __all__ = ["Start", "find_start", "maximal_state", "own_state", "settle"]
 
@@ -115,10 +116,27 @@ def find_start(assembly: Assembly) -> Start:
     positions, speeds = sort_targets(assembly, equations)
     scales = motion_scales(equations, length)
     t = assembly.flat.t_start
-    at = solve_positions(assembly, equations, positions, scales, length, t)
-    u, free_u, repeated_u = solve_speeds(assembly, equations, speeds, scales, t, at.coordinates)
+    try:
+        at = solve_positions(assembly, equations, positions, scales, length, t)
+        u, free_u, repeated_u = solve_speeds(assembly, equations, speeds, scales, t, at.coordinates)
+    except KernelEvaluationError as error:
+        raise _without_value(assembly, t, error) from error
     free = own_names(assembly, at.free)
     return Start(t, at.coordinates, u, length, free, free_u, (*at.repeated, *repeated_u), at.rough)
+
+
+def _without_value(assembly: Assembly, t: float, error: KernelEvaluationError) -> AtwoodError:
+    """Return the error that names the law that has no value where bodies are placed if nothing is said of them."""
+    at_rest = resting_place(assembly.equations)
+    found = missing_at(assembly, t, at_rest, np.zeros(len(assembly.equations.speeds)))
+    if found is None:
+        return error
+    why = f" ({found.reason})" if found.reason else ""
+    return StartError(
+        f"{found.quantity} has no value where the start puts the bodies at first{why}",
+        where=found.part,
+        advice="Give start values or guesses, of places and orientations, with which it has one.",
+    )
 
 
 def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
