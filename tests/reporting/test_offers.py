@@ -10,7 +10,21 @@ import numpy as np
 import pytest
 
 import atwood
-from atwood import Component, Load, Point, Scene, Vector, connector, force, parameter, report, select, simulate
+from atwood import (
+    Component,
+    Load,
+    Point,
+    Scalar,
+    Scene,
+    Vector,
+    connector,
+    force,
+    parameter,
+    potential,
+    report,
+    select,
+    simulate,
+)
 from atwood.pipeline import assemble
 from atwood.reporting import Offer
 from atwood.solve.start import find_start
@@ -141,6 +155,61 @@ class Gust(Component):
         yield Load(self.at, Vector(select(is_there, self.ahead, 0.0), select(is_there, self.aside, 0.0), 0.0))
 
 
+class Patch(Component):
+    """A force along y, or along x, that acts in a narrow place only."""
+
+    ahead: float = parameter(0.0, unit="N", doc="Force along x.")
+    aside: float = parameter(0.0, unit="N", doc="Force along y.")
+    at: Point = connector(Point, "Where it acts.")
+
+    @force
+    def blow(self) -> Iterable[Load]:
+        """Return the force."""
+        share = atwood.exp(-(((self.at.position.x + 0.4) / 1e-3) ** 2))
+        yield Load(self.at, Vector(self.ahead * share, self.aside * share, 0.0))
+
+
+class Band(Component):
+    """A band that only pulls."""
+
+    stiffness: float = parameter(50.0, unit="N/m", doc="Force for a metre.")
+    length: float = parameter(1.0, unit="m", doc="Length at which it begins to pull.")
+    a: Point = connector(Point, "One end.")
+    b: Point = connector(Point, "The other end.")
+
+    @potential
+    def energy(self) -> Scalar:
+        """Return the energy."""
+        stretch = atwood.maximum(self.distance(self.a, self.b) - self.length, 0.0)
+        return 0.5 * self.stiffness * stretch * stretch
+
+
+def on_bands(y: float, length: float = 1.0) -> Scene:
+    """A mass thrown between two bands on both sides."""
+    scene = thrown(1.0, 0.0, 0.5)
+    for name, place in (("left", (0.0, -1.0, 0.0)), ("right", (0.0, 1.0 + y, 0.0))):
+        band = scene.add(name, Band(length=length))
+        scene.connect(scene.add(f"{name}_ground", Ground(position=place)).frame, band.a)
+        scene.connect(band.b, scene["part"].connectors()["point"])
+    return scene
+
+
+def aside(scene: Scene, azimuth: float, push: float = 0.0) -> Scene:
+    """Two bobs on rods, let go in a vertical plane at an azimuth; the lower one may be thrown out of it."""
+    scene.add("ground", Ground())
+    before = scene["ground"].connectors()["frame"]
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    for number, (r, z) in enumerate(((0.6, -0.8), (0.6 + 0.28, -0.8 - 0.96))):
+        rod, bob = scene.add(f"rod{number}", Rod(length=1.0)), scene.add(f"bob{number}", PointMass(mass=1.0 + number))
+        scene.connect(before, rod.a)
+        scene.connect(rod.b, bob.point)
+        before = bob.point
+        start = {"position": (r * c, r * s, z), "velocity": (-number * push * s, number * push * c, 0.0)}
+        for name, values in start.items():
+            scene.start.update({f"bob{number}.{name}.{axis}": v for axis, v in zip("xyz", values, strict=True)})
+    return scene
+
+
 class Twist(Component):
     """A force square to the velocity, as that of a magnetic field along z."""
 
@@ -202,6 +271,10 @@ STAYS: dict[str, tuple[Callable[[], Scene], tuple[str, ...]]] = {
         (ALONG_Z, X_Z),
     ),
     "gust in the plane": (lambda: with_part(Gust(ahead=1.0)), (X_Z,)),
+    "narrow gust in the plane": (lambda: with_part(Patch(ahead=1.0)), (X_Z,)),
+    "bands on both sides": (lambda: on_bands(0.0), (X_Z,)),
+    "slack bands on both sides": (lambda: on_bands(0.0, length=3.0), (X_Z,)),
+    "pendulum aside": (lambda: aside(Scene(space="space"), 1.1), ("in a plane square to (0.8912, -0.4536, 0)",)),
     "top that falls": (lambda: upright(0.0), (X_Z,)),
 }
 
@@ -246,6 +319,11 @@ LEAVES: dict[str, Callable[[], Scene]] = {
     "push by the clock": lambda: pushed(lambda t: select(t > 9.0, 1e-3, 0.0)),
     "short push": lambda: pushed(lambda t: atwood.exp(-(((t - 3.0) / 1e-3) ** 2))),
     "gust beyond a place": lambda: with_part(Gust(aside=1.0)),
+    "narrow gust": lambda: with_part(Patch(aside=1.0)),
+    "band a little aside": lambda: on_bands(1e-4),
+    "slack band a little aside": lambda: on_bands(1e-4, length=3.0),
+    "pendulum aside, thrown": lambda: aside(Scene(space="space"), 1.1, 1e-8),
+    "fast wheel, pushed": lambda: _pushed_wheel(1e3, 1e-5),
     "gust far away": lambda: with_part(Gust(aside=1.0, beyond=1e3)),
     "field along z": lambda: with_part(Twist()),
     "universal shaft": lambda: SCENES["universal-shaft"](),
@@ -254,6 +332,14 @@ LEAVES: dict[str, Callable[[], Scene]] = {
     "platform": lambda: SCENES["stewart-platform"](),
     "rest": lambda: hung(Cone(), Pivot(), "tip", joint__angle=math.pi),
 }
+
+
+def _pushed_wheel(spin: float, push: float) -> Scene:
+    scene = alone(Disc(thickness=0.1), spin_x=0.0, spin_y=spin, spin_z=0.0)
+    scene.connect(
+        scene.add("push", Force(direction=(0.0, 1.0, 0.0), value=push)).point, scene["part"].connectors()["frame"]
+    )
+    return scene
 
 
 @pytest.mark.parametrize("name", LEAVES)

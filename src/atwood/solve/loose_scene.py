@@ -79,16 +79,14 @@ class LooseScene:
         moving = {*equations.coordinates, *equations.speeds, *equations.accelerations}
         self.loosened: Loosened = loosen(program, equations.time, moving)
         self._exact, self._kernel = (compile_program(one) for one in (program, self.loosened.program))
-        self._clock = compile_program(self.loosened.clock)
+        self._probe = compile_program(self.loosened.probe)
         self.bound = self._exact.bind(assembly.parameter_values)
 
-    def loosely(self, t: float, random: np.random.Generator, number: int) -> None:
-        """Take other values for what the clock and switches decide."""
+    def loosely(self, t: float, q: FloatArray, u: FloatArray, random: np.random.Generator, number: int) -> None:
+        """Take other values for what the clock and switches decide at a state; see `Loosened.choose`."""
         known = self.assembly.parameter_values
-        at = np.zeros(0)
-        if self.loosened.clock.results:
-            at = np.asarray(self._clock.bind(known)([t])[0], dtype=float)
-        self.bound = self._kernel.bind(np.concatenate([known, self.loosened.choose(at, random, number)]))
+        probed = self._probe.bind(known)([t], q, u, np.zeros_like(u))
+        self.bound = self._kernel.bind(np.concatenate([known, self.loosened.choose(probed, random, number)]))
 
     def exactly(self) -> None:
         """Take what they are."""

@@ -25,10 +25,10 @@ __all__ = ["Symmetry", "find_symmetries"]
 
 FloatArray = NDArray[np.float64]
 
-_START = 1e-9
+_START = 1e-11
 """Relative to the scene's sizes: what leads out of the plane at the start by less than this is rounding."""
 
-_NEAR = 1e-10
+_NEAR = 1e-12
 """The same at other places, where constraints and accelerations are solved for."""
 
 _SAMPLES, _SAMPLES_WITH_SWITCHES = 6, 24
@@ -194,14 +194,15 @@ def _stays(scene: LooseScene, one: Symmetry) -> bool:
     span = max(scene.assembly.flat.t_end - t, 0.0)
     for number in range(count):
         moment = t + span * float(random.uniform()) if number else t
-        if not scene.loosened.is_plain:
-            scene.loosely(moment, random, number)
+        scene.exactly()
         place = _place(scene, one, moment, first, random)
         if place is None:
             return False
         speeds = _speeds(scene, one, moment, place, pace, random)
         if speeds is None:
             return False
+        if number and not scene.loosened.is_plain:
+            scene.loosely(moment, place, speeds, random, number - 1)
         later = scene.accelerations(moment, place, speeds)
         _, now = scene.at(moment, place, speeds)
         rates = np.concatenate([now.velocities / scene.start.length, now.spins])
@@ -224,12 +225,15 @@ def _place(scene: LooseScene, one: Symmetry, t: float, first: Bodies, random: np
             now, bodies = scene.at(t, q, still)
             misses = np.concatenate([now.value[scene.holonomic], _misses(one, bodies, first)])
             slopes = np.concatenate([now.slope[scene.holonomic], _slopes(one, bodies)]) * scene.sizes
-            rows = np.maximum(np.max(np.abs(slopes), axis=1, initial=0.0), 1e-300)
-            miss = float(np.max(np.abs(misses / np.where(rows < 1e-12 * scene.start.length, 1.0, rows)), initial=0.0))
+            rows = np.max(np.abs(slopes), axis=1, initial=0.0)
+            rows[rows < 1e-12 * max(scene.start.length, 1.0)] = 1.0
+            miss = float(np.max(np.abs(misses / rows), initial=0.0))
             if miss < 1e-12 or (miss < 1e-10 and miss > 0.5 * last):
                 return q
             last = miss
-            q = scene.turning.moved(t, q, -scene.sizes * np.linalg.lstsq(slopes, misses, rcond=1e-10)[0])
+            q = scene.turning.moved(
+                t, q, -scene.sizes * np.linalg.lstsq(slopes / rows[:, None], misses / rows, rcond=1e-9)[0]
+            )
     return None
 
 
