@@ -1,6 +1,7 @@
 """Bodies placed roughly are brought together: where they come to, what moved, and what is said if they cannot."""
 
 import math
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -110,6 +111,20 @@ def test_hinges_are_not_put_in_the_wrong_way_round() -> None:
     with pytest.raises(StartError, match="the wrong way round") as caught:
         find_start(assemble(hinged_askew(math.pi)))
     assert caught.value.where in ("low", "high")
+
+
+def test_a_loop_that_closes_only_far_from_the_guess_says_where() -> None:
+    scene = Bricard()
+    scene.start["hinge1.angle"] = 0.5
+    scene.guess.update({"hinge2.angle": 0.67, "hinge3.angle": 1.44, "hinge5.angle": 0.27, "hinge6.angle": 2.73})
+    with pytest.raises(StartError, match="near the guess only with this joint the wrong way round") as caught:
+        find_start(assemble(scene))
+    advised = dict(re.findall(r"(hinge\d\.angle) = (-?[\d.]+\d)", caught.value.advice))
+    assert set(advised) == set(scene.guess)
+    scene.guess.update({path: float(value) for path, value in advised.items()})
+    assembly = assemble(scene)
+    found = find_placement(assembly, find_start(assembly))
+    assert all(abs(one.off) < 1e-3 for one in found.guesses)  # the advice is good
 
 
 def test_gaps_of_joints_are_distances_and_angles() -> None:

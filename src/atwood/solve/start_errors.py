@@ -194,7 +194,7 @@ def _lengths_that_close(failed: Failed, system: System, best: Nearest) -> list[s
     return [f"{name} = {new:.4g} m (it is {old:.4g} m)" for _, name, old, new in good[:shown]]
 
 
-def far_from_guess(failed: Failed, found: FloatArray) -> StartError:
+def far_from_guess(failed: Failed, found: FloatArray, wrong: Sequence[str]) -> StartError:
     """Return the error that says that all fits only far from the guess.
 
     Parameters
@@ -203,23 +203,29 @@ def far_from_guess(failed: Failed, found: FloatArray) -> StartError:
         The start that was not found.
     found
         Coordinates of the nearest place at which everything holds.
+    wrong
+        Joints that would be the wrong way round nearer to the guess.
     """
-    equations, assembly = failed.equations, failed.assembly
-    if not any(one.value is not None for one in equations.constraints):
-        return contradiction(failed.level.fixed, failed.missing, _freedom(failed))
+    equations, assembly, guessed = failed.equations, failed.assembly, failed.level.guessed
+    off, _ = System(assembly, equations, guessed, False).at(failed.time, found, np.zeros_like(failed.scales))
+    places = [f"{one.path} = {one.value + miss:.4g}" for one, miss in zip(guessed, off, strict=True)]
+    elsewhere = f"guess near to {', '.join(places[:_SHOWN])}{', ...' if len(places) > _SHOWN else ''}."
+    if wrong:
+        return wrong_way_round(failed, wrong[0], f"It closes the right way elsewhere; {elsewhere}")
     gaps = find_gaps(assembly, equations, failed.time, failed.nearest)
-    worst = _largest(gaps, failed.length)
-    system = System(assembly, equations, failed.level.guessed, False)
-    off, _ = system.at(failed.time, found, np.zeros_like(failed.scales))
-    places = [f"{one.path} = {one.value + miss:.4g}" for one, miss in zip(failed.level.guessed, off, strict=True)]
+    open_ones = [gap for gap in gaps if gap.size(failed.length) > _CLOSED]
+    if not open_ones:
+        text, where = "what is fixed cannot hold near the guess", (failed.level.fixed or guessed)[0].path
+        return StartError(text, where=where, advice=f"It holds elsewhere; {elsewhere}")
+    worst = _largest(open_ones, failed.length)
     return StartError(
         f"the loop does not close near the guess: the nearest position found there misses by {worst.describe()}",
         where=worst.part,
-        advice=f"It closes elsewhere; guess near to {', '.join(places[:6])}{', ...' if len(places) > 6 else ''}.",
+        advice=f"It closes elsewhere; {elsewhere}",
     )
 
 
-def wrong_way_round(failed: Failed, part: str) -> StartError:
+def wrong_way_round(failed: Failed, part: str, advice: str = "") -> StartError:
     """Return the error that says that a joint would have to be put in the wrong way round.
 
     Parameters
@@ -228,6 +234,8 @@ def wrong_way_round(failed: Failed, part: str) -> StartError:
         The start that was not found.
     part
         Path of the joint.
+    advice
+        What to do, if more is known.
     """
     loop = _loop_through(failed.assembly, part)
     fixed = [f"{one.path} = {one.value:g}" for one in failed.level.fixed]
@@ -235,7 +243,8 @@ def wrong_way_round(failed: Failed, part: str) -> StartError:
         "the loop closes near the guess only with this joint the wrong way round: its two frames would be half a turn "
         "away from how it joins them" + (f" (the loop of {', '.join(loop)})" if loop else ""),
         where=part,
-        advice="Turn its axis round, or the frame that it is fixed to, or guess a start in which it is the right way"
+        advice=advice
+        or "Turn its axis round, or the frame that it is fixed to, or guess a start in which it is the right way"
         + (f", or give up {' or '.join(fixed[:_SHOWN])}." if fixed else "."),
     )
 

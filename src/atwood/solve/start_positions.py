@@ -122,7 +122,7 @@ def _elsewhere(failed: Failed, system: System) -> tuple[FloatArray, Matrix]:
     if best is None:
         raise wrong_way_round(failed, wrong[0]) if wrong else explain_positions(failed)
     if _strays(failed, best[1]):
-        raise far_from_guess(failed, best[1])
+        raise far_from_guess(failed, best[1], wrong)
     return best[1], best[2]
 
 
