@@ -9,7 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from atwood import AtwoodError, Component, ParameterError, Scene, assemble, report, simulate, sweep
+from atwood import (
+    AtwoodError,
+    Component,
+    ParameterError,
+    Scene,
+    assemble,
+    from_data,
+    report,
+    simulate,
+    sweep,
+    to_data,
+)
 from atwood.solids import MassProperties, box, combine, cone, cylinder, disc, rod, sphere, stl_solid, tube
 from atwood_library import (
     Bar,
@@ -198,6 +209,23 @@ def test_a_sweep_meets_the_wall() -> None:
     assert not np.isfinite(made["pivot.angle"][2]).any()
     assert made.failed == (2,)
     assert "greater than the outer one" in str(made.to_dict())
+
+
+def test_files_are_kept_and_may_be_others(tmp_path: Path) -> None:
+    write_binary(tmp_path / "egg.stl", ellipsoid_mesh(0.1, 0.1, 0.2, 12))
+    scene = Scene(space="space")
+    scene.add("part", MeshBody(file=TETRAHEDRON, density=10.0))
+    again = from_data(to_data(scene))
+    assert again["part"].file == str(TETRAHEDRON)
+    made = assemble(again)
+    moved = made.with_values({"part.file": str(tmp_path / "egg.stl")})
+    assert "part.file" in moved.why_new
+    (mass,) = report(moved).bodies
+    assert mass.mass == pytest.approx(stl_solid(tmp_path / "egg.stl", density=10.0).mass, rel=1e-12)
+    larger = made.with_values({"part.scale": 2.0})
+    assert larger.why_new == ""
+    (mass,) = report(larger).bodies
+    assert mass.mass == pytest.approx(8.0 * 10.0 / 6.0, rel=1e-12)
 
 
 # -- welded together ----------------------------------------------------------------------------------------------

@@ -91,7 +91,7 @@ def _offer(assembly: Assembly, start: Start, found: Symmetry) -> Offer:
     x, y, z = (float(component) for component in found.direction)
     offer = Offer(found.space, found.name, (x, y, z))
     if found.space == "plane" and (x, y, z) != (0.0, 1.0, 0.0):
-        return replace(offer, why_not="a scene in a plane lies in the plane x-z")
+        return replace(offer, why_not=_elsewhere(x, y, z))
     try:
         reduced, plans = _assemble_there(assembly, start, found)
     except AtwoodError as error:
@@ -101,6 +101,15 @@ def _offer(assembly: Assembly, start: Start, found: Symmetry) -> Offer:
         return replace(offer, why_not="its start could not be carried over")
     states = {form: plan[0] for form, plan in plans.items()}
     return replace(offer, states=states, operations={form: plan[1] for form, plan in plans.items()}, assembly=reduced)
+
+
+def _elsewhere(x: float, y: float, z: float) -> str:
+    """Return why the plane with this normal is not offered, and what would make it one that is."""
+    if z != 0.0:
+        return "a scene in a plane lies in the plane x-z"
+    angle = np.degrees(np.arctan2(x, y))  # about z, which takes the normal to y
+    turned = f"turned by {angle:.4g} deg about z"
+    return f"a scene in a plane lies in the plane x-z, where this one would be if it were {turned}"
 
 
 def _assemble_there(

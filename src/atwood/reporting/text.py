@@ -176,7 +176,7 @@ def _offers(report: MechanismReport) -> Iterator[tuple[str, str]]:
             )
         yield "symmetry", f"the motion stays {one.where}; with space={one.space!r} it would have: {'; '.join(forms)}"
     for one in [] if ready else report.offers:
-        yield "symmetry", f"the motion stays {one.where}, where the scene cannot be assembled: {one.why_not}"
+        yield "symmetry", f"the motion stays {one.where}, and cannot be offered there: {one.why_not}"
 
 
 def _kinds(counts: object) -> str:

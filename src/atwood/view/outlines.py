@@ -51,23 +51,24 @@ def outline_mesh(outline: Outline) -> Mesh:
         triangles = np.asarray(outline.triangles, dtype=np.intp)
         faces = np.column_stack([triangles, triangles[:, 2]])
         return Mesh(np.asarray(outline.vertices, dtype=float), faces, np.zeros(len(faces), dtype=bool))
-    line = _with_thickness(np.asarray(outline.profile, dtype=float))
+    line = _with_thickness(np.asarray(outline.profile, dtype=float), outline.is_ring)
     made = revolved(_divided(line, outline.is_ring), around=40, marks=True, closed=outline.is_ring)
     # z of the surface along the axis, x and y along the next two: a right-handed turn.
     turn = np.eye(3)[:, [(outline.axis + 1) % 3, (outline.axis + 2) % 3, outline.axis]]
     return made.placed(np.zeros(3), turn)
 
 
-def _with_thickness(line: FloatArray) -> FloatArray:
+def _with_thickness(line: FloatArray, is_ring: bool) -> FloatArray:
     """Return a line that encloses something: of a plate without thickness, or a wall without it, with a little."""
     widths, heights = np.ptp(line, axis=0)
     least = _THIN * max(float(np.max(line[:, 0])), float(heights))
     line = line.copy()
     if heights < least:
         line[:, 1] = 0.5 * least * np.array([-1.0 if i < (len(line) + 1) // 2 else 1.0 for i in range(len(line))])
-    if widths < least:
-        inner = np.array([i in (0, len(line) - 1) for i in range(len(line))])
-        line[inner, 0] -= least
+    if widths < least and is_ring:
+        line[[0, -1], 0] -= least
+    elif 0.0 < widths < least:
+        line[:, 0] *= least / widths
     return line
 
 
