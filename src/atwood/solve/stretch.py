@@ -202,7 +202,12 @@ class _Runner:
         q, bodies = restated(plan.assembly, q)
         if not bodies:
             return False
-        session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
+        if plan.is_projected:
+            q, u = plan.balance.project(advance.t, q, u, plan.sizes)
+        y, yp = pack_state(plan, advance.t, q, u)
+        session.reinitialize(advance.t, y, yp)
+        if self.guard is not None:
+            self.guard.restart(Advance(advance.t, y, yp, Status.REACHED))
         self.restated += [Restated(advance.t, body) for body in bodies]
         return True
 
