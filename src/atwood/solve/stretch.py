@@ -204,10 +204,13 @@ class _Runner:
             return False
         if plan.is_projected:
             q, u = plan.balance.project(advance.t, q, u, plan.sizes)
-        y, yp = pack_state(plan, advance.t, q, u)
-        session.reinitialize(advance.t, y, yp)
-        if self.guard is not None:
-            self.guard.restart(Advance(advance.t, y, yp, Status.REACHED))
+        if isinstance(session, ExplicitSession):
+            session.reinitialize(advance.t, np.concatenate([q, u]))
+        else:
+            y, yp = pack_state(plan, advance.t, q, u)
+            session.reinitialize(advance.t, y, yp)
+            if self.guard is not None:
+                self.guard.restart(Advance(advance.t, y, yp, Status.REACHED))
         self.restated += [Restated(advance.t, body) for body in bodies]
         return True
 

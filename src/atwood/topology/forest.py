@@ -11,13 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from atwood.errors import DeclarationError
 from atwood.expr import Expression
 from atwood.model.local import LocalPart
 from atwood.model.space import Space
 from atwood.topology.bodies import Bodies, reads_position
 from atwood.topology.charts import Chart, Orientation, coordinates_of
-from atwood.topology.graph import Joint, MechanismGraph
+from atwood.topology.graph import Joint, MechanismGraph, unit_of
 from atwood.topology.groups import connected_groups
 
 __all__ = ["Attachment", "Coordinate", "Forest", "OrientationStep", "grow_forest"]
@@ -284,7 +283,7 @@ class _Grower:
             if symbol in joint.turns and not in_space:
                 continue
             self.told.add(symbol)
-            numbers.append(self._coordinate(symbol.name, _unit_of(self.locals[joint.part], symbol.name)))
+            numbers.append(self._coordinate(symbol.name, unit_of(self.locals[joint.part], symbol.name)))
         chart, spin = self._chart(child) if in_space and oriented and not follows else ((), ())
         node, other = (joint.a, joint.b) if backwards else (joint.b, joint.a)
         coordinates, speeds = tuple(q for q, _ in numbers), tuple(u for _, u in numbers)
@@ -391,17 +390,8 @@ class _Grower:
                 if one.counts in self.told or one.counts not in wanted:
                     solved.add((path, one.law.name, one.index))
                 else:
-                    counted[one.counts] = self._coordinate(one.counts.name, _unit_of(local, one.counts.name))
+                    counted[one.counts] = self._coordinate(one.counts.name, unit_of(local, one.counts.name))
         return counted
 
     def _order_of_angles(self) -> list[int]:
         return [one.body for one in self.attachments]
-
-
-def _unit_of(local: LocalPart, path: str) -> str:
-    """Return the unit of a joint coordinate: it is an observable of its part."""
-    name = path.rpartition(".")[2]
-    for law in local.part.component.laws("observable"):
-        if law.name == name:
-            return str(law.options.unit)
-    raise DeclarationError(f"the joint coordinate {name!r} is not an observable of the part", where=local.part.path)

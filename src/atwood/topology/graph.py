@@ -18,7 +18,7 @@ from atwood.topology.groups import connected_groups
 if TYPE_CHECKING:
     import networkx as nx
 
-__all__ = ["WORLD", "Joint", "MechanismGraph", "Node", "build_graph"]
+__all__ = ["WORLD", "Joint", "MechanismGraph", "Node", "build_graph", "unit_of"]
 
 WORLD = 0
 """Index of the node that is the world itself."""
@@ -226,3 +226,12 @@ def _joint(path: str, local: LocalPart, joint: LocalJoint, node_of: Mapping[tupl
     angles = [angle for angle in found if isinstance(angle, Expression)]
     turns = tuple(q for q in joint.coordinates if any(depends_on(angle, [q]) for angle in angles))
     return Joint(path, ends[0], ends[1], joint, moves, turns)
+
+
+def unit_of(local: LocalPart, path: str) -> str:
+    """Return the unit of a joint coordinate, by its path: it is an observable of its part."""
+    name = path.rpartition(".")[2]
+    for law in local.part.component.laws("observable"):
+        if law.name == name:
+            return str(law.options.unit)
+    raise DeclarationError(f"the joint coordinate {name!r} is not an observable of the part", where=local.part.path)
