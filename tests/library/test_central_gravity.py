@@ -196,3 +196,21 @@ VALUES = [
 @pytest.mark.parametrize(("e", "t", "values"), VALUES)
 def test_the_exact_orbit_meets_the_reference_values(e: float, t: float, values: tuple[float, ...]) -> None:
     assert np.allclose(kepler(e, np.array([t]))[0], values, rtol=1e-11, atol=1e-11)
+
+
+def test_a_satellite_is_small_beside_its_orbit() -> None:
+    """In metres and kilogrammes: its moments are nothing beside those of the orbit, and yet it turns."""
+    mu, radius = 3.986004418e14, 6.878e6
+    scene = Scene(space="plane", gravity=0.0)
+    earth = scene.add("earth", lib.Ground())
+    craft = scene.add("craft", lib.RigidBody(mass=4.0, moments=(0.01, 0.03, 0.035)))
+    pull = scene.add("pull", lib.CentralGravity(mass=4.0, attracts="body", moments=(0.01, 0.03, 0.035)))
+    scene.connect(earth.frame, pull.source)
+    scene.connect(pull.frame, craft.frame)
+    rate = math.sqrt(mu / radius**3)
+    scene.start.update({"craft.position.x": radius, "craft.velocity.z": rate * radius})
+    scene.start.update({"craft.angle": 0.01, "craft.angular_speed": rate})
+    result = simulate(scene, t_end=2.0 * math.pi / rate, rtol=1e-11, outputs=41)
+    pitch = result["craft.angle"] - np.unwrap(np.arctan2(result["craft.position.z"], result["craft.position.x"]))
+    wanted = 0.01 * np.cos(rate * math.sqrt(3.0 * (0.035 - 0.01) / 0.03) * result.time)
+    assert np.allclose(pitch, wanted, atol=2e-6)

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import atwood_library as lib
-from atwood import AtwoodError, DeclarationError, ParameterError, Result, Scene, simulate
+from atwood import AtwoodError, DeclarationError, ParameterError, Result, Scene, UnsupportedError, assemble, simulate
 
 from ..helpers.runs import FORMS
 
@@ -270,3 +270,21 @@ def test_an_axis_out_of_the_plane_is_refused() -> None:
     scene = on_a_hinge("plane", (0.0, -1.0, 0.0), ("spring", lib.TorsionSpring(axis=(1.0, 0.0, 0.0))))
     with pytest.raises(AtwoodError, match=r"spring\.axis.*normal"):
         simulate(scene)
+
+
+@pytest.mark.parametrize(
+    ("space", "part", "said"),
+    [
+        ("plane", lib.Cylindrical, "exists in space only, and the scene is in a plane.*space='space'"),
+        ("plane", lib.OrientationSensor, "exists in space only"),
+        ("line", lib.Torque, "exists in a plane and in space only, and the scene is on a line"),
+        ("line", lib.TorsionSpring, "exists in a plane and in space only"),
+        ("line", lib.AngleSensor, "exists in a plane and in space only"),
+    ],
+)
+def test_a_part_in_the_wrong_space_is_refused(space: str, part: Any, said: str) -> None:
+    scene = Scene(space=space)
+    ground, added = scene.add("ground", lib.Ground()), scene.add("odd", part())
+    scene.connect(ground.frame, added.frame if part is lib.Torque else added.a)
+    with pytest.raises(UnsupportedError, match=f"odd: {part.__name__} {said}"):
+        assemble(scene)

@@ -15,6 +15,8 @@ class Torque(Component):
     `other`: a motor between two frames.
     """
 
+    spaces = ("plane", "space")
+
     axis: tuple[float, float, float] = parameter(
         (0.0, -1.0, 0.0),
         turning=True,

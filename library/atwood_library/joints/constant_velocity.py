@@ -14,6 +14,8 @@ class ConstantVelocity(LoadedBall):
     motors against the bend, and a cone as a stop. A part of space.
     """
 
+    spaces = ("space",)
+
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")
 

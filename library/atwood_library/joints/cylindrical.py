@@ -29,6 +29,8 @@ class Cylindrical(LoadedSlide, LoadedTwist):
     Along the axis and about it, it can carry springs, dampers, an actuator, a motor and stops.
     """
 
+    spaces = ("space",)
+
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis, in both frames.")
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")

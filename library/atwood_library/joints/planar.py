@@ -29,6 +29,8 @@ class Planar(LoadedPlate, LoadedTwist):
     spring to the origin, dampers, actuators, a rim, and whatever acts on the angle.
     """
 
+    spaces = ("space",)
+
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Normal, in both frames.")
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")

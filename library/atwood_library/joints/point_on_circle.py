@@ -34,6 +34,8 @@ class PointOnCircle(LoadedHinge):
     It can carry a spring, a damper, a motor and stops of the angle.
     """
 
+    spaces = ("space",)
+
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis of the circle, in frame a.")
     radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius of the circle.")
     a: Frame = connector(Frame, "The frame that carries the circle; its origin is the centre.")

@@ -27,6 +27,8 @@ class PointOnLine(LoadedSlide):
     It can carry a spring, a damper, an actuator and stops.
     """
 
+    spaces = ("space",)
+
     axis: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction, in frame a.")
     a: Frame = connector(Frame, "The frame that carries the line; its origin is on it.")
     b: Point = connector(Point, "The point.")

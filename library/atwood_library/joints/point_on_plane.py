@@ -27,6 +27,8 @@ class PointOnPlane(LoadedPlate):
     spring to the origin, a damper, actuators and a rim.
     """
 
+    spaces = ("space",)
+
     axis: tuple[float, float, float] = parameter(
         (0.0, 0.0, 1.0), direction=True, doc="Normal of the plane, in frame a."
     )

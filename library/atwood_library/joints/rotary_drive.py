@@ -30,6 +30,8 @@ class RotaryDrive(Component):
     Its `force` and, in a plane, `torque` are what it exerts on frame b; in space `motor_torque` is about the axis.
     """
 
+    spaces = ("plane", "space")
+
     axis: tuple[float, float, float] = parameter(
         (0.0, -1.0, 0.0),
         turning=True,

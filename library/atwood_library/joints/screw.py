@@ -32,6 +32,8 @@ class Screw(LoadedHinge):
     It can carry a spring, a damper, a motor and stops of the angle.
     """
 
+    spaces = ("space",)
+
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis, in both frames.")
     pitch: float = parameter(0.01, unit="m", doc="Displacement for one turn; negative for a left-handed thread.")
     a: Frame = connector(Frame, "The frame that carries the joint.")

@@ -33,6 +33,8 @@ class Universal(LoadedCross):
     space.
     """
 
+    spaces = ("space",)
+
     axis_a: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="First axis, in frame a.")
     axis_b: tuple[float, float, float] = parameter((0.0, 1.0, 0.0), direction=True, doc="Second axis, in frame b.")
     a: Frame = connector(Frame, "The frame that carries the joint.")

@@ -13,6 +13,8 @@ class AngleSensor(Component):
     between them.
     """
 
+    spaces = ("plane", "space")
+
     axis: tuple[float, float, float] = parameter(
         (0.0, -1.0, 0.0),
         turning=True,

@@ -22,6 +22,8 @@ class OrientationSensor(Component):
     axis comes again, within a quarter turn either way where it does not; the others count turns. A part of space.
     """
 
+    spaces = ("space",)
+
     convention: str = parameter("zyz", choices=CONVENTIONS, doc="Axes of the three turns, in order.")
     a: Frame = connector(Frame, "The frame that the orientation is measured from.")
     b: Frame = connector(Frame, "The frame whose orientation is measured.")

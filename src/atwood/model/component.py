@@ -44,6 +44,9 @@ class Component:
     mode_parameter: ClassVar[str] = ""
     """Name of the choice parameter that says the mode at the start; the usual one if empty."""
 
+    spaces: ClassVar[tuple[str, ...]] = ("line", "plane", "space")
+    """Where it means something; in a scene that lives elsewhere it is refused."""
+
     _parameters: ClassVar[dict[str, ParameterSpec]] = {}
     _signals: ClassVar[dict[str, SignalSpec]] = {}
     _connectors: ClassVar[dict[str, ConnectorSpec]] = {}

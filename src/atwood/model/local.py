@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from atwood.errors import AtwoodError, DeclarationError, ParameterError
+from atwood.errors import AtwoodError, DeclarationError, ParameterError, UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, depends_on
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, JointCoordinate, Motion
@@ -75,6 +75,8 @@ def localize(
     AtwoodError
         If a law cannot be evaluated; it names the part and the law.
     """
+    for path, part in flat.parts.items():
+        _check_space(path, part, space.name)
     held = find_held(flat)
     found: dict[str, LocalPart] = {}
     for path in sorted(flat.parts, key=lambda path: path in held):  # joints before what takes hold of them
@@ -82,6 +84,21 @@ def localize(
         counted = {one.coordinate for several in held.values() for one in several if one.joint == path}
         found[path] = _localize_part(flat.parts[path], flat, space, time, table, modes, sides, taken, counted)
     return {path: found[path] for path in flat.parts}
+
+
+def _check_space(path: str, part: Part, space: str) -> None:
+    """Refuse a part that means nothing in a scene's space."""
+    known = type(part.component).spaces
+    if space not in known:
+        kind, places = type(part.component).__name__, " and ".join(_PLACES[one] for one in known)
+        raise UnsupportedError(
+            f"{kind} exists {places} only, and the scene is {_PLACES[space]}",
+            where=path,
+            advice=f"Give the scene space='{known[-1]}', or take the part out.",
+        )
+
+
+_PLACES = {"line": "on a line", "plane": "in a plane", "space": "in space"}
 
 
 def _localize_part(

@@ -35,6 +35,7 @@ def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatA
     n = mass.shape[0]
     if n == 0:
         return
+    sizes = _sizes_of_inertia(mass, sizes)
     if not is_full(mass):
         from atwood.solve.sparse import without_inertia
 
@@ -55,6 +56,19 @@ def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatA
     if values[0] > 1e-14 * max(values[-1], 1e-300):
         return
     raise _without_inertia(assembly, np.abs(vectors[:, 0] @ free))
+
+
+def _sizes_of_inertia(mass: Matrix, sizes: FloatArray) -> FloatArray:
+    """Return displacements that move as much inertia along each speed: a satellite is small beside its orbit.
+
+    What has none along a speed keeps its size beside the others.
+    """
+    own = np.asarray(mass.diagonal(), dtype=float)
+    has = own > 0.0
+    if not np.any(has):
+        return sizes
+    even = np.where(has, 1.0 / np.sqrt(np.where(has, own, 1.0)), 0.0)
+    return np.where(has, even, sizes * np.median(even[has] / sizes[has]))
 
 
 def _without_inertia(assembly: Assembly, moving: FloatArray) -> StartError:
