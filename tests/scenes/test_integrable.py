@@ -6,7 +6,20 @@ import numpy as np
 import pytest
 
 import atwood_library as lib
-from atwood import Component, Frame, Point, Scalar, Scene, connector, constraint, parameter, report, simulate, sweep
+from atwood import (
+    Component,
+    Frame,
+    Point,
+    Scalar,
+    Scene,
+    connector,
+    constraint,
+    parameter,
+    report,
+    select,
+    simulate,
+    sweep,
+)
 from atwood.pipeline import assemble
 
 from ..helpers.runs import FORMS
@@ -255,3 +268,58 @@ def test_two_wheels_keep_a_cart_level_and_leave_one_freedom() -> None:
         assert np.max(np.abs(made["front.contact.friction"] + 0.01 / 0.2**2 * pull)) < 1e-8
         weight = made["front.contact.normal_force"] + made["back.contact.normal_force"]
         assert np.max(np.abs(weight - 6.0 * G * np.cos(0.2))) < 1e-8
+
+
+class Towed(Component):
+    """A point is towed along x at a given speed, by a share that may depend on where it is."""
+
+    point: Point = connector(Point, "The point.")
+    speed: float = parameter(0.7, unit="m/s", doc="Speed.")
+    beyond: float = parameter(1e3, unit="m", doc="From where on it is let go.")
+
+    @constraint(reaction="pull", unit="N", doc="Force on the point along x.")
+    def tow(self) -> Scalar:
+        """Return the velocity less the speed of towing."""
+        return self.point.velocity.x - self.speed
+
+
+class LetGo(Towed):
+    """The same, but slower where it has come far; near the start nothing shows it."""
+
+    @constraint(reaction="pull", unit="N", doc="Force on the point along x.")
+    def tow(self) -> Scalar:
+        """Return the velocity less the speed of towing there."""
+        past = self.point.position.x - self.beyond
+        return self.point.velocity.x - self.speed * select(past < 0.0, 1.0, 1.0 - past)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_what_is_towed_is_a_function_of_time(form: str) -> None:
+    made = simulate(held_point(Towed(), "plane"), form=form, rtol=1e-10)
+    assert np.max(np.abs(made["mass.position.x"] - 1.0 - 0.7 * made.time)) < 1e-10
+    assert len(made.assembly.reduced.coordinates) == 1
+    assert np.max(np.abs(made["held.pull"])) < 1e-9
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_what_switches_is_not_integrated_from_a_few_places(form: str) -> None:
+    scene = held_point(LetGo(beyond=1.1), "plane")
+    far = held_point(LetGo(), "plane")
+    for one in (scene, far):
+        assert report(one).integrated == ()
+    made = simulate(scene, form=form, rtol=1e-9, t_end=0.5)
+    past = 0.7 * made.time - 0.1
+    ahead = np.where(past < 0.0, 0.1 + past, 1.1 - np.exp(-past))
+    assert np.max(np.abs(made["mass.position.x"] - 1.0 - ahead)) < 1e-7
+
+
+def test_a_small_constraint_is_not_taken_for_rounding() -> None:
+    """Units of what somebody writes are nobody's business: a millionth of a millionth of a velocity holds as well."""
+
+    class Faint(Towed):
+        @constraint(reaction="pull", unit="N", doc="Multiplier.")
+        def tow(self) -> Scalar:
+            return 1e-13 * (self.point.velocity.x - self.speed)
+
+    made = simulate(held_point(Faint(), "plane"), rtol=1e-10)
+    assert np.max(np.abs(made["mass.position.x"] - 1.0 - 0.7 * made.time)) < 1e-10

@@ -10,12 +10,12 @@ constraint stays as it is.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from atwood.expr import Expression, depends_on, evaluate, jacobian, jvp, substitute
+from atwood.expr import Expression, depends_on, evaluate, jacobian, jvp, substitute, vjp
 from atwood.mechanics.constraints import Values
 from atwood.mechanics.elimination import SOLVED, eliminate_linear
 from atwood.mechanics.equations import Integral, put_in_place
@@ -23,7 +23,16 @@ from atwood.mechanics.forces import Site, local_map
 from atwood.mechanics.inertia import Masses
 from atwood.mechanics.mechanism import Mechanism, decide
 from atwood.mechanics.motion import Motion, Movement
-from atwood.mechanics.pfaffian import NEEDED, Form, Places, constant_pivot, is_idle, linear_integrals, pfaffian_forms
+from atwood.mechanics.pfaffian import (
+    NEEDED,
+    Form,
+    Places,
+    constant_pivot,
+    is_idle,
+    linear_integrals,
+    pfaffian_forms,
+    switches,
+)
 from atwood.model.local import LocalConstraint
 from atwood.topology.forest import Forest
 
@@ -86,10 +95,12 @@ def take_up(
         forms = _forms(mechanism, site, state, left)
         moving = [form for form in forms if not is_idle(mechanism, places, form)]
         left = [(form.path, form.constraint) for form in moving]
-        new = linear_integrals(mechanism, places, moving, together=True)
+        even = not any(form.switches for form in moving)
+        new = linear_integrals(mechanism, places, moving, together=even)
         if not new:
             held = any(value is not SOLVED and _holds(value, found, state) for _, _, value in values)
-            speeds = {} if held or mechanism.space.name != "space" else _solved_speeds(mechanism, places, moving)
+            in_turn = even and not held and mechanism.space.name == "space"
+            speeds = _solved_speeds(mechanism, places, moving) if in_turn else {}
             return Taken(found, speeds, tuple(integrals), () if speeds else tuple(left))
         made = [
             _integral(mechanism, state, moving, members, c, len(integrals) + i) for i, (members, c) in enumerate(new)
@@ -128,7 +139,11 @@ def _held_still(
             continue
         value = substitute([given], solution)[0] if solution else given
         state = motion.finish(solution)
-        alone = decide(mechanism, partial(_depends_on_one, Places(state, mechanism.time), value))
+        alone = (
+            None
+            if switches([value])
+            else decide(mechanism, partial(_depends_on_one, Places(state, mechanism.time), value))
+        )
         if alone is None:
             continue
         symbol = state.coordinates[alone]
@@ -166,11 +181,17 @@ def _holds(value: Expression, solution: Mapping[Expression, Expression], state: 
 
 
 def _forms(mechanism: Mechanism, site: Site, state: Movement, rolling: OnVelocities) -> list[Form]:
-    rates = []
+    forms = []
     for path, one in rolling:
-        mapping = local_map(site, mechanism.locals_[path], state.kinematics)
-        rates.append((path, one, put_in_place(one.value, mapping)))
-    return pfaffian_forms(state, rates)
+        local = mechanism.locals_[path]
+        mapping = local_map(site, local, state.kinematics)
+        (form,) = pfaffian_forms(state, [(path, one, put_in_place(one.value, mapping))])
+        velocities = [s for connector in local.connectors.values() for s in (*connector.velocity, *connector.spin)]
+        slopes = substitute(vjp([one.value], [one.value.graph.constant(1.0)], velocities), mapping)
+        moved = jacobian([mapping.get(s, s) for s in velocities], list(state.speeds))
+        terms = tuple((c, slopes[r] * e) for r, c, e in zip(moved.rows, moved.columns, moved.entries, strict=True))
+        forms.append(replace(form, terms=terms))
+    return forms
 
 
 def _integral(
