@@ -7,13 +7,28 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from atwood import Scene
+from atwood import Component, Scene
 from atwood.errors import StartError
 from atwood.pipeline import assemble, simulate
+from atwood.solve.facing import wrongly_turned
 from atwood.solve.gaps import find_gaps
 from atwood.solve.placement import find_placement
 from atwood.solve.start import find_start
-from atwood_library import Ground, Link, Pivot, PointMass, RigidBody, Rod, Slider, Spherical, Weld
+from atwood_library import (
+    Cylindrical,
+    Ground,
+    Link,
+    Pivot,
+    Planar,
+    PointMass,
+    RigidBody,
+    Rod,
+    Screw,
+    Slider,
+    Spherical,
+    Universal,
+    Weld,
+)
 from atwood_library.scenes import Bricard, DoublePendulum, FourBar, SpatialSliderCrank, StewartPlatform
 
 FORMS = ("reduced", "dae")
@@ -125,6 +140,33 @@ def test_a_loop_that_closes_only_far_from_the_guess_says_where() -> None:
     assembly = assemble(scene)
     found = find_placement(assembly, find_start(assembly))
     assert all(abs(one.off) < 1e-3 for one in found.guesses)  # the advice is good
+
+
+@pytest.mark.parametrize("kind", [Pivot, Slider, Cylindrical, Universal, Screw, Planar])
+@pytest.mark.parametrize("is_turned", [False, True])
+def test_which_way_round_is_known_of_every_joint(kind: type[Component], is_turned: bool) -> None:
+    """A second joint like the first, beside it: right at every place; its base turned over, wrong at every place."""
+    scene = Scene(space="space")
+    ground, body = scene.add("ground", Ground()), scene.add("body", RigidBody(moments=(1.0, 1.0, 1.0)))
+    first, second = scene.add("first", kind()), scene.add("second", kind())
+    names = ("axis", "normal", "axis_a")
+    axis = next(first.parameter_specs()[name].default for name in names if name in first.parameter_specs())
+    square = (axis[1], axis[2], axis[0])
+    over = scene.add("over", Weld(angle=math.pi if is_turned else 0.0, axis=square))
+    scene.connect(ground.frame, first.a)
+    scene.connect(first.b, body.frame)
+    scene.connect(ground.frame, over.a)
+    scene.connect(over.b, second.a)
+    scene.connect(second.b, body.frame)
+    assembly = assemble(scene)
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        q = random.uniform(-3.0, 3.0, len(assembly.reduced.coordinates))
+        wrong = wrongly_turned(assembly, assembly.reduced, 0.0, q)
+        if not is_turned:
+            assert wrong == []
+        elif kind is not Universal:  # its cross fits either way round
+            assert wrong == ["second"]
 
 
 def test_gaps_of_joints_are_distances_and_angles() -> None:
