@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 import atwood_library as lib
 from atwood import Scene, simulate
@@ -129,3 +130,33 @@ def test_it_stops_before_half_a_turn() -> None:
     result = simulate(scene, t_end=5.0, outputs=11)
     assert [one.law for one in result.happenings] == ["comes_to_half_a_turn"]
     assert result["mount.rotation.x"][-1] == pytest.approx(0.999 * math.pi, rel=1e-6)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("space", ["plane", "space"])
+def test_a_shaft_of_two_stiffnesses_is_unstable_between_its_frequencies(space: str, form: str) -> None:
+    """In the frame that turns with the mount a mass feels centrifugal and Coriolis forces (Goldstein, section 4.10)."""
+    mass, k, turning = 1.5, (6.0, 6.0, 20.0), 2.6
+    scene = Scene(space=space, gravity=0.0)
+    ground, bob = scene.add("ground", lib.Ground()), scene.add("bob", lib.PointMass(mass=mass))
+    shaft = scene.add("shaft", lib.RotaryDrive(axis=(0.0, -1.0, 0.0), rotation=lambda t: turning * t))
+    mount = scene.add("mount", lib.Bushing(stiffness=k, turning_stiffness=(0.0, 0.0, 0.0)))
+    scene.connect(ground.frame, shaft.a)
+    scene.connect(shaft.b, mount.a)
+    scene.connect(mount.b, bob.point)
+    # Counter-clockwise is about -y: at rest on the turning shaft at x = 0.1, it moves along z.
+    scene.start.update({"bob.position.x": 0.1, "bob.velocity.z": turning * 0.1})
+    result = simulate(scene, form=form, t_end=4.0, rtol=1e-10, outputs=9)
+    motion = np.array(
+        [
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+            [turning**2 - k[0] / mass, 0.0, 0.0, 2.0 * turning],
+            [0.0, turning**2 - k[2] / mass, -2.0 * turning, 0.0],
+        ]
+    )
+    assert max(np.linalg.eigvals(motion).real) > 0.5
+    exact = np.array([scipy.linalg.expm(motion * t) @ [0.1, 0.0, 0.0, 0.0] for t in result.time])
+    found = np.stack([result["mount.displacement.x"], result["mount.displacement.z"]], axis=1)
+    assert np.allclose(found, exact[:, :2], atol=1e-7)
+    assert result.energy.max_drift < 1e-6

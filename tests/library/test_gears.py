@@ -368,3 +368,31 @@ def with_a_second_gear(ratio: float) -> Scene:
     scene.connect(second.a, scene.hinge_one.shaft)
     scene.connect(second.b, scene.hinge_two.shaft)
     return scene
+
+
+def test_every_solver_takes_a_gear_and_other_ratios_compile_nothing() -> None:
+    assembly = assemble(wheels("space", SPACE, motor=1.5))
+    for solver in ("ida", "explicit", "taylor"):
+        result = simulate(assembly, solver=solver, t_end=1.0, outputs=2, rtol=1e-9)
+        assert result["hinge_two.angle"][-1] == pytest.approx(-0.75 / (2.0 + 0.5 / 0.09) / 0.3, rel=1e-7)
+    for ratio in (-0.5, 0.2, 3.0):
+        result = simulate(assembly.with_values({"gear.ratio": ratio}), t_end=1.0, outputs=2, rtol=1e-9)
+        assert result["hinge_one.angle"][-1] == pytest.approx(0.75 / (2.0 + 0.5 / ratio**2), rel=1e-7)
+
+
+def test_a_gear_through_a_change_of_mode() -> None:
+    """A rope on a wheel's rim goes slack and comes taut with a jerk; turns pass from mode to mode."""
+    runs = []
+    for form in FORMS:
+        scene = wheels("space", PLANE, stiffness=0.5)
+        rim, far = scene.add("rim", lib.Weld(displacement=(0.3, 0.0, 0.0))), scene.add("far", lib.Ground())
+        far.position = (0.3, 0.0, -0.5)
+        rope = scene.add("rope", lib.Rope(length=0.7, starts="slack", when_slack="slack"))
+        scene.connect(scene.one.frame, rim.a)
+        scene.connect(rim.b, rope.a)
+        scene.connect(far.frame, rope.b)
+        scene.start.update({"hinge_one.angle": 0.0, "hinge_one.angular_velocity": 3.0})
+        runs.append(simulate(scene, form=form, t_end=3.0, rtol=1e-10, outputs=7))
+    assert [one.law for one in runs[0].happenings][:2] == ["comes_taut", "goes_slack"]
+    for path in ("hinge_one.angle", "hinge_two.angle"):
+        assert np.allclose(runs[0][path], runs[1][path], atol=1e-5)
