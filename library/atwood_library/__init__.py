@@ -41,6 +41,7 @@ from atwood_library.parts.mass_1d import Mass1D
 from atwood_library.parts.mesh_body import MeshBody
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.parts.rigid_body import RigidBody
+from atwood_library.parts.rim import Rim
 from atwood_library.parts.rod import Rod
 from atwood_library.parts.sphere import Sphere
 from atwood_library.parts.tube import Tube
@@ -95,6 +96,7 @@ __all__ = [
     "Ramp",
     "RelativePositionSensor",
     "RigidBody",
+    "Rim",
     "Rod",
     "RollingDisc",
     "RollingSphere",

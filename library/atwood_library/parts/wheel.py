@@ -5,7 +5,7 @@ from __future__ import annotations
 from atwood import Frame, Model, connect, connector, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.rolling_disc import RollingDisc
-from atwood_library.parts.rigid_body import RigidBody
+from atwood_library.parts.rim import Rim
 
 
 class Wheel(Model):
@@ -18,8 +18,12 @@ class Wheel(Model):
 
     radius: float = parameter(0.3, unit="m", above=0.0, doc="Radius.")
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
-    axial: float = parameter(0.0, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the axle.")
-    transverse: float = parameter(0.0, unit="kg*m^2", minimum=0.0, doc="Moment of inertia across the axle.")
+    axial: float | None = parameter(
+        None, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the axle; of a uniform disc if not given."
+    )
+    transverse: float | None = parameter(
+        None, unit="kg*m^2", minimum=0.0, doc="Moment of inertia across the axle; half of that about it if not given."
+    )
     axis: tuple[float, float, float] = parameter(
         (0.0, 1.0, 0.0), turning=True, doc="Direction of the axle in its frame; the wheel turns right-handed about it."
     )
@@ -29,7 +33,7 @@ class Wheel(Model):
     axle: Frame = connector(Frame, "The frame that carries the wheel, at its centre.")
     ground: Frame = connector(Frame, "The frame that carries the plane; its origin is in it.")
     bearing: Pivot = Pivot(axis=axis)
-    rim: RigidBody = RigidBody(mass=mass)
+    rim: Rim = Rim(mass=mass, radius=radius, axis=axis)
     contact: RollingDisc = RollingDisc(radius=radius, axis=axis, normal=normal)
     connections = [
         connect(axle, bearing.a),
@@ -41,6 +45,8 @@ class Wheel(Model):
     def build(self) -> None:
         """Give the wheel its inertia, about whichever axis it has."""
         x, y, z = self.axis
-        across, more = self.transverse, self.axial - self.transverse
+        axial = 0.5 * self.mass * self.radius**2 if self.axial is None else self.axial
+        across = 0.5 * axial if self.transverse is None else self.transverse
+        more = axial - across
         self.rim.moments = (across + more * x * x, across + more * y * y, across + more * z * z)
         self.rim.products = (more * x * y, more * x * z, more * y * z)

@@ -11,12 +11,13 @@ from atwood_library.parts.ground import Ground
 
 
 class RollingDisc(Scene):
-    """A thin disc rolls on a level table without slipping (Routh, Advanced Rigid Dynamics, art. 244), in one motion.
+    """A coin, a hoop or Euler's disc rolls on a level table without slipping.
 
-    ``steady``: it leans at a constant angle and rolls along a circle about the origin. ``wobble``: it is set off like
-    that, but falling at first, so that it leans more and less in turn. ``coin``: the centre is at rest and the contact
-    runs round it, as with Euler's disc; this motion has a rate of precession of its own. ``straight``: it rolls upright
-    along a line, which wobbles and turns if it is slow.
+    Its motion (Routh, Advanced Rigid Dynamics, art. 244) begins in one of four ways. ``steady``: it leans at a constant
+    angle and rolls along a circle about the origin. ``wobble``: it is set off like that, but falling at first, so that
+    it leans more and less in turn. ``coin``: the centre is at rest and the contact runs round it, as with Euler's disc;
+    this motion has a rate of precession of its own. ``straight``: it rolls upright along a line, which wobbles and
+    turns if it is slow.
     """
 
     radius: float = parameter(0.1, unit="m", above=0.0, doc="Radius.")

@@ -114,7 +114,7 @@ def _what_became(report: MechanismReport) -> Iterator[tuple[str, str]]:
         yield "on surfaces", f"{shorten(report.on_surfaces)}: {text}"
     if report.solved_speeds:
         rates = (f"{name}'" for name in report.solved_speeds)
-        yield "rolling", f"{shorten(rates)} follow from the other speeds, and only these are states"
+        yield "rolling", f"{shorten(rates)}: given by the other speeds, so no states of their own"
     if report.eliminated:
         yield "eliminated", f"{shorten(report.eliminated)}: a linear constraint gives it from the other coordinates"
 

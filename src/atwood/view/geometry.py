@@ -281,7 +281,9 @@ def _between(
         if all(not isinstance(c, Expression) and c == 0.0 for c in shifts):
             return [Shape(path, "pivot", (ends[1],))]
         is_rod = any(joint.placement.axes == "world" and joint.placement.rotation is None for joint in joints)
-        return [Shape(path, "rod" if is_rod else "rail", ends)]
+        radius = local.part.values.get("radius", 0.0)  # of what rolls on a line, and not through it
+        rolls = float(radius) if isinstance(radius, (int, float)) else 0.0
+        return [Shape(path, "rod", ends) if is_rod else Shape(path, "rail", ends, rolls)]
     return []
 
 

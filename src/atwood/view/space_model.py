@@ -254,16 +254,32 @@ def _add_plane(bench: Bench, joining: Joining) -> None:
     node, unit = joining.nodes[0], bench.unit
     reading = bench.reading
     pose = reading.poses[reading.body_of[node]]
-    seen = np.einsum("tji,tj->ti", pose.axes, reading.place(joining.nodes[1]) - reading.place(node))
     frame = frame_along(joining.axes[0])
-    spread = seen @ frame[:, :2]
-    margin = 8.0 * unit + joining.reach[1]
-    low, high = spread.min(axis=0) - margin, spread.max(axis=0) + margin
+    shared = [one for one in reading.joinings if _is_same_plane(reading, joining, one, unit)]
+    if shared[0] is not joining:
+        return  # it is drawn with the first one
+    lows, highs = [], []
+    for one in shared:
+        spread = np.einsum("tji,tj->ti", pose.axes, reading.place(one.nodes[1]) - reading.place(node)) @ frame[:, :2]
+        margin = 8.0 * unit + one.reach[1]
+        lows.append(spread.min(axis=0) - margin)
+        highs.append(spread.max(axis=0) + margin)
+    low, high = np.min(lows, axis=0), np.max(highs, axis=0)
     middle = reading.offsets[node] + frame[:, :2] @ (0.5 * (low + high)) - 0.3 * unit * frame[:, 2]
     sides = (float(high[0] - low[0]), float(high[1] - low[1]), 0.5 * unit)
     bench.surface(
-        reading.body_of[node], box(sides, cells=24 if joining.reach[1] else 8).placed(middle, frame), "#eef1f4"
+        reading.body_of[node],
+        box(sides, cells=24 if any(one.reach[1] for one in shared) else 8).placed(middle, frame),
+        "#eef1f4",
     )
+
+
+def _is_same_plane(reading: Reading, joining: Joining, other: Joining, unit: float) -> bool:
+    """Return whether two joints hold something on one plane of one body."""
+    if other.kind != "plane" or reading.body_of[other.nodes[0]] != reading.body_of[joining.nodes[0]]:
+        return False
+    normal, apart = joining.axes[0], reading.offsets[other.nodes[0]] - reading.offsets[joining.nodes[0]]
+    return abs(float(normal @ other.axes[0])) > 1.0 - 1e-9 and abs(float(normal @ apart)) < 0.1 * unit
 
 
 def _add_curve(bench: Bench, joining: Joining) -> None:

@@ -110,6 +110,10 @@ class Pen:
         if np.ptp(along) < 1e-9 * self.picture.extent:
             return None
         reach = np.array([along.min(), along.max()]) + np.array([-6.0, 6.0]) * self.unit
+        if shape.size:  # it rolls on a line through the base
+            below = base.mean(axis=0) - middle
+            middle = middle + below - (below @ axes[0]) * axes[0]
+            reach += np.array([-1.0, 1.0]) * shape.size
         ends: FloatArray = middle + reach[:, None] * axes[0]
         return ends
 
