@@ -205,6 +205,7 @@ def simulate(
     max_step: float | None = None,
     solver: str = "auto",
     samples: int = 400,
+    structure: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> Result:
     """Simulate a scene from its start to its end.
@@ -233,6 +234,8 @@ def simulate(
     samples
         The run is sampled at least so often, whatever is shown of it: for the work that is put in, and for angles to
         count their turns. More are taken where functions of time change faster, unless this is 1.
+    structure
+        Whether nothing needs to move: a truss, whose forces are asked for. Otherwise what cannot move is refused.
     progress
         Called with the time reached, s.
 
@@ -245,6 +248,8 @@ def simulate(
     ------
     StartError
         If the start is not consistent.
+    TopologyError
+        If joints and ties let nothing move, and no structure is meant.
     UsageError
         If the end is not after the start.
     SolveError
@@ -264,6 +269,7 @@ def simulate(
         max_step=max_step,
         solver=solver,
         samples=samples,
+        structure=structure,
     )
 
     start = find_start(assembly)

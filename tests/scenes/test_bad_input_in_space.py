@@ -151,7 +151,12 @@ def crossed(start: Mapping[str, float] | None = None) -> Scene:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_joints_that_let_nothing_move_are_named(form: str) -> None:
-    result = simulate(crossed(), form=form, t_end=0.01, outputs=2)
+    spare = r"joint\.bearing: nothing can move.*4 of their constraints to spare"
+    with pytest.raises(TopologyError, match=spare) as caught:
+        simulate(crossed(), form=form, t_end=0.01, outputs=2)
+    assert caught.value.where == "joint.bearing"
+    assert "structure=True" in caught.value.advice
+    result = simulate(crossed(), form=form, t_end=0.01, outputs=2, structure=True)
     assert result.immobile is not None
     assert result.immobile.surplus == 4
     assert dict(result.immobile.freed) == {"joint.bearing": 1, "other.bearing": 1}
@@ -181,7 +186,7 @@ def tripod(rods: int, space: str = "space") -> Scene:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("rods", "space"), [(3, "space"), (4, "space"), (2, "plane")])
 def test_a_structure_carries_its_load_and_says_that_it_is_one(form: str, rods: int, space: str) -> None:
-    result = simulate(tripod(rods, space), form=form, t_end=0.01, outputs=2)
+    result = simulate(tripod(rods, space), form=form, t_end=0.01, outputs=2, structure=True)
     assert result.immobile is not None
     assert result.immobile.surplus == (1 if rods == 4 else 0)
     assert result.immobile.freed == (() if rods == 4 else tuple((f"rod{i}", 1) for i in range(rods)))
@@ -199,7 +204,9 @@ def test_what_moves_is_not_called_immobile() -> None:
 def test_a_bent_bricard_is_a_structure() -> None:
     scene = Bricard()
     scene.set("end3.displacement", (0.0, -1.0, 0.1))
-    result = simulate(scene, t_end=0.01, outputs=2)
+    with pytest.raises(TopologyError, match="nothing can move"):
+        simulate(scene, t_end=0.01, outputs=2)
+    result = simulate(scene, t_end=0.01, outputs=2, structure=True)
     assert result.immobile is not None
     assert len(result.immobile.freed) == 12
     assert np.ptp(result.array("hinge1.angle")) < 1e-9

@@ -40,6 +40,7 @@ class RunRequest:
     max_steps: int | None = None
     max_seconds: float | None = None
     max_step: float | None = None
+    structure: bool = False
     plot: Path | None = None
     draw: Path | None = None
     view: str | None = None
@@ -76,6 +77,7 @@ def run_scene(request: RunRequest) -> None:
                 max_steps=request.max_steps,
                 max_seconds=request.max_seconds,
                 max_step=request.max_step,
+                structure=request.structure,
                 solver=request.solver,
                 progress=progress,
             )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.errors import TopologyError
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Constraint
@@ -16,7 +17,7 @@ from atwood.solve.matrices import LARGEST_FULL, row_scales, scaled, to_array
 from atwood.solve.scales import motion_scales
 from atwood.solve.start import Start, maximal_state
 
-__all__ = ["Immobile", "find_immobile"]
+__all__ = ["Immobile", "find_immobile", "refuse_immobile"]
 
 FloatArray = NDArray[np.float64]
 
@@ -90,6 +91,30 @@ def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | 
             found.append((name, left))
     found.sort(key=lambda one: one[1])
     return Immobile(tuple(found), len(rows) - _rank(rows))
+
+
+def refuse_immobile(assembly: Assembly, freedom: int, start: Start) -> None:
+    """Raise if nothing can move, and nothing is driven or may let go later: this is seldom what was meant.
+
+    Parameters
+    ----------
+    assembly, freedom, start
+        See `find_immobile`.
+
+    Raises
+    ------
+    TopologyError
+        If it is so; it says what would have to let go.
+    """
+    found = find_immobile(assembly, freedom, start) if freedom <= 0 and not assembly.modes else None
+    if found is None:
+        return
+    raise TopologyError(
+        found.describe(),
+        where=found.freed[0][0] if found.freed else assembly.flat.name,
+        advice="Look at the axes and places of the joints; if it is meant as a structure, say structure=True "
+        "(on the command line: --structure).",
+    )
 
 
 def _name(assembly: Assembly, one: Constraint) -> str:

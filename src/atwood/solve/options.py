@@ -46,6 +46,8 @@ class RunOptions:
         often if functions of time change faster, unless this is 1.
     solver
         A key of `SOLVERS`, or ``"auto"``; see `atwood.solve.choice`.
+    structure
+        Whether it may be that nothing can move.
     """
 
     t_end: float
@@ -58,6 +60,7 @@ class RunOptions:
     max_step: float | None = None
     solver: str = "auto"
     samples: int = 400
+    structure: bool = False
 
 
 def sample_times(t: float, options: RunOptions, at_least: int = 0) -> tuple[FloatArray, NDArray[np.bool_]]:

@@ -13,6 +13,7 @@ from atwood.solve.breaks import find_breaks
 from atwood.solve.charts import CHART, Reassemble, Restated, enter_charts, to_regular
 from atwood.solve.choice import Choice, check_solver, choose, describe_choices
 from atwood.solve.driver import Statistics
+from atwood.solve.immobile import refuse_immobile
 from atwood.solve.inputs import samples_needed
 from atwood.solve.missing import missing_at
 from atwood.solve.modes import EventProbe, Happening, enter_mode
@@ -101,6 +102,8 @@ def run(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reass
     ------
     UsageError
         If the end is not after the start.
+    TopologyError
+        If nothing can move, and no structure is meant.
     SolveError
         If the solver fails; what came before is in its `run` attribute.
     """
@@ -179,6 +182,9 @@ class _Walk:
         t, q, u, options = self.t, self.q, self.u, self.options
         if self.plan is None:
             self.plan = self._plan()
+            if not self.segments and not options.structure:
+                freedom = len(self.plan.assembly.equations.speeds) - self.plan.finding.rank
+                refuse_immobile(self.assembly, freedom, self.start)
             self.probe = EventProbe(self.plan, t, q, u, options.relative_tolerance)
             self.choice = choose(self.plan, options, t, q, u)
         limit = float(np.min(self.breaks[self.breaks[:, 0] > t, 0], initial=options.t_end))
