@@ -399,3 +399,18 @@ def test_a_guide_in_a_loop_is_the_right_way_round() -> None:
     scene.connect(high.b, body.frame)
     with pytest.raises(StartError, match="the wrong way round"):
         find_start(assemble(scene))
+
+
+def test_what_nothing_holds_up_hangs() -> None:
+    scene = Scene(space="space")
+    below = scene.add("ground", Ground()).frame
+    for i in range(3):
+        rod, bob = scene.add(f"rod{i}", Rod(length=1.0)), scene.add(f"bob{i}", PointMass())
+        scene.connect(below, rod.a)
+        scene.connect(rod.b, bob.point)
+        scene.start[f"bob{i}.position.x"] = 0.5 * (i + 1)
+        below = bob.point
+    result = simulate(scene, t_end=0.01, outputs=2)
+    for i in range(3):
+        assert result[f"bob{i}.position.y"][0] == pytest.approx(0.0, abs=1e-12)
+        assert result[f"bob{i}.position.z"][0] == pytest.approx(-math.sqrt(0.75) * (i + 1), rel=1e-12)

@@ -137,19 +137,33 @@ def closest(
     return Nearest(q, missing * units, cost**0.5)
 
 
-def places_around(system: System, scales: FloatArray, t: float, q: FloatArray) -> Iterator[FloatArray]:
+def places_around(
+    system: System, scales: FloatArray, t: float, q: FloatArray, hangs: bool = False
+) -> Iterator[FloatArray]:
     """Yield a place and then others around it, the same ones each time, farther and farther away.
 
     Parameters
     ----------
     system, scales, t, q
         See `closest`.
+    hangs
+        Whether the first of the others has free points lower, each more than the one before.
     """
     assert system.turning is not None
     random = np.random.default_rng(20)
     yield q
+    if hangs:
+        yield system.turning.moved(t, q, _lowered(system, scales))
     for size in _SHIFTS if len(scales) <= LARGEST_FULL else ():
         yield system.turning.moved(t, q, size * scales * random.uniform(-1.0, 1.0, len(scales)))
+
+
+def _lowered(system: System, scales: FloatArray) -> FloatArray:
+    """Return the displacement that lowers free points, each by a little more than the one before."""
+    heights = [i for i, one in enumerate(system.speed_names) if one.endswith(".position.z'")]
+    down = np.zeros(len(scales))
+    down[heights] = -0.3 * (1.0 + np.arange(len(heights)) / max(len(heights), 1)) * scales[heights]
+    return down
 
 
 def closest_of_all(

@@ -98,9 +98,10 @@ def _elsewhere(failed: Failed, system: System) -> tuple[FloatArray, Matrix]:
     assembly, equations, t, scales = failed.assembly, failed.equations, failed.time, failed.scales
     assert system.turning is not None
     units = units_of_rows(assembly, equations, system, failed.length)
+    hangs = not failed.level.guessed  # where no place is preferred, what nothing holds up is down
     best: tuple[float, FloatArray, Matrix] | None = None
     wrong = wrongly_turned(assembly, equations, t, failed.nearest) if _is_met(failed.missing) else []
-    for place in places_around(system, scales, t, failed.rough):
+    for number, place in enumerate(places_around(system, scales, t, failed.rough, hangs)):
         try:
             near = closest(system, units, scales, t, place, iterations=40)
             if not near.size < 0.1:
@@ -117,7 +118,7 @@ def _elsewhere(failed: Failed, system: System) -> tuple[FloatArray, Matrix]:
         off = float(np.linalg.norm(system.turning.difference(t, failed.rough, q) / scales))
         if best is None or off < best[0]:
             best = off, q, matrix
-        if place is failed.rough:
+        if number == 0 or (hangs and number == 1):
             return q, matrix
     if best is None:
         raise wrong_way_round(failed, wrong[0]) if wrong else explain_positions(failed)

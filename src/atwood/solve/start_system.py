@@ -97,6 +97,7 @@ class System:
         self.kernel = assembly.kernel(made.program)
         self.rows, self.columns, self.shape = made.rows, made.columns, made.shape
         self.targets, self.constraints = targets, made.shape[0] - len(targets)
+        self.speed_names = tuple(one.name for one in equations.speed_names)
         self.speeds = len(equations.speeds)
 
     def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, Matrix]:
