@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 from atwood import Component, Frame, Point, Scalar, Scene, Vector, connector, event, observable, parameter, simulate
 from atwood.cli.app import main
+from atwood.errors import SolveError
 from atwood.result.about import describe_run
 from atwood.solve import sundials_library
 from atwood.solve.collocation import find_arc
@@ -92,6 +93,17 @@ def test_rows_of_other_lengths_and_in_space(form: str, windows: int, space: str,
 
 
 @needs_sundials
+@pytest.mark.parametrize("windows", [1, 2])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-6, 1e-8])
+def test_drift_that_is_projected_away_does_no_harm(windows: int, rtol: float) -> None:
+    # at index 1 the solver leaps into folded positions more readily
+    result = quiet(FourBarRow(windows=windows), form="dae", level="index1-projected", t_end=10.0, rtol=rtol)
+    angle = 0.5 * np.pi - result["foot[0].angle"]
+    assert np.max(np.abs(angle - ExactRow(windows).crank_angle(result.time))) < 3e3 * rtol**0.9
+    assert [one.ways for one in result.passages] == 10 * [windows]
+
+
+@needs_sundials
 def test_a_row_of_forty() -> None:
     result = quiet(FourBarRow(windows=40), t_end=0.9, rtol=1e-11, outputs=3)
     assert abs(0.5 * np.pi - result["foot[0].angle"][-1] - ExactRow(40).crank_angle(0.9)) < 1e-7
@@ -165,6 +177,61 @@ def test_both_forms_and_drivers_pass_alike() -> None:
     for result in runs:
         assert len(result.passages) == 1
         assert abs(result["crank0.angle"][-1] - runs[0]["crank0.angle"][-1]) < 1e-7
+
+
+# -- near it -----------------------------------------------------------------------------------------------------------
+
+
+def parallelogram_speed(start: float, turn: float) -> float:
+    """Return the rate with which `parallel_four_bar` comes from one angle to rest at another."""
+    return math.sqrt(2.0 * 1.3 * 9.81 * (math.sin(turn) - math.sin(start)) / 1.2)
+
+
+@needs_sundials
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("angle", [1e-2, 1e-3, 1e-5, -1e-4])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-10])
+def test_a_start_near_the_place(form: str, angle: float, rtol: float) -> None:
+    result = quiet(parallel_four_bar(2, angle=angle, rate=-2.0), form=form, rtol=rtol, t_end=0.2)
+    one, other = result["crank0.angle"], result["crank1.angle"]
+    assert np.max(np.abs(one - other)) < 1e-9
+    energy = 0.5 * 1.2 * result["crank0.angular_velocity"] ** 2 + 1.3 * 9.81 * np.sin(one)
+    assert np.max(np.abs(energy - energy[0])) < 1e3 * rtol
+
+
+@needs_sundials
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("short", "rtol"), [(0.1, 1e-5), (0.01, 1e-5), (1e-2, 1e-9), (1e-4, 1e-9)])
+def test_turning_back_short_of_the_place(form: str, short: float, rtol: float) -> None:
+    scene = parallel_four_bar(2, angle=-1.0, rate=parallelogram_speed(-1.0, -short))
+    result = quiet(scene, form=form, rtol=rtol, t_end=0.8)
+    assert not result.passages
+    assert result["crank0.angle"][-1] < -0.6
+    assert np.max(np.abs(result["crank0.angle"] - result["crank1.angle"])) < 1e-8
+    assert np.max(result["crank0.angle"]) < 0.0
+
+
+@needs_sundials
+@pytest.mark.parametrize("form", FORMS)
+def test_what_nearly_stops_at_the_place_is_not_told_as_if_it_were_known(form: str) -> None:
+    # With the errors of a loose run it could come to rest there, or fold either way.
+    scene = parallel_four_bar(2, angle=-1.0, rate=parallelogram_speed(-1.0, -1e-6))
+    with pytest.warns(UserWarning, match="do not rely on what comes after"):
+        result = simulate(scene, form=form, rtol=1e-4, t_end=0.8)
+    assert [one.ways for one in result.passages] == [0]
+    assert "coincidence" in result.passages[0].describe()
+    shown = [one["what"] for one in describe_run(result)["singular_positions"]]
+    assert "could not be told" in shown[0]
+
+
+@needs_sundials
+def test_a_solver_that_fails_there_says_where_it_is() -> None:
+    scene = parallel_four_bar(2, angle=-1.0, rate=parallelogram_speed(-1.0, 0.0))
+    with pytest.raises(SolveError, match="comes to a singular position") as caught:
+        simulate(scene, form="dae", rtol=1e-10, t_end=0.8)
+    assert caught.value.where.startswith(("low", "high"))
+    assert "coincidence" in str(caught.value)
+    assert caught.value.run.segments
 
 
 # -- what is recorded --------------------------------------------------------------------------------------------------

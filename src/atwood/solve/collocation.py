@@ -191,8 +191,8 @@ _SMALLEST = 1e-9
 
 _TRIES = 600
 
-_NOISE = 1e-13
-"""Rounding, which grows with how near a singular position is."""
+_NOISE, _LOUDEST = 1e-13, 2e-7
+"""Rounding, which grows with how near a singular position is, and where it hides which way a motion goes on."""
 
 
 def follow(
@@ -228,7 +228,10 @@ def follow(
     for _ in range(_TRIES):
         h = min(h, end - t)
         arc = find_arc(plan, t, q, u, t + h)
-        if arc is not None and arc.error < max(tolerance, _NOISE * far / here):
+        noise = _NOISE * far / here
+        if noise > _LOUDEST:
+            return None
+        if arc is not None and arc.error < max(tolerance, noise):
             times = np.append(t + 0.5 * h * (x + 1.0), arc.end)
             away = measure(times, arc.at(times)[0])
             if np.min(away) >= 0.5 * here:

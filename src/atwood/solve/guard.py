@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from atwood.errors import AtwoodError
+from atwood.errors import AtwoodError, SolveError
 from atwood.solve.collocation import Path, find_arc, follow
 from atwood.solve.driver import Advance, FloatArray, Status
 from atwood.solve.nearness import Nearness, crossing, find_loss, nearly_lost
@@ -37,6 +37,9 @@ _CLOSE = 0.05
 
 _QUITE_CLOSE = 0.02
 """The same where a motion is followed past a position that it does not pass through."""
+
+_FALLEN = 1e-2
+"""The same where the motion may be at a singular position already, and stay there."""
 
 _REACH = 0.2
 """An arc begins so far before the place, in what moves most, if it can."""
@@ -92,7 +95,12 @@ class Guard:
         Time spent.
     agreed
         Passages that the solver made by itself, and well; whoever takes them into a record empties the list.
+    trouble
+        Where the solver failed at a singular position that it could not be helped over: its time, and the number of
+        the constraint that nearly follows from the others there; None elsewhere.
     """
+
+    trouble: tuple[float, int] | None
 
     def __init__(self, plan: Plan, tolerance: float, advance: Advance) -> None:
         self.plan, self.tolerance = plan, tolerance
@@ -109,7 +117,8 @@ class Guard:
     def restart(self, advance: Advance) -> None:
         """Begin again from a state."""
         self._looks, self._away = [], []
-        self._judged = advance.t
+        self._judged = -np.inf
+        self.trouble = None
         self.note(advance)
 
     def note(self, advance: Advance) -> None:
@@ -142,7 +151,7 @@ class Guard:
             Whether the run is to end here.
         """
         ended = advance.status is not Status.REACHED
-        if not (between or at_end or ended):
+        if advance.status is Status.INTERRUPTED or not (between or at_end or ended):
             return None
         self.note(advance)
         if len(self._looks) - len(self._away) < _REVIEW and not (at_end or ended):
@@ -152,7 +161,7 @@ class Guard:
             self._measure()
             found = self._first_minimum(at_end or ended)
             if found is None and advance.status is Status.FAILED:
-                found = self._ahead()
+                found = self._ahead() or self._from_start(advance.t)
             self._forget()
             return found
         finally:
@@ -170,6 +179,31 @@ class Guard:
             if found is not None:
                 return found
         return None
+
+    def _from_start(self, near: float) -> Passage | None:
+        """Return the way on from a start that is near a singular position, or has one just ahead, at a time."""
+        first = self._looks[0]
+        stride = self._stride(Advance(first.t, first.y, first.yp, Status.REACHED))
+        begin = self._state(first)
+        if begin is None or not near < first.t + 0.1 * stride < np.inf:
+            return None
+        longest: Path | None = None
+        for share in (1.0, 0.3, 0.1):
+            arc = find_arc(self.plan, *begin, first.t + share * stride)
+            if arc is None or not arc.error < max(self.tolerance, 1e-7):
+                continue
+            times = np.linspace(arc.start, arc.end, _FINE)
+            self._measures.learn(times, arc.at(times)[0])
+            away = self._measures.at(times, arc.at(times)[0])
+            found = crossing(self._measures, arc)
+            if found is not None:
+                loss = find_loss(self._measures, arc, *found)
+                if loss is None:
+                    return None
+                return Passage(found[0], loss.rank, *self._said(loss.constraints), Path((arc,)), loss.gap)
+            if longest is None and away[0] < _QUITE_CLOSE * away[-1] and np.all(np.diff(away[1:]) > 0.0):
+                longest = Path((arc,))
+        return None if longest is None else Passage(longest.start, 0, (), (), longest)
 
     def _measure(self) -> None:
         new = self._looks[len(self._away) :]
@@ -195,15 +229,33 @@ class Guard:
             self._judged = t
             before = away[i - 1] if i else np.inf
             behind = away[i + 1] if i + 1 < len(away) else np.inf
-            if away[i] > before or away[i] > behind or away[i] > _LOW * self._largest:
+            is_least = away[i] <= min(before, behind, _LOW * self._largest)
+            if not is_least and not away[i] <= _FALLEN * self._largest < before < np.inf:
                 continue
-            near = self._closest(max(i - 1, 0), min(i + 1, len(away) - 1))
+            near = self._closest(max(i - 1, 0), min(i + 1, len(away) - 1)) if is_least else None
             found = None if near is None else self._pass(*near)
+            heading = self._heading(i) if found is None else None
+            if heading is not None:
+                found = self._pass(*heading)
             if found is None:
                 continue
             if not self._went_along(found):
                 return found
             self.agreed.append(found)
+        return None
+
+    def _heading(self, i: int) -> tuple[float, float] | None:
+        """Return when the motion before a look would have come to a singular position about then; None if not.
+
+        Where the solver has leapt into another way to move, what comes behind says nothing about the place.
+        """
+        away, times = self._away, [one.t for one in self._looks]
+        for last in (i, i - 1):
+            if last >= 1 and away[last] < away[last - 1]:
+                step = times[last] - times[last - 1]
+                t = times[last] + step * away[last] / (away[last - 1] - away[last])
+                if t <= times[min(i + 1, len(times) - 1)]:
+                    return t, away[i]
         return None
 
     def _went_along(self, passage: Passage) -> bool:
@@ -228,6 +280,8 @@ class Guard:
         for one, other in zip(self._looks[first:last], self._looks[first + 1 : last + 1], strict=True):
             h = other.t - one.t
             s = np.linspace(0.0, 1.0, _FINE)
+            if first == 0:  # perhaps it starts quite near
+                s = np.unique(np.concatenate([s, np.geomspace(1e-5, 0.05, _FINE)]))
             # the cubic through both states with their rates
             a, b = one.y[: self._n, None], other.y[: self._n, None]
             v, w = h * one.yp[: self._n, None], h * other.yp[: self._n, None]
@@ -252,6 +306,10 @@ class Guard:
             if found is not None:
                 return found
         begin = self._begin(near, 1.0)
+        if begin is None or begin[0] == self._looks[0].t:
+            found = self._from_start(near)
+            if found is not None:
+                return found
         if begin is None or away > _QUITE_CLOSE * self._largest:
             return None
         return self._past(near, begin, failed)
@@ -267,10 +325,25 @@ class Guard:
         if path is not None:
             times = np.concatenate([np.linspace(one.start, one.end, 5) for one in path.arcs])
             return Passage(float(times[np.argmin(measure.at(times, path.at(times)[0]))]), 0, (), (), path)
-        if failed:
-            return None
         q = min(self._looks, key=lambda one: abs(one.t - near)).y[: self._n]
-        return Passage(near, 0, *self._said((nearly_lost(measure, near, q),)), None)
+        lost = nearly_lost(measure, near, q)
+        if failed:
+            self.trouble = near, lost
+            return None
+        return Passage(near, 0, *self._said((lost,)), None)
+
+    def explain(self, message: str) -> SolveError | None:
+        """Return the error of a solver that failed at a singular position; None if it failed elsewhere."""
+        if self.trouble is None:
+            return None
+        t, lost = self.trouble
+        one = self.plan.assembly.equations.constraints[lost]
+        return SolveError(
+            f"near t = {t:.6g} the mechanism comes to a singular position, where {one.label} nearly follows from the "
+            f"other constraints, too slowly or too closely to tell which way it goes on: {message}",
+            where=one.key[0],
+            advice="Change lengths, start or speed a little, so that it clearly passes through or stays away.",
+        )
 
     def _said(self, constraints: tuple[int, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the labels of constraints, and the parts that they belong to."""
@@ -280,10 +353,12 @@ class Guard:
     def _begin(self, near: float, reach: float) -> tuple[float, FloatArray, FloatArray] | None:
         """Return a state from which an arc may start."""
         one = next((one for one in reversed(self._looks) if self._is_before(one, near, reach)), None)
-        if one is None:
-            one = self._looks[0] if self._looks[0].t < near else None
-        if one is None:
-            return None
+        if one is None and self._looks[0].t < near:
+            one = self._looks[0]
+        return None if one is None else self._state(one)
+
+    def _state(self, one: _Look) -> tuple[float, FloatArray, FloatArray] | None:
+        """Return a state that fulfils the constraints; None if there is none."""
         q, u = one.y[: self._n], one.y[self._n : self._n + self._m]
         try:
             return one.t, *project_safely(self.plan, one.t, q, u)

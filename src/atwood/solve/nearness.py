@@ -26,6 +26,9 @@ _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 _LOST = 1e-5
 """The measure at a singular position, relative to that a little away from it: what is left is that of rounding."""
 
+_SMALL = 40
+"""Up to so many constraints singular values cost little."""
+
 _HOLDS = 5e-10
 """Relative to the scene's sizes: what a place that constraints admit may miss them by.
 
@@ -84,7 +87,7 @@ class Nearness:
         """
         now = self._constraints(t, q)
         share = now.rows / self.rows
-        if now.normal is None:
+        if now.normal is None and len(now.kept) <= _SMALL:
             slopes = (now.slope * share[:, :, None])[:, now.kept]
             if not slopes.shape[1]:
                 return np.ones(len(t))  # what constraints there are follow from what is eliminated

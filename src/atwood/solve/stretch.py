@@ -215,13 +215,13 @@ class _Runner:
         return True
 
     def _explain(self, advance: Advance) -> SolveError | None:
-        """Return an error that names what has no value; None if everything has one."""
+        """Return an error that names what has no value, or a singular position; None where it is neither."""
         program, assembly, options = self.stretch.plan.program, self.stretch.plan.assembly, self.stretch.options
         now, rates = program.split(advance.y), program.split(advance.yp)
         states = states_ahead(advance.t, now, rates, options.t_end - self.stretch.choice.time)
         found = find_missing(assembly, *states)
         if found is None:
-            return None
+            return None if self.guard is None else self.guard.explain(advance.message)
         return SolveError(
             f"{found.describe()}, so that the run cannot go on: {advance.message}",
             where=found.part,
