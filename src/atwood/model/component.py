@@ -10,6 +10,7 @@ from atwood.errors import DeclarationError, ParameterError, UsageError, suggesti
 from atwood.expr import Scalar
 from atwood.model.binding import Binding
 from atwood.model.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
+from atwood.model.declaring import check_field_name, merge_inherited, with_checked_default
 from atwood.model.fields import MISSING, Deferred, Field, ParameterSpec, SignalSpec
 from atwood.model.laws import Kind, Law
 from atwood.model.outline import Outline
@@ -61,25 +62,25 @@ class Component:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        _merge_inherited(cls)
+        merge_inherited(cls)
         for name, value in list(vars(cls).items()):
             law = getattr(value, "_atwood_law", None)
             if isinstance(value, (Field, ConnectorSpec)) or isinstance(law, Law):
-                _check_field_name(cls, name, value)
+                check_field_name(cls, name, value)
             if isinstance(value, ParameterSpec):
-                cls._parameters[name] = _with_checked_default(value, cls)
+                cls._parameters[name] = with_checked_default(value, cls)
             elif isinstance(value, SignalSpec):
-                cls._signals[name] = _with_checked_default(value, cls)
+                cls._signals[name] = with_checked_default(value, cls)
             elif isinstance(value, ConnectorSpec):
                 cls._connectors[name] = value
             elif isinstance(law, Law):
                 cls._laws[name] = law
             elif name in cls._parameters:
-                changed = _with_checked_default(cls._parameters[name].with_default(value), cls)
+                changed = with_checked_default(cls._parameters[name].with_default(value), cls)
                 cls._parameters[name] = changed
                 setattr(cls, name, changed)
             elif name in cls._signals:
-                replaced = _with_checked_default(cls._signals[name].with_default(value), cls)
+                replaced = with_checked_default(cls._signals[name].with_default(value), cls)
                 cls._signals[name] = replaced
                 setattr(cls, name, replaced)
 
@@ -379,42 +380,3 @@ def bind(component: Component, binding: Binding) -> Any:
         object.__setattr__(twin, name, getattr(component, name))
     object.__setattr__(twin, "_bound", binding)
     return twin
-
-
-def _merge_inherited(cls: type[Component]) -> None:
-    """Collect what all bases declare, in the order in which Python looks names up."""
-    for table in ("_parameters", "_signals", "_connectors", "_laws"):
-        merged: dict[str, Any] = {}
-        for base in reversed(cls.__mro__[1:]):
-            merged.update(vars(base).get(table, {}))
-        setattr(cls, table, merged)
-
-
-def _with_checked_default(spec: Any, cls: type[Component]) -> Any:
-    if spec.default is not MISSING:
-        spec.default = spec.check(spec.default, f"{cls.__name__}.{spec.name}")
-    return spec
-
-
-def _check_field_name(cls: type[Component], name: str, value: Any) -> None:
-    if getattr(value, "name", name) != name:
-        raise DeclarationError(
-            f"{name!r} is a second name for {value.name!r}",
-            where=cls.__name__,
-            advice=f"Declare {name!r} on its own; its default can be {value.name!r}.",
-        )
-    check_reserved(cls, name)
-
-
-def check_reserved(cls: type[Component], name: str) -> None:
-    """Refuse a name that every component, or every model, uses for something else."""
-    for base in cls.__mro__[1:]:
-        if not base.__module__.startswith("atwood.model."):
-            continue
-        taken = vars(base).get(name)
-        if taken is not None and not isinstance(taken, (Field, ConnectorSpec)):
-            raise DeclarationError(
-                f"the name {name!r} has a meaning of its own in every {base.__name__}",
-                where=cls.__name__,
-                advice="Choose another name.",
-            )

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from atwood.errors import ConnectError, DeclarationError, UsageError, suggestion
-from atwood.model.component import Component, check_reserved
+from atwood.model.component import Component
 from atwood.model.connectors import Connector, ConnectorSpec, InputRef, OutputRef
+from atwood.model.declaring import check_reserved
 from atwood.model.units import Unit, parse_unit
 
 __all__ = [

@@ -69,9 +69,9 @@ class ParameterRows:
         self._followers = list(followers.items())
         mechanism = assembly.mechanism
         # Parts that check how their values go together are looked at run by run.
-        checks = any(
-            type(part.component).check_values is not Component.check_values for part in assembly.flat.parts.values()
-        )
+        varied = {slot.part for slot in followers} | {axis.path.rpartition(".")[0] for _, axis in axes}
+        kinds = {type(part.component) for path, part in assembly.flat.parts.items() if path in varied}
+        checks = any(kind.check_values is not Component.check_values for kind in kinds)
         closures = mechanism.bodies.closures
         self._is_simple = not mechanism.decisions and not closures and not checks and not self._builds()
 
