@@ -101,6 +101,18 @@ def test_changes_of_chart_are_counted(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", OTHERS)
+def test_uniform_turns_are_followed_although_their_coordinates_hardly_change(kind: str) -> None:
+    """They are straight lines in some coordinates, and pass poles exactly in others."""
+    for k, spin in enumerate(np.diag([2.0, 2.0, 2.0])):
+        for solver, rtol in (("explicit", 1e-8), ("taylor", 1e-10), ("ida", 1e-8)):
+            result = simulate(
+                FreeBody(spin=tuple(spin)), orientation=kind, t_end=30.0, solver=solver, rtol=rtol, outputs=31
+            )
+            error = angle_between(axes(result), about(np.eye(3)[k], 2.0 * result.time))
+            assert np.max(error) < (100.0 if solver != "ida" else 2000.0) * rtol
+
+
+@pytest.mark.parametrize("kind", OTHERS)
 def test_a_top_that_starts_upright_runs(kind: str) -> None:
     """Exactly upright it sleeps, and pushed a little when it spins too slowly it falls and comes up again."""
     asleep = simulate(LagrangeTop(inclination=0.0, spin=5.0), orientation=kind, t_end=1.0, rtol=1e-10, outputs=11)

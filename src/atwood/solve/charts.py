@@ -20,7 +20,16 @@ from atwood.mechanics.equations import Equations
 from atwood.mechanics.watches import Watch
 from atwood.topology.charts import Chart, Orientation
 
-__all__ = ["CHART", "Restated", "chart_watches", "enter_charts", "from_regular", "restated", "to_regular"]
+__all__ = [
+    "CHART",
+    "Restated",
+    "chart_watches",
+    "enter_charts",
+    "from_regular",
+    "longest_step",
+    "restated",
+    "to_regular",
+]
 
 FloatArray = NDArray[np.float64]
 Reassemble = Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float], Orientation], Assembly]
@@ -31,6 +40,9 @@ CHART = "chart"
 
 _NEARLY = 0.95
 """What is so near to where a chart is left leaves it with another that is there."""
+
+_FARTHEST_STEP = 2.0
+"""Angle that a body may turn in a step, rad: together with the margin of a chart it is less than a full turn."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +129,24 @@ def own_names(assembly: Assembly, names: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(one for name in names for one in stands.get(name, [name])))
 
 
+def longest_step(equations: Equations, u: FloatArray) -> float:
+    """Return the longest step that an explicit method may take in charts that can be left, s; perhaps infinite.
+
+    A uniform turn is no more than a straight line in some of them, and its steps would grow until rounding is
+    amplified; and a step that is longer than the margin of a chart could pass its singular place unseen.
+
+    Parameters
+    ----------
+    equations
+        The equations.
+    u
+        Speeds.
+    """
+    own = [list(chart.speeds) for chart in equations.charts if not chart.is_homogeneous]
+    fastest = max((float(np.linalg.norm(u[one])) for one in own), default=0.0)
+    return _FARTHEST_STEP / fastest if fastest > 0.0 else np.inf
+
+
 def _plain(equations: Equations) -> list[str]:
     """Return the names of coordinates that are not of orientations."""
     turned = {i for chart in equations.charts for i in chart.coordinates}
@@ -147,7 +177,7 @@ def restated(assembly: Assembly, q: FloatArray) -> tuple[FloatArray, tuple[str, 
         if chart.kind == "rodrigues" and size * size > _NEARLY * FARTHEST_RODRIGUES:
             q[own] /= -(size * size)
         elif chart.kind == "rotation-vector" and size > _NEARLY * FARTHEST_ROTATION:
-            q[own] *= 1.0 - 2.0 * np.pi / size
+            q[own] *= 1.0 - 2.0 * np.pi * max(1.0, round(size / (2.0 * np.pi))) / size
         else:
             continue
         bodies.append(chart.body)

@@ -189,6 +189,10 @@ class CompiledStepper:
         """Say which sign each event has; where it is zero, every step is noticed."""
         self._signs[:] = signs
 
+    def limit_steps(self, longest: float) -> None:
+        """Take no longer steps from now on than this, nor than the options allow."""
+        self._numbers[_LONGEST] = min(longest, self._options.max_step or inf)
+
     def heed_stiffness(self) -> None:
         """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
         self._counts[_HEEDS] = 1

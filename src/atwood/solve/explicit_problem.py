@@ -188,6 +188,15 @@ class HeedingStepper(Protocol):
         ...
 
 
+@runtime_checkable
+class LimitedStepper(Protocol):
+    """What a stepper has in addition if the length of its steps can be limited on the way."""
+
+    def limit_steps(self, longest: float) -> None:
+        """Take no longer steps from now on than this, nor than the options allow."""
+        ...
+
+
 class Stepper(Protocol):
     """Takes the steps of an explicit method."""
 

@@ -92,6 +92,10 @@ class ReferenceStepper:
         """What it has done so far, over all starts."""
         return self._counts
 
+    def limit_steps(self, longest: float) -> None:
+        """Take no longer steps from now on than this, nor than the options allow."""
+        self._longest = min(longest, self._options.max_step or inf)
+
     def heed_stiffness(self) -> None:
         """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
         self._heeds = True

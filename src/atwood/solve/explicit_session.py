@@ -16,7 +16,14 @@ import numpy as np
 from atwood.errors import KernelEvaluationError, StartError, UsageError
 from atwood.solve.driver import Advance, Budget, FloatArray, ImplicitProblem, SolverOptions, Statistics, Status
 from atwood.solve.event_watch import ROUNDING, EventWatch, Root, State
-from atwood.solve.explicit_problem import ExplicitProblem, HeedingStepper, Outcome, Stepper, WatchingStepper
+from atwood.solve.explicit_problem import (
+    ExplicitProblem,
+    HeedingStepper,
+    LimitedStepper,
+    Outcome,
+    Stepper,
+    WatchingStepper,
+)
 
 __all__ = ["ExplicitSession", "open_explicit"]
 
@@ -142,6 +149,11 @@ class ExplicitSession:
     def seems_stiff(self) -> bool:
         """Whether stability, and not accuracy, has kept steps short: an implicit method would take far fewer."""
         return self._stepper.counts.stiff > 0
+
+    def limit_steps(self, longest: float) -> None:
+        """Take no longer steps from now on than this, nor than the options allow, if the stepper can be told so."""
+        if isinstance(self._stepper, LimitedStepper):
+            self._stepper.limit_steps(longest)
 
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
         """Go on from another state; its rates follow from it."""

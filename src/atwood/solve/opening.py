@@ -6,6 +6,7 @@ import ctypes
 from dataclasses import dataclass, replace
 
 from atwood.errors import UsageError
+from atwood.solve.charts import longest_step
 from atwood.solve.driver import (
     Budget,
     FloatArray,
@@ -155,4 +156,6 @@ def open_explicit_session(
 
         series = taylor_problem(assembly, order.end, has_events=bool(probe.directions))
         return open_taylor(problem, series, order.settings(t), t, y, order.budget)
-    return open_explicit(problem, order.settings(t), t, y, order.budget, leave=leave, end=order.end)
+    session = open_explicit(problem, order.settings(t), t, y, order.budget, leave=leave, end=order.end)
+    session.limit_steps(longest_step(assembly.equations, order.plan.program.split(y)[1]))
+    return session

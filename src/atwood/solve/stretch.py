@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import SolveError
-from atwood.solve.charts import CHART, Restated, restated
+from atwood.solve.charts import CHART, Restated, longest_step, restated
 from atwood.solve.choice import Choice, stiffness_of, turned_stiff
 from atwood.solve.driver import Advance, Budget, FloatArray, Session, Statistics, Status
 from atwood.solve.explicit_session import ExplicitSession
@@ -205,6 +205,7 @@ class _Runner:
         if plan.is_projected:
             q, u = plan.balance.project(advance.t, q, u, plan.sizes)
         if isinstance(session, ExplicitSession):
+            session.limit_steps(longest_step(plan.assembly.equations, u))
             session.reinitialize(advance.t, np.concatenate([q, u]))
         else:
             y, yp = pack_state(plan, advance.t, q, u)

@@ -40,6 +40,8 @@ class Turning:
         homogeneous = [chart for chart in program.charts if chart.is_homogeneous]
         self._charts = [np.asarray(chart.coordinates, dtype=np.intp) for chart in homogeneous]
         self._kinds = [chart.kind for chart in homogeneous]
+        vectors = [chart.coordinates for chart in program.charts if chart.kind == "rotation-vector"]
+        self._vectors = [np.asarray(one, dtype=np.intp) for one in vectors]
 
     @property
     def is_plain(self) -> bool:
@@ -93,12 +95,19 @@ class Turning:
         return np.asarray(np.linalg.lstsq(self.tangent(t, q), target - q, rcond=None)[0], dtype=float)
 
     def normalized(self, q: FloatArray) -> FloatArray:
-        """Return coordinates with orientations of size one: one state, or many of shape (coordinates, samples)."""
-        if not self._charts:
+        """Return coordinates with orientations of size one: one state, or many of shape (coordinates, samples).
+
+        Rotation vectors of more than three quarters of a turn go the other way round.
+        """
+        if not self._charts and not self._vectors:
             return q
         q = np.array(q, dtype=float)
         for chart in self._charts:
             q[chart] /= np.sqrt(np.sum(q[chart] ** 2, axis=0))
+        for chart in self._vectors:
+            size = np.sqrt(np.sum(q[chart] ** 2, axis=0))
+            turns = np.where(size > 1.5 * np.pi, np.round(size / (2.0 * np.pi)), 0.0)
+            q[chart] *= 1.0 - 2.0 * np.pi * turns / np.where(turns > 0.0, size, 1.0)
         return q
 
     def strays(self, q: FloatArray) -> bool:
