@@ -53,6 +53,11 @@ class Turning:
         """Whether there are coordinates whose size means nothing."""
         return bool(self._charts)
 
+    @property
+    def can_be_left(self) -> bool:
+        """Whether there are charts that are singular somewhere, and are left before."""
+        return not all(chart.is_homogeneous for chart in self.program.charts)
+
     def rates(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return the derivatives of the coordinates."""
         program = self.program.program
