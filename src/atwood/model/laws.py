@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeVar
 
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
-from atwood.model.connectors import Frame, Point
+from atwood.model.connectors import Frame, JointCoordinate, Point
 from atwood.model.quantities import ObservableLaw
 from atwood.model.rotation import FreeRotation, Rotation
 from atwood.model.units import parse_si_unit
@@ -117,6 +117,11 @@ class Load:
     torque: Vector = ZERO
 
     def __post_init__(self) -> None:
+        if isinstance(self.at, JointCoordinate):
+            raise DeclarationError(
+                "a load acts on a point or a frame, and not on a joint's coordinate",
+                advice="Write it as a @potential of the coordinate and of time, or as a @dissipation of its rate.",
+            )
         object.__setattr__(self, "force", as_vector(self.force))
         object.__setattr__(self, "torque", as_vector(self.torque))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from atwood.expr import Expression
@@ -112,3 +112,8 @@ class LocalPart:
     signal_symbols: Mapping[str, Expression]
     formulas: Mapping[Expression, tuple[Expression, Expression | None]] = field(default_factory=dict)
     borrowed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    def is_idle(self, solved: Collection[tuple[str, str, int]]) -> bool:
+        """Return whether all that it does is held by constraints, as (part, law, number), that are solved anyhow."""
+        keys = [(self.part.path, one.law.name, one.index) for one in self.constraints]
+        return bool(keys) and all(key in solved for key in keys) and not (self.potentials or self.dissipations)

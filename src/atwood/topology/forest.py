@@ -378,9 +378,8 @@ class _Grower:
         counted: dict[Expression, tuple[int, int]] = {}
         wanted = {
             symbol
-            for path, local in self.locals.items()
-            if local.borrowed
-            and any((path, one.law.name, one.index) not in solved for one in local.constraints)
+            for local in self.locals.values()
+            if local.borrowed and not local.is_idle(solved)
             for symbol in local.formulas
         }
         for path, local in self.locals.items():
