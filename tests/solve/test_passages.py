@@ -99,7 +99,7 @@ def test_drift_that_is_projected_away_does_no_harm(windows: int, rtol: float) ->
     # at index 1 the solver leaps into folded positions more readily
     result = quiet(FourBarRow(windows=windows), form="dae", level="index1-projected", t_end=10.0, rtol=rtol)
     angle = 0.5 * np.pi - result["foot[0].angle"]
-    assert np.max(np.abs(angle - ExactRow(windows).crank_angle(result.time))) < 3e3 * rtol**0.9
+    assert np.max(np.abs(angle - ExactRow(windows).crank_angle(result.time))) < 1e4 * rtol**0.9
     assert [one.ways for one in result.passages] == 10 * [windows]
 
 

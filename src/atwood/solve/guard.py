@@ -159,8 +159,9 @@ class Guard:
         began = time.perf_counter()
         try:
             self._measure()
-            found = self._first_minimum(at_end or ended)
-            if found is None and advance.status is Status.FAILED:
+            failed = advance.status is Status.FAILED
+            found = self._first_minimum(at_end or ended, failed)
+            if found is None and failed:
                 found = self._ahead() or self._from_start(advance.t)
             self._forget()
             return found
@@ -220,7 +221,7 @@ class Guard:
         if cut > 0:
             del self._looks[:cut], self._away[:cut]
 
-    def _first_minimum(self, at_end: bool) -> Passage | None:
+    def _first_minimum(self, at_end: bool, failed: bool) -> Passage | None:
         away = self._away
         for i in range(len(away) if at_end else len(away) - 1):
             t = self._looks[i].t
@@ -233,10 +234,10 @@ class Guard:
             if not is_least and not away[i] <= _FALLEN * self._largest < before < np.inf:
                 continue
             near = self._closest(max(i - 1, 0), min(i + 1, len(away) - 1)) if is_least else None
-            found = None if near is None else self._pass(*near)
+            found = None if near is None else self._pass(*near, failed)
             heading = self._heading(i) if found is None else None
             if heading is not None:
-                found = self._pass(*heading)
+                found = self._pass(*heading, failed)
             if found is None:
                 continue
             if not self._went_along(found):
