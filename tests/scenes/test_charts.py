@@ -141,6 +141,17 @@ def pendulum(*spin: float) -> Scene:
 
 
 @pytest.mark.parametrize("kind", OTHERS)
+def test_no_quantity_shows_its_coordinates(kind: str) -> None:
+    """Positions, axes, Euler angles that count their turns, velocities, forces, energies."""
+    exact, other = (simulate(pendulum(1.0, 0.5, 2.0), orientation=one, rtol=1e-11, t_end=4.0, outputs=41)
+                    for one in ("quaternion", kind))  # fmt: skip
+    assert other.restated
+    assert other.paths == exact.paths
+    for path in exact.paths:
+        assert np.allclose(other.array(path), exact.array(path), rtol=0.0, atol=1e-7, equal_nan=True), path
+
+
+@pytest.mark.parametrize("kind", OTHERS)
 def test_a_pendulum_swings_through_its_pole(kind: str) -> None:
     exact, other = (simulate(pendulum(), orientation=one, rtol=1e-11) for one in ("quaternion", kind))
     assert np.max(exact["body.theta"]) > 3.1
