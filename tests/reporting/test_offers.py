@@ -11,7 +11,9 @@ import pytest
 
 import atwood
 from atwood import (
+    BodyInertia,
     Component,
+    Frame,
     Load,
     Point,
     Scalar,
@@ -19,6 +21,7 @@ from atwood import (
     Vector,
     connector,
     force,
+    inertia,
     parameter,
     potential,
     report,
@@ -405,6 +408,40 @@ def test_other_planes_are_said_in_words() -> None:
     assert not found.states
     assert "turned by 90 deg about z" in found.why_not
     assert "in the plane y-z" in str(report(STAYS["hinge along x"][0]()))
+
+
+def test_a_body_whose_frame_is_turned_out_of_the_plane_is_not_taken_for_another() -> None:
+    scene = alone(RigidBody(moments=(0.1, 0.2, 0.25)), spin_x=0.0, spin_y=0.0, spin_z=3.0)
+    scene.start.update({"part.phi": 0.5 * math.pi, "part.theta": 0.5 * math.pi, "part.psi": 0.0})
+    (found,) = offers(scene)
+    assert (found.where, found.states) == (X_Z, {})
+    assert found.why_not
+
+
+class Odd(Component):
+    """A body that is another one in a plane."""
+
+    frame: Frame = connector(Frame, "Its frame.")
+
+    @inertia
+    def body(self) -> Iterable[BodyInertia]:
+        """Return the inertia."""
+        yield BodyInertia(self.frame, 1.0, Vector(0.0, 0.0, -0.3), 0.1, ((0.2, 0, 0), (0, 0.2, 0), (0, 0, 0.2)))
+
+
+def test_a_body_that_is_another_one_in_a_plane_is_not_offered() -> None:
+    (found,) = offers(hung(Odd(), Pivot(), "frame", joint__angle=0.4))
+    assert not found.states
+    assert "moment of inertia of part" in found.why_not
+
+
+def test_parts_of_space_alone_are_not_offered_in_a_plane() -> None:
+    scene = SCENES["double-pendulum-3d"]()
+    scene.start.update(dict.fromkeys(scene.start, 0.0))
+    scene.start["joint1.angle_b"] = 0.5
+    (found,) = offers(scene)
+    assert (found.where, found.states) == (X_Z, {})
+    assert "plane" in found.why_not
 
 
 def test_the_report_says_what_would_be_saved() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import AtwoodError
+from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
-from atwood.mechanics.orientation import node_axes
+from atwood.mechanics.orientation import node_axes, spin_in_world
 from atwood.model.flatten import FlatScene
+from atwood.model.vector import Vector
 from atwood.pipeline import assemble_flat
 from atwood.solve.balance import balance_of, independent_rows
 from atwood.solve.problem import make_plan
@@ -28,7 +31,7 @@ _SAME = 1e-8
 
 _CARRIED = (
     *("position.x", "position.z", "velocity.x", "velocity.z", "displacement", "speed"),
-    *("angle", "angular_velocity", "angular_velocity.y"),
+    *("angle", "angular_velocity"),
 )
 """Quantities that mean the same in both spaces and are handed on as guesses."""
 
@@ -92,15 +95,33 @@ def _offer(assembly: Assembly, start: Start, found: Symmetry) -> Offer:
     offer = Offer(found.space, found.name, (x, y, z))
     if found.space == "plane" and (x, y, z) != (0.0, 1.0, 0.0):
         return replace(offer, why_not=_elsewhere(x, y, z))
+    other = _other_moment(assembly)
+    if other and found.space == "plane":
+        return replace(offer, why_not=f"the moment of inertia of {other} in a plane is not that of its tensor about y")
     try:
         reduced, plans = _assemble_there(assembly, start, found)
+        gap = _gap(assembly, start, reduced, found)
     except AtwoodError as error:
         return replace(offer, why_not=str(error).splitlines()[0])
-    gap = _gap(assembly, start, reduced, found)
+    except np.linalg.LinAlgError:
+        return replace(offer, why_not="its accelerations there are not determined")
     if not gap < _SAME:
         return replace(offer, why_not="its start could not be carried over")
     states = {form: plan[0] for form, plan in plans.items()}
     return replace(offer, states=states, operations={form: plan[1] for form, plan in plans.items()}, assembly=reduced)
+
+
+def _other_moment(assembly: Assembly) -> str:
+    """Return the part whose moment of inertia in a plane is not that of its tensor; empty if there is none."""
+    table = assembly.mechanism.table
+    for path, local in assembly.mechanism.locals_.items():
+        for one in local.body_inertias:
+            if one.tensor is not None:
+                pair = [table.graph.convert(value) for value in (one.moment, one.tensor[1][1])]
+                plane, space = evaluate(pair, table.values)
+                if not math.isclose(plane, space, rel_tol=1e-12):
+                    return path
+    return ""
 
 
 def _elsewhere(x: float, y: float, z: float) -> str:
@@ -164,7 +185,7 @@ def _carried(assembly: Assembly, start: Start) -> dict[str, float]:
 
 
 def _angles(assembly: Assembly, start: Start) -> dict[str, float]:
-    """Return the angles in the plane of parts with a body frame, and their rates, from the frame's x axis."""
+    """Return the angles in the plane, and their rates, of parts with a body frame, from the frame's x axis."""
     reduced, bodies, graph = assembly.reduced, assembly.mechanism.bodies, assembly.mechanism.table.graph
     placements = reduced.kinematics.placements
     found: dict[str, float] = {}
@@ -172,47 +193,63 @@ def _angles(assembly: Assembly, start: Start) -> dict[str, float]:
         for one in local.body_inertias:
             node = assembly.mechanism.graph.node_of[path, one.frame.name]
             axes = node_axes(None, placements.axes.get(bodies.body_of[node]), reduced.site.node_turns[node])
-            if axes is None:
+            if axes is None or bodies.body_of[node] not in reduced.kinematics.angular_velocities:
                 continue
-            program = assembly.coordinate_program("angle", reduced, [graph.convert(c) for c in axes[0]])
-            x = np.asarray(assembly.kernel(program)([start.time], start.coordinates, start.speeds)[0], dtype=float)
-            if np.hypot(x[0], x[2]) > 0.0:
-                found[f"{path}.angle"] = float(np.arctan2(x[2], x[0]))
+            body = bodies.body_of[node]
+            spin = spin_in_world(reduced.kinematics.angular_velocities[body], placements.axes[body])
+            program = assembly.coordinate_program("angle", reduced, [graph.convert(c) for c in (*axes[0], spin.y)])
+            x, _, z, rate = assembly.kernel(program)([start.time], start.coordinates, start.speeds)[0]
+            found[f"{path}.angle"] = math.atan2(z, x)
+            found[f"{path}.angular_speed"] = found[f"{path}.angular_velocity"] = -float(rate)  # about -y
     return found
 
 
 def _gap(assembly: Assembly, start: Start, there: Assembly, found: Symmetry) -> float:
-    """Return how far the starts are apart: places, speeds and accelerations of all nodes, relative to the sizes."""
+    """Return how far the starts are apart: place and turn of all nodes, and how both change, relative to the sizes."""
     begun = find_start(there)
     sets = [_nodes(one, first) for one, first in ((assembly, start), (there, begun))]
     nodes = [key for key in sets[0] if key in sets[1]]
+    here, other = (np.array([known[key] for key in nodes]) for known in sets)
+    gap = np.abs(np.where(np.isfinite(here) & np.isfinite(other), here - other, 0.0))
     # How far aside bodies are means nothing there.
     seen = np.eye(3)[[0, 2]] if found.space == "plane" else found.direction[None]
-    gaps = []
-    for order in range(3):
-        one, other = (np.array([seen @ known[key][order] for key in nodes]) for known in sets)
-        size = max(float(np.max(np.abs(one), initial=0.0)), start.length if order == 0 else 0.0)
-        if order and size == 0.0:
-            size = 1.0
-        gaps.append(float(np.max(np.abs(one - other), initial=0.0)) / size)
-    return max(gaps)
+    gap[:, 0, : len(seen)], gap[:, 0, len(seen) :] = np.abs((here[:, 0] - other[:, 0]) @ seen.T), 0.0
+    size = np.nanmax(np.abs(here), axis=(0, 2), initial=0.0)
+    length = start.length
+    rates = [size[1] / length, math.sqrt(size[2] / length), size[6], math.sqrt(size[7])]
+    pace = max(rates) or 1.0
+    sizes = np.array([length, length * pace, length * pace**2, 1.0, 1.0, 1.0, pace, pace**2])
+    return float(np.max(gap / sizes[:, None], initial=0.0))
 
 
 def _nodes(assembly: Assembly, start: Start) -> dict[tuple[str, str], FloatArray]:
-    """Return place, velocity and acceleration of every connector at the start, shape (3, 3), without what is fixed."""
+    """Return of every connector at the start what tells how it is and moves, shape (8, 3), in world axes.
+
+    Place, velocity and acceleration, the three axes of its frame, and angular velocity and acceleration; those of what
+    is not oriented are nan.
+    """
     equations, mechanism = assembly.reduced, assembly.mechanism
     kinematics, graph = equations.kinematics, assembly.mechanism.table.graph
     balance = balance_of(assembly, "reduced")
     q, u = start.coordinates, start.speeds
     kept = np.asarray(independent_rows(balance.at(start.time, q, u).slope), dtype=np.intp)
     a, _ = balance.accelerate(start.time, q, u, kept)
-    tables = (kinematics.placements.positions, kinematics.velocities, kinematics.accelerations)
-    nodes = sorted(tables[0])
-    expressions = [
-        graph.convert(c) for node in nodes for table in tables for c in mechanism.space.vector(tuple(table[node]))
-    ]
+    placements = kinematics.placements
+    tables = (placements.positions, kinematics.velocities, kinematics.accelerations)
+    nodes, expressions = sorted(tables[0]), []
+    for node in nodes:
+        body = mechanism.bodies.body_of[node]
+        vectors = [mechanism.space.vector(tuple(table[node])) for table in tables]
+        own = placements.axes.get(body)
+        axes = node_axes(placements.angles.get(body), own, equations.site.node_turns[node])
+        if axes is not None and body in kinematics.angular_velocities:
+            spins = (kinematics.angular_velocities[body], kinematics.angular_accelerations[body])
+            vectors += [*axes, *(spin_in_world(one, own) for one in spins)]
+        else:
+            vectors += [Vector(math.nan, math.nan, math.nan)] * 5
+        expressions += [graph.convert(c) for vector in vectors for c in vector]
     program = assembly.state_program("nodes", expressions)
     idle = np.zeros(len(assembly.reactions))
-    values = np.asarray(assembly.kernel(program)([start.time], q, u, a, idle)[0], dtype=float).reshape(-1, 3, 3)
+    values = np.asarray(assembly.kernel(program)([start.time], q, u, a, idle)[0], dtype=float).reshape(-1, 8, 3)
     place = dict(zip(nodes, values, strict=True))
     return {key: place[node] for key, node in mechanism.graph.node_of.items() if node in place}
