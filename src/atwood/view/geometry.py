@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -27,7 +28,7 @@ FloatArray = NDArray[np.float64]
 Kind = Literal["ground", "rod", "link", "spring", "damper", "rope", "mass", "pulley", "rail", "pivot", "solid"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shape:
     """What a part looks like.
 
@@ -50,6 +51,15 @@ class Shape:
     nodes: tuple[int, ...]
     size: float = 0.0
     surface: Mesh | None = None
+
+    @cached_property
+    def rim(self) -> FloatArray:
+        """Of a solid the points of its surface that are farthest out on the page, in the axes of its node, m."""
+        assert self.surface is not None
+        page = self.surface.vertices[:, [0, 2]]
+        turn = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+        found: FloatArray = page[np.unique(np.argmax(page @ np.array([np.cos(turn), np.sin(turn)]), axis=0))]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +89,7 @@ class Picture:
     radii: Mapping[int, float]
     angles: Mapping[int, FloatArray] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def extent(self) -> float:
         """The larger side of what is drawn."""
         return float(np.max(np.ptp(self.everything(), axis=0))) or 1.0
@@ -90,7 +100,7 @@ class Picture:
         for shape in self.shapes:
             if shape.surface is not None:
                 angles = self.angles[shape.nodes[0]][shown, None]
-                x, z = shape.surface.vertices[:, 0], shape.surface.vertices[:, 2]
+                x, z = shape.rim.T
                 turned = np.stack([x * np.cos(angles) - z * np.sin(angles), x * np.sin(angles) + z * np.cos(angles)], 2)
                 middle = self.points[shape.nodes[0]][shown]
                 places += [middle + turned.min(axis=1), middle + turned.max(axis=1)]
