@@ -28,9 +28,7 @@ from atwood import (
     select,
     simulate,
 )
-from atwood.pipeline import assemble
 from atwood.reporting import Offer
-from atwood.solve.start import find_start
 from atwood_library import (
     Box,
     Cone,
@@ -60,28 +58,6 @@ from atwood_library.scenes import (
     SimplePendulum,
     SphericalPendulum,
 )
-
-
-def into_space(make: Callable[..., Scene]) -> Scene:
-    """A planar scene of rods and point masses in space, started where the planar one starts."""
-    flat = assemble(make())
-    begin = find_start(flat)
-    scene = make(space="space")
-    for path in list(scene.start):
-        if ".angle" in path or ".angular" in path:
-            del scene.start[path]
-    for path in flat.flat.parts:
-        if not isinstance(flat.flat.parts[path].component, PointMass):
-            continue
-        for quantity in ("position", "velocity"):
-            names = [f"{path}.{quantity}.{axis}" for axis in "xz"]
-            program = flat.coordinate_program(
-                "places", flat.reduced, [flat.start_observables[name].value for name in names]
-            )
-            values = flat.kernel(program)([begin.time], begin.coordinates, begin.speeds)[0]
-            scene.start.update(zip(names, np.asarray(values).tolist(), strict=True))
-            scene.start[f"{path}.{quantity}.y"] = 0.0
-    return scene
 
 
 def offers(scene: Scene) -> tuple[Offer, ...]:
@@ -246,11 +222,11 @@ X_Z, ALONG_Z = "in the plane x-z", "on a line along z"
 
 STAYS: dict[str, tuple[Callable[[], Scene], tuple[str, ...]]] = {
     "spherical pendulum": (lambda: SphericalPendulum(azimuth_rate=0.0), (X_Z,)),
-    "simple pendulum": (lambda: into_space(SimplePendulum), (X_Z,)),
-    "double pendulum": (lambda: into_space(DoublePendulum), (X_Z,)),
-    "chain": (lambda: into_space(lambda **given: Chain(links=4, **given)), (X_Z,)),
-    "pendulum on a cart": (lambda: into_space(PendulumOnCart), (X_Z,)),
-    "driven pendulum": (lambda: into_space(DrivenPendulum), (X_Z,)),
+    "simple pendulum": (lambda: SimplePendulum(space="space"), (X_Z,)),
+    "double pendulum": (lambda: DoublePendulum(space="space"), (X_Z,)),
+    "chain": (lambda: Chain(links=4, space="space"), (X_Z,)),
+    "pendulum on a cart": (lambda: PendulumOnCart(space="space"), (X_Z,)),
+    "driven pendulum": (lambda: DrivenPendulum(space="space"), (X_Z,)),
     "four-bar": (lambda: SCENES["four-bar"](space="space"), (X_Z,)),
     "slider-crank": (lambda: SCENES["slider-crank"](space="space"), (X_Z,)),
     "row of four-bars": (lambda: SCENES["four-bar-row"](space="space"), (X_Z,)),

@@ -20,6 +20,7 @@ from atwood import (
     joint,
     observable,
     parameter,
+    select,
     sin,
 )
 
@@ -29,8 +30,8 @@ class Rod(Component):
 
     Without mass it only carries a tension. With mass it is uniform and slender; its kinetic energy in terms of the
     velocities of its ends is ``m/6 (v_a^2 + v_a.v_b + v_b^2)`` (the integral of ``1/2 v^2`` over its length, in
-    which the velocity is linear). The angle is zero when b hangs straight below a, and counter-clockwise; in space it is
-    that of the rod as seen along y.
+    which the velocity is linear). The angle is zero when b hangs straight below a, and counter-clockwise; in space it
+    is that of the rod as seen along y.
     """
 
     length: float = parameter(1.0, unit="m", above=0.0, doc="Length.")
@@ -75,9 +76,11 @@ class Rod(Component):
         spaces=("plane", "space"),
     )
     def angle(self) -> Scalar:
-        """Return the angle."""
+        """Return the angle; in space, where both ends are seen at one place, it is as if the rod hung."""
         r = self.b.position - self.a.position
-        return atan2(r.x, -r.z)
+        if not self.in_space:
+            return atan2(r.x, -r.z)
+        return atan2(r.x, select(r.x * r.x + r.z * r.z > 0.0, -r.z, self.length))
 
     @observable(unit="rad/s", doc="Rate of the angle.", spaces=("plane", "space"))
     def angular_velocity(self) -> Scalar:
