@@ -207,8 +207,7 @@ class Guard:
         return None if longest is None else Passage(longest.start, 0, (), (), longest)
 
     def _measure(self) -> None:
-        new = self._looks[len(self._away) :]
-        if new:
+        if new := self._looks[len(self._away) :]:
             t = np.array([one.t for one in new])
             q = np.stack([one.y[: self._n] for one in new], axis=1)
             self._measures.learn(t, q)
@@ -301,9 +300,13 @@ class Guard:
 
     def _pass(self, near: float, away: float = 0.0, failed: bool = False) -> Passage | None:
         """Return the passage near a time; None where the motion is as anywhere else."""
-        for reach in (1.0, 2.0, 0.5):
+        tried: set[float] = set()
+        for reach in (1.0, 2.0, 0.5, 0.25, 0.1):
             begin = self._begin(near, reach)
-            found = None if begin is None else self._over(near, *begin)
+            if begin is None or begin[0] in tried:
+                continue
+            tried.add(begin[0])
+            found = self._over(near, *begin)
             if found is not None:
                 return found
         begin = self._begin(near, 1.0)
@@ -326,8 +329,7 @@ class Guard:
         if path is not None:
             times = np.concatenate([np.linspace(one.start, one.end, 5) for one in path.arcs])
             return Passage(float(times[np.argmin(measure.at(times, path.at(times)[0]))]), 0, (), (), path)
-        q = min(self._looks, key=lambda one: abs(one.t - near)).y[: self._n]
-        lost = nearly_lost(measure, near, q)
+        lost = nearly_lost(measure, near, min(self._looks, key=lambda one: abs(one.t - near)).y[: self._n])
         if failed:
             self.trouble = near, lost
             return None
@@ -372,11 +374,17 @@ class Guard:
 
     def _over(self, near: float, t: float, q: FloatArray, u: FloatArray) -> Passage | None:
         """Return the way over a singular position near a time, from a state."""
-        plan = self.plan
-        for _ in range(6):
+        plan, accurate = self.plan, max(self.tolerance, 1e-7)
+        for _ in range(8):
             arc = find_arc(plan, t, q, u, 2.0 * near - t)
-            if arc is None or not arc.error < max(self.tolerance, 1e-7):
-                return None
+            if arc is None or not arc.error < accurate:
+                # It is too long: perhaps one half of the way is not.
+                arc = find_arc(plan, t, q, u, 0.5 * (t + near))
+                if arc is None or not arc.error < accurate:
+                    return None
+                q, u, _ = (one[:, 0] for one in arc.at(np.array([arc.end])))
+                t, (q, u) = arc.end, plan.balance.project(arc.end, q, u, plan.sizes)
+                continue
             found = crossing(self._measures, arc)
             if found is None or found[0] <= t:
                 return None
