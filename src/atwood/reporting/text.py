@@ -134,7 +134,9 @@ def _loops(report: MechanismReport) -> Iterator[tuple[str, str]]:
 
 def _warnings(report: MechanismReport) -> Iterator[tuple[str, str]]:
     if report.redundant:
-        text = f"{shorten(report.redundant)}: it follows from the other constraints and is left out"
+        follow = "it follows" if len(report.redundant) == 1 else "they follow"
+        left = "is" if len(report.redundant) == 1 else "are"
+        text = f"{shorten(report.redundant)}: {follow} from the other constraints and {left} left out"
         if report.not_unique:
             text += f"; the reactions {shorten(report.not_unique)} are then not unique, the smallest ones are reported"
         yield "redundant", text
