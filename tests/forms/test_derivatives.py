@@ -77,11 +77,13 @@ def test_levels_of_constraints_are_derivatives_of_each_other(name: str, form: st
         a = random.standard_normal(n)
         now = balance.at(t, q, u)
         slope = difference_quotient(
-            lambda d, q=q, u=u: balance.at(t, moved(prepared, q, d, still, 1.0, t), u).value, np.zeros(n), step=1e-3
+            lambda d, q=q, u=u: balance.at(t, moved(prepared, q, d, still, 1.0, t), u).value[held],
+            np.zeros(n),
+            step=1e-3,
         )
         assert np.max(np.abs(now.slope[held] - slope)) < 1e-9 * max(1.0, float(np.max(np.abs(slope))))
         rate = difference_quotient(
-            lambda h, q=q, u=u: balance.at(t + h[0], moved(prepared, q, u, still, h[0], t), u).value,
+            lambda h, q=q, u=u: balance.at(t + h[0], moved(prepared, q, u, still, h[0], t), u).value[held],
             np.zeros(1),
             step=1e-3 / max(1.0, float(np.max(np.abs(u)))),
         )
