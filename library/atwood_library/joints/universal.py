@@ -29,8 +29,8 @@ class Universal(LoadedCross):
     """A universal joint (Hooke, Cardan): frame b turns about `axis_a` of frame a, and then about its own `axis_b`.
 
     The two axes meet at a right angle in a cross. Its `force` is what it exerts on frame b, `cross_torque` the torque
-    on frame b about the common normal of the axes. Each hinge can carry a spring, a damper, a motor and stops. A part of
-    space.
+    on frame b about the common normal of the axes. Each hinge can carry a spring, a damper, a motor and stops. A part
+    of space.
     """
 
     spaces = ("space",)

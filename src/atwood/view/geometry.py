@@ -256,7 +256,7 @@ def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]
     grooves = [nodes[name] for name, one in kinds.items() if isinstance(one, Groove)]
     outline = outline_of(local) if mechanism.space.name == "plane" else None
     if outline is not None:
-        return [Shape(path, "solid", (ends[0],), surface=outline_mesh(outline))]
+        return [Shape(path, "solid", (ends[0],), surface=outline_mesh(outline, around=120))]
     masses = [one for one in local.point_inertias if len(one.points) == 1]
     weight = sum(_value(mechanism, one.masses[0][0]) for one in masses)
     joints = [joint.law.options for joint in local.joints]

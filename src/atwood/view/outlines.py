@@ -37,13 +37,15 @@ def outline_of(local: LocalPart) -> Outline | None:
     return found
 
 
-def outline_mesh(outline: Outline) -> Mesh:
+def outline_mesh(outline: Outline, around: int = 40) -> Mesh:
     """Return the surface of an outline, in the axes of the part's frame.
 
     Parameters
     ----------
     outline
         The outline.
+    around
+        How many corners stand for a circle.
     """
     if outline.kind == "box":
         return box(outline.sides, cells=_PARTS - 3)
@@ -52,7 +54,7 @@ def outline_mesh(outline: Outline) -> Mesh:
         faces = np.column_stack([triangles, triangles[:, 2]])
         return Mesh(np.asarray(outline.vertices, dtype=float), faces, np.zeros(len(faces), dtype=bool))
     line = _with_thickness(np.asarray(outline.profile, dtype=float), outline.is_ring)
-    made = revolved(_divided(line, outline.is_ring), around=40, marks=True, closed=outline.is_ring)
+    made = revolved(_divided(line, outline.is_ring), around=around, marks=True, closed=outline.is_ring)
     # z of the surface along the axis, x and y along the next two: a right-handed turn.
     turn = np.eye(3)[:, [(outline.axis + 1) % 3, (outline.axis + 2) % 3, outline.axis]]
     return made.placed(np.zeros(3), turn)
