@@ -189,7 +189,8 @@ def _size(plan: Plan, q: FloatArray, u: FloatArray) -> float:
 _SMALLEST = 1e-9
 """Arcs of this length, relative to the whole, are not tried."""
 
-_TRIES = 600
+_TRIES, _FEWEST, _WORK = 600, 60, 60_000
+"""So many arcs are tried, fewer where there are many unknowns: so many divided by their number."""
 
 _NOISE, _LOUDEST = 1e-13, 2e-7
 """Rounding, which grows with how near a singular position is, and where it hides which way a motion goes on."""
@@ -225,7 +226,7 @@ def follow(
     h = 0.25 * whole
     far = here = float(measure(np.array([t]), q[:, None])[0])
     x = _points(_POINTS)[0]
-    for _ in range(_TRIES):
+    for _ in range(int(np.clip(_WORK / plan.program.size, _FEWEST, _TRIES))):
         h = min(h, end - t)
         arc = find_arc(plan, t, q, u, t + h)
         noise = _NOISE * far / here

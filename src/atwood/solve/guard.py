@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from atwood.errors import AtwoodError, SolveError
-from atwood.solve.collocation import Path, find_arc, follow
+from atwood.solve.collocation import Arc, Path, find_arc, follow
 from atwood.solve.driver import Advance, FloatArray, Status
 from atwood.solve.nearness import Nearness, crossing, find_loss, nearly_lost
-from atwood.solve.passage import Passage
+from atwood.solve.passage import Passage, stuck_at
 from atwood.solve.problem import Plan
 from atwood.solve.projection import project_safely
 
@@ -25,6 +25,9 @@ __all__ = ["Guard", "guard_of"]
 
 _MOVE = 0.3
 """Between two looks nothing moves by more of its size; an angle by so many radians."""
+
+_SHARE = 0.01
+"""What rests is looked at after this share of a run: it may be set in motion."""
 
 _REVIEW = 8
 """So many looks are judged together."""
@@ -47,25 +50,28 @@ _REACH = 0.2
 _CENTRED = 0.06
 """So far from its middle an arc may pass the place, relative to half its length; its points keep twice that away."""
 
+_ACCURATE = 1e-7
+"""Arcs over a place are taken whose estimates are smaller, or within the tolerance; errors are far below these."""
+
 _FINE = 17
 
 _AGREES = 30.0
 """Times the tolerance: a solver whose states behind the place differ by less from the arc has gone the same way."""
 
 
-def guard_of(plan: Plan, tolerance: float, advance: Advance) -> Guard | None:
+def guard_of(plan: Plan, tolerance: float, end: float, advance: Advance) -> Guard | None:
     """Return what looks out for singular positions; None where there can be none: without loops.
 
     Without projection (plain index 1) drift is to be seen, and nothing is looked out for.
 
     Parameters
     ----------
-    plan, tolerance, advance
+    plan, tolerance, end, advance
         See `Guard`.
     """
     if not plan.is_projected or not plan.assembly.reduced.constraints:
         return None
-    return Guard(plan, tolerance, advance)
+    return Guard(plan, tolerance, end, advance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +92,8 @@ class Guard:
         The scene in its mode.
     tolerance
         The relative tolerance of the run.
+    end
+        When the stretch ends at the latest, s.
     advance
         The state at its start.
 
@@ -102,8 +110,9 @@ class Guard:
 
     trouble: tuple[float, int] | None
 
-    def __init__(self, plan: Plan, tolerance: float, advance: Advance) -> None:
+    def __init__(self, plan: Plan, tolerance: float, end: float, advance: Advance) -> None:
         self.plan, self.tolerance = plan, tolerance
+        self._whole = end - advance.t
         self.seconds = 0.0
         self.agreed: list[Passage] = []
         self._n, self._m = plan.program.coordinates, len(plan.sizes)
@@ -129,14 +138,15 @@ class Guard:
         self.next = advance.t + self._stride(advance)
 
     def _stride(self, advance: Advance) -> float:
-        """Return the time in which something moves as far as it may."""
+        """Return the time in which something moves as far as it may; never beyond the end."""
         u, a = advance.y[self._n : self._n + self._m], advance.yp[self._n : self._n + self._m]
         speed, pull = float(np.max(np.abs(u) / self.plan.sizes)), float(np.max(np.abs(a) / self.plan.sizes))
         if not np.isfinite(speed + pull):
-            return np.inf
+            return _SHARE * self._whole
         # the root of pull/2 h^2 + speed h = move, without cancellation
         below = speed + np.sqrt(speed * speed + 2.0 * pull * _MOVE)
-        return 2.0 * _MOVE / below if below > 0.0 else np.inf
+        stride = 2.0 * _MOVE / below if below > 0.0 else np.inf
+        return stride if stride < self._whole else _SHARE * self._whole
 
     def look(self, advance: Advance, between: bool, at_end: bool) -> Passage | None:
         """Take up what a solver gave, and return the first singular position over which it must be helped.
@@ -186,22 +196,19 @@ class Guard:
         first = self._looks[0]
         stride = self._stride(Advance(first.t, first.y, first.yp, Status.REACHED))
         begin = self._state(first)
-        if begin is None or not near < first.t + 0.1 * stride < np.inf:
+        if begin is None or not near < first.t + 0.1 * stride:
             return None
         longest: Path | None = None
         for share in (1.0, 0.3, 0.1):
             arc = find_arc(self.plan, *begin, first.t + share * stride)
-            if arc is None or not arc.error < max(self.tolerance, 1e-7):
+            if arc is None or not arc.error < max(self.tolerance, _ACCURATE):
                 continue
             times = np.linspace(arc.start, arc.end, _FINE)
             self._measures.learn(times, arc.at(times)[0])
             away = self._measures.at(times, arc.at(times)[0])
             found = crossing(self._measures, arc)
             if found is not None:
-                loss = find_loss(self._measures, arc, *found)
-                if loss is None:
-                    return None
-                return Passage(found[0], loss.rank, *self._said(loss.constraints), Path((arc,)), loss.gap)
+                return self._passage(arc, *found)
             if longest is None and away[0] < _QUITE_CLOSE * away[-1] and np.all(np.diff(away[1:]) > 0.0):
                 longest = Path((arc,))
         return None if longest is None else Passage(longest.start, 0, (), (), longest)
@@ -212,7 +219,7 @@ class Guard:
             q = np.stack([one.y[: self._n] for one in new], axis=1)
             self._measures.learn(t, q)
             self._away += self._measures.at(t, q).tolist()
-            self._largest = max(self._largest, float(np.nanmax(self._away[-len(new) :])))
+            self._largest = max(self._largest, float(np.nanmax(self._away[-len(new) :], initial=0.0)))
 
     def _forget(self) -> None:
         """Drop looks that are not needed any more."""
@@ -340,13 +347,7 @@ class Guard:
         if self.trouble is None:
             return None
         t, lost = self.trouble
-        one = self.plan.assembly.equations.constraints[lost]
-        return SolveError(
-            f"near t = {t:.6g} the mechanism comes to a singular position, where {one.label} nearly follows from the "
-            f"other constraints, too slowly or too closely to tell which way it goes on: {message}",
-            where=one.key[0],
-            advice="Change lengths, start or speed a little, so that it clearly passes through or stays away.",
-        )
+        return stuck_at(self.plan.assembly.equations.constraints[lost], t, message)
 
     def _said(self, constraints: tuple[int, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the labels of constraints, and the parts that they belong to."""
@@ -355,7 +356,9 @@ class Guard:
 
     def _begin(self, near: float, reach: float) -> tuple[float, FloatArray, FloatArray] | None:
         """Return a state from which an arc may start."""
-        one = next((one for one in reversed(self._looks) if self._is_before(one, near, reach)), None)
+        speeds, sizes = slice(self._n, self._n + self._m), self.plan.sizes
+        moved = ((one, float(np.max(np.abs(one.y[speeds]) / sizes)) * (near - one.t)) for one in reversed(self._looks))
+        one = next((one for one, move in moved if move >= reach * _REACH), None)
         if one is None and self._looks[0].t < near:
             one = self._looks[0]
         return None if one is None else self._state(one)
@@ -368,13 +371,9 @@ class Guard:
         except AtwoodError:
             return None
 
-    def _is_before(self, one: _Look, near: float, reach: float) -> bool:
-        u = one.y[self._n : self._n + self._m]
-        return float(np.max(np.abs(u) / self.plan.sizes)) * (near - one.t) >= reach * _REACH
-
     def _over(self, near: float, t: float, q: FloatArray, u: FloatArray) -> Passage | None:
         """Return the way over a singular position near a time, from a state."""
-        plan, accurate = self.plan, max(self.tolerance, 1e-7)
+        plan, accurate = self.plan, max(self.tolerance, _ACCURATE)
         for _ in range(8):
             arc = find_arc(plan, t, q, u, 2.0 * near - t)
             if arc is None or not arc.error < accurate:
@@ -392,8 +391,10 @@ class Guard:
             if abs(now - near) > _CENTRED * (near - t):
                 near = now
                 continue
-            loss = find_loss(self._measures, arc, now, away)
-            if loss is None:
-                return None
-            return Passage(now, loss.rank, *self._said(loss.constraints), Path((arc,)), loss.gap)
+            return self._passage(arc, now, away)
         return None
+
+    def _passage(self, arc: Arc, t: float, away: float) -> Passage | None:
+        """Return the passage that an arc makes at a time; None if that is no singular position."""
+        loss = find_loss(self._measures, arc, t, away)
+        return None if loss is None else Passage(t, loss.rank, *self._said(loss.constraints), Path((arc,)), loss.gap)

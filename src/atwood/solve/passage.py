@@ -12,13 +12,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.errors import SolveError
+from atwood.mechanics.equations import Constraint
 from atwood.solve.collocation import Path
 from atwood.solve.driver import FloatArray
 from atwood.solve.event_watch import EventWatch, Root, State
 from atwood.solve.modes import EventProbe
 from atwood.solve.problem import Plan
 
-__all__ = ["Passage", "events_on"]
+__all__ = ["Passage", "events_on", "stuck_at"]
 
 _PIECES = 8
 """In so many pieces a path is searched for events."""
@@ -91,6 +93,26 @@ class Passage:
         if self.gap < 1e-12:
             return ""
         return f" (lengths fit there to {self.gap:.0e} of the scene's size, which was taken for exactly)"
+
+
+def stuck_at(constraint: Constraint, t: float, message: str) -> SolveError:
+    """Return the error of a solver that failed at a singular position.
+
+    Parameters
+    ----------
+    constraint
+        What nearly follows from the other constraints there.
+    t
+        When.
+    message
+        What the solver said.
+    """
+    return SolveError(
+        f"near t = {t:.6g} the mechanism comes to a singular position, where {constraint.label} nearly follows from "
+        f"the other constraints, too slowly or too closely to tell which way it goes on: {message}",
+        where=constraint.key[0],
+        advice="Change lengths, start or speed a little, so that it clearly passes through or stays away.",
+    )
 
 
 def events_on(path: Path, plan: Plan, probe: EventProbe) -> Root | None:

@@ -245,7 +245,8 @@ class _Runner:
             ),
         )
         if choice.solver.startswith("ida"):
-            self.guard = guard_of(stretch.plan, options.relative_tolerance, Advance(t, y, yp, Status.REACHED))
+            here = Advance(t, y, yp, Status.REACHED)
+            self.guard = guard_of(stretch.plan, options.relative_tolerance, stretch.end, here)
             self.session = open_implicit_session(order, choice.solver, t, y, yp)
         else:
             leave = self._is_stiff if options.solver == "auto" else None
