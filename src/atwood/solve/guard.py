@@ -219,7 +219,7 @@ class Guard:
             q = np.stack([one.y[: self._n] for one in new], axis=1)
             self._measures.learn(t, q)
             self._away += self._measures.at(t, q).tolist()
-            self._largest = max(self._largest, float(np.nanmax(self._away[-len(new) :], initial=0.0)))
+            self._largest = max([self._largest, *(one for one in self._away[-len(new) :] if np.isfinite(one))])
 
     def _forget(self) -> None:
         """Drop looks that are not needed any more."""
