@@ -11,7 +11,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 
-@pytest.mark.parametrize("name", ["kernels", "ida", "loops", "work_precision", "startup", "sweep", "taylor", "charts"])
+@pytest.mark.parametrize(
+    "name", ["kernels", "ida", "loops", "work_precision", "startup", "sweep", "taylor", "charts", "space"]
+)
 def test_smallest_case(name: str, tmp_path: Path) -> None:
     paths = [str(ROOT / "src"), str(ROOT / "library"), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
