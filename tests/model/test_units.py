@@ -25,6 +25,7 @@ EXPONENTS = st.tuples(*[st.integers(-4, 4)] * 4)
         ("s^-1", 1.0, (0, 0, -1, 0)),
         ("V/A", 1.0, (1, 2, -3, -2)),
         ("kg · m", 1.0, (1, 1, 0, 0)),
+        ("rpm", 2.0 * math.pi / 60.0, (0, 0, -1, 0)),
     ],
 )
 def test_units_are_read(text, factor, exponents):

@@ -282,3 +282,45 @@ def test_rods_without_a_guess_find_a_place() -> None:
     place = [float(result.array(f"bob.position.{c}")[0]) for c in "xyz"]
     assert math.hypot(*place) == pytest.approx(1.0, rel=1e-12)
     assert assemble(scene).reduced.constraints
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("joint.rate", "joint can start with angle, angular_velocity."),
+        ("joint", "joint can start with angle, angular_velocity."),
+        ("joint.angl", "Did you mean 'joint.angle'?"),
+        ("joit.angle", "Did you mean 'joint.angle' or 'joint.angular_velocity'?"),
+        ("body.position", "It is a vector: give body.position.x and body.position.y and body.position.z"),
+        ("body.quaternion.w", "body can start with position.x/y/z, velocity.x/y/z"),
+    ],
+)
+def test_a_start_of_nothing_names_what_the_part_can_start_with(path, expected):
+    with pytest.raises(StartError) as caught:
+        simulate(hung(Pivot(), {path: 1.0}), t_end=0.1)
+    assert caught.value.where == path
+    assert expected in str(caught.value)
+    assert "force" not in str(caught.value)
+
+
+def test_a_vector_as_a_start_is_refused_with_its_components():
+    with pytest.raises(StartError, match=r"Give its components, body\.position\.x and so on"):
+        lone({"body.position": (0.0, 0.0, 1.0)})
+
+
+@pytest.mark.parametrize(
+    ("word", "axis"), [("z", (0.0, 0.0, 1.0)), ("-x", (-1.0, 0.0, 0.0)), (" +y ", (0.0, 1.0, 0.0))]
+)
+def test_a_direction_may_be_an_axis(word, axis):
+    assert Pivot(axis=word).axis == axis
+
+
+@pytest.mark.parametrize("axis", ["w", "xy", "--x", "", (0, 1)])
+def test_a_direction_that_is_none_is_refused(axis):
+    with pytest.raises(ParameterError, match=r"not 3 numbers.*or one of x, y, z"):
+        Pivot(axis=axis)
+
+
+def test_words_are_directions_only():
+    with pytest.raises(ParameterError, match="not 3 numbers"):
+        Weld(displacement="x")

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from atwood.errors import StartError, UsageError, suggestion
+from atwood.errors import StartError, UsageError, near_matches, suggestion
 from atwood.model.composite import Model
 from atwood.model.flatten import FlatScene
 from atwood.model.scene import Scene
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
+    from atwood.mechanics.observables import Observable
 
 __all__ = ["Assemble", "Source", "no_start_quantity"]
 
@@ -83,6 +84,40 @@ def change_scene(scene: Model, values: Mapping[str, Any], start: Mapping[str, An
                 raise UsageError("the scene has no such start value", where=path, advice=suggestion(path, target))
 
 
-def no_start_quantity(path: str, known: Collection[str]) -> StartError:
-    """Return the error that says that a start value is of nothing."""
-    return StartError("there is no such quantity to start with", where=path, advice=suggestion(path, list(known)))
+def no_start_quantity(path: str, known: Mapping[str, Observable]) -> StartError:
+    """Return the error that says that a start value is of nothing.
+
+    Parameters
+    ----------
+    path
+        What was given.
+    known
+        The quantities there are; what is offered instead is a position or a speed, of the same part if there is one.
+    """
+    message = "there is no such quantity to start with"
+    choices = [name for name, one in known.items() if one.unit in _POSITIONS_AND_SPEEDS]
+    part, own = path, [name for name in choices if name.startswith(f"{path}.")]
+    if f"{path}.x" in own:
+        parts = " and ".join(name for name in own if name.count(".") == path.count(".") + 1)
+        return StartError(message, where=path, advice=f"It is a vector: give {parts}, each with a number.")
+    while not own and "." in part:
+        part = part.rpartition(".")[0]
+        own = [name for name in choices if name.startswith(f"{part}.")]
+    tails = [name.removeprefix(f"{part}.") for name in own]
+    close = near_matches(path.removeprefix(f"{part}."), tails)
+    if not own or close:
+        named = [f"{part}.{tail}" for tail in close] or near_matches(path, choices)
+        return StartError(message, where=path, advice=suggestion(path, named))
+    return StartError(message, where=path, advice=f"{part} can start with {', '.join(_vectors(tails))}.")
+
+
+def _vectors(names: Sequence[str]) -> list[str]:
+    """Return names with the components of a vector as one, such as ``position.x/y/z``."""
+    axes: dict[str, list[str]] = {}
+    for name in names:
+        stem, _, last = name.rpartition(".")
+        axes.setdefault(f"{stem}." if last in ("x", "y", "z") else name, []).append(last)
+    return [stem + "/".join(last) if stem.endswith(".") else stem for stem, last in axes.items()]
+
+
+_POSITIONS_AND_SPEEDS = ("1", "m", "rad", "m/s", "rad/s")

@@ -95,7 +95,7 @@ class Component:
                 raise ParameterError(
                     "it has no default and must be given",
                     where=f"{type(self).__name__}.{name}",
-                    advice=f"{name} is: {spec.doc} Unit {spec.unit.text}.",
+                    advice=f"{name} is: {spec.doc}" + ("" if spec.unit.text == "1" else f" Unit {spec.unit.text}."),
                 )
 
     def _start_as(self, settings: dict[str, Any], parent: Component | None, name: str) -> None:
@@ -273,11 +273,15 @@ class Component:
         return self._parameters[name] if name in self._parameters else self._signals[name]
 
     def _connector(self, spec: ConnectorSpec) -> Any:
-        motions = self._bound.motions if self._bound is not None else {}
-        made = tuple(spec.kind(self, name, motions.get(name)) for name in spec.names(self))
+        made = self._made(spec)
         if not made and spec.count is None:
             raise spec.absent(self)
         return made if spec.count is not None else made[0]
+
+    def _made(self, spec: ConnectorSpec) -> tuple[Connector, ...]:
+        """Return the connectors that a declaration stands for, of which there may be none."""
+        motions = self._bound.motions if self._bound is not None else {}
+        return tuple([spec.kind(self, name, motions.get(name)) for name in spec.names(self)])
 
     def _checked(self, name: str, value: Any) -> Any:
         return self._field(name).check(value, f"{self.path or type(self).__name__}.{name}")
@@ -333,11 +337,7 @@ class Component:
 
     def connectors(self) -> dict[str, Connector]:
         """Return the connectors by name, each element of an array on its own."""
-        found: dict[str, Connector] = {}
-        for spec in self._connectors.values():
-            made = self._connector(spec) if spec.names(self) else ()
-            found.update({one.name: one for one in (made if isinstance(made, tuple) else (made,))})
-        return found
+        return {one.name: one for spec in self._connectors.values() for one in self._made(spec)}
 
     def parameters(self) -> dict[str, Any]:
         """Return the parameter values by name."""

@@ -96,6 +96,13 @@ class Field(FieldReference):
         return value
 
 
+_AXES = {
+    sign + name: tuple(size if name == axis else 0.0 for axis in "xyz")
+    for sign, size in (("", 1.0), ("+", 1.0), ("-", -1.0))
+    for name in "xyz"
+}
+
+
 class ParameterSpec(Field):
     """The declaration of a parameter: unit, default, bounds and meaning.
 
@@ -153,13 +160,14 @@ class ParameterSpec(Field):
         return self._check_number(value, where)
 
     def _check_vector(self, value: Any, where: str) -> tuple[float, ...]:
-        if isinstance(value, str):
-            value = [part for part in value.strip("()[] ").split(",") if part.strip()]
-        parts = list(value) if isinstance(value, Iterable) and not isinstance(value, (bytes, set, dict)) else []
+        given = _AXES.get(value.strip(), value) if self.direction and isinstance(value, str) else value
+        if isinstance(given, str):
+            given = [part for part in given.strip("()[] ").split(",") if part.strip()]
+        parts = list(given) if isinstance(given, Iterable) and not isinstance(given, (bytes, set, dict)) else []
         if len(parts) != self.size:
-            raise ParameterError(
-                f"{value!r} is not {self.size} numbers", where=where, advice=f"Give {self.size} numbers in brackets."
-            )
+            or_word = ", or one of x, y, z, -x, -y, -z" if self.direction else ""
+            advice = f"Give {self.size} numbers in brackets{or_word}."
+            raise ParameterError(f"{value!r} is not {self.size} numbers", where=where, advice=advice)
         numbers = tuple(self._check_number(part, where) for part in parts)
         if not self.direction:
             return numbers
@@ -280,7 +288,8 @@ def parameter(
         Whether its value shapes the mechanism, as a direction does. Counts and choices always do; every other
         parameter is a number that can change without anything being derived again.
     direction
-        Whether it is a direction: three numbers, not all zero, of which a unit vector is made.
+        Whether it is a direction: three numbers, not all zero, of which a unit vector is made, or an axis such as
+        ``"z"`` or ``"-x"``.
     turning
         Whether it is a direction about which something turns; in a plane it can only be the plane's normal.
     text

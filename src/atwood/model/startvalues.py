@@ -65,6 +65,9 @@ def _checked(path: Any, value: Any, where: str) -> Any:
     full = f"{where}.{path}" if where else path
     if isinstance(value, Deferred):
         return value
+    if isinstance(value, (list, tuple)):
+        advice = f"Give its components, {path}.x and so on, each with a number."
+        raise StartError("a start value is one number", where=full, advice=advice)
     number = value
     if isinstance(value, str):
         split = split_quantity(value)

@@ -22,6 +22,7 @@ _BASE: dict[str, tuple[float, Exponents]] = {
     "rad": (1.0, (0, 0, 0, 0)),
     "deg": (math.pi / 180.0, (0, 0, 0, 0)),
     "rev": (2.0 * math.pi, (0, 0, 0, 0)),
+    "rpm": (math.pi / 30.0, (0, 0, -1, 0)),
     "kg": (1.0, (1, 0, 0, 0)),
     "g": (1e-3, (1, 0, 0, 0)),
     "t": (1e3, (1, 0, 0, 0)),
@@ -102,7 +103,8 @@ def parse_unit(text: str) -> Unit:
             raise DeclarationError(f"cannot read the unit {text!r}", advice="Write it like 'kg*m^2' or 'N/m'.")
         operator, name, power_text = match.groups()
         if name not in _BASE:
-            raise DeclarationError(f"{name!r} is not a unit, in {text!r}", advice=suggestion(name, _BASE))
+            inside = f", in {text!r}" if name != stripped else ""
+            raise DeclarationError(f"{name!r} is not a unit{inside}", advice=suggestion(name, _BASE))
         power = int(power_text or 1) * (-1 if operator == "/" else 1)
         size, powers = _BASE[name]
         factor *= size**power
