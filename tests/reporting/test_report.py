@@ -154,3 +154,19 @@ def test_long_lists_are_shortened() -> None:
     assert shorten([f"{name}.angle" for name in ["a", *names[3:9], "b"]]) == "a.angle, rod[3..8].angle, b.angle"
     assert shorten(names[:2]) == "rod[0], rod[1]"
     assert shorten("abcdefgh", 4) == "a, b, ... h (8 in all)"
+    assert shorten(names[:2], least=2) == "rod[0..1]"
+
+
+def test_vectors_in_space_are_written_as_one() -> None:
+    assert shorten(f"bob.force.{axis}" for axis in "xyz") == "bob.force.x/y/z"
+    assert shorten(f"top.quaternion.{axis}" for axis in "wxyz") == "top.quaternion.w/x/y/z"
+    assert shorten(f"bob.position.{axis}'" for axis in "xyz") == "bob.position.x'/y'/z'"
+    assert shorten(["a.x", "a.z"]) == "a.x, a.z"
+    assert shorten(["a.x", "a.y", "b.z"]) == "a.x, a.y, b.z"
+    assert shorten(f"bob[{i}].position.{axis}" for i in range(9) for axis in "xyz") == "bob[0..8].position.x/y/z"
+
+
+def test_constraints_of_one_law_have_names_of_their_own() -> None:
+    found = report(SCENES["four-bar-row"](space="space"))
+    assert {"right[0].bearing[0]", "right[0].bearing[1]"} <= set(found.redundant)
+    assert len(set(found.constraints)) == len(found.constraints)

@@ -14,7 +14,7 @@ class Ground(Component):
     position: tuple[float, float, float] = parameter(
         (0.0, 0.0, 0.0), unit="m", size=3, doc="Position in world axes (x right, y into the page, z up)."
     )
-    angle: float = parameter(0.0, unit="rad", doc="Rotation in the plane, counter-clockwise.")
+    angle: float = parameter(0.0, unit="rad", doc="Rotation in the plane x-z, counter-clockwise; in space, about -y.")
     frame: Frame = connector(Frame, "The fixed frame.")
 
     @joint("world", "frame", rigid=True, spaces=("line", "plane", "space"), reaction="exerted by the ground")

@@ -72,11 +72,11 @@ def _print(found: MechanismReport, moved: bool) -> None:
     out.print()
     listing = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
     listing.add_column("parameter", no_wrap=True)
-    listing.add_column("value", justify="right")
-    listing.add_column("unit")
+    listing.add_column("value", justify="right", no_wrap=True)
+    listing.add_column("unit", no_wrap=True)
     listing.add_column("meaning", overflow="ellipsis", no_wrap=True)
     for (_, value, unit, meaning), paths in list(groups.items())[:_SHOWN]:
-        listing.add_row(shorten(paths, 3), f"{value:g}", "" if unit == "1" else unit, meaning)
+        listing.add_row(shorten(paths, 3, least=2), f"{value:g}", "" if unit == "1" else unit, meaning)
     out.print(listing)
     if len(groups) > _SHOWN:
         out.print(f"... and {len(groups) - _SHOWN} more; --json shows all", style="dim")

@@ -16,6 +16,7 @@ from atwood.result.about import solver_name
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from atwood.forms.assembly import Assembly
     from atwood.result.result import Result
 
 __all__ = ["duration", "main_quantities", "print_summary", "sparkline"]
@@ -154,11 +155,14 @@ def duration(seconds: float) -> str:
 
 def _clean(value: float, values: NDArray[np.float64]) -> float:
     """Return a value, or zero where it is rounding against the others."""
-    return 0.0 if abs(value) < 1e-13 * float(np.max(np.abs(values))) else float(value)
+    return 0.0 if abs(value) <= 1e-13 * float(np.max(np.abs(values))) else float(value)
 
 
 def main_quantities(result: Result) -> list[str]:
     """Return the quantities that say most: coordinates, where masses are, then what pulls and holds.
+
+    Of a body with coordinates of its orientation its spin is shown, since no result has those coordinates themselves.
+    Where something does not move comes last.
 
     Parameters
     ----------
@@ -166,13 +170,24 @@ def main_quantities(result: Result) -> list[str]:
         The run.
     """
     assembly = result.assembly
-    names = [one.name for one in assembly.reduced.names if one.name in result]
+    names = [name for name in _shown_coordinates(assembly) if name in result]
     shown = assembly.mechanism.bodies.bodies
     masses = [f"{body.name}.position.{axis}" for body in shown if not body.is_fixed for axis in "xyz"]
     tensions = [path for path in result.paths if path.endswith(".tension")]
     forces = [one.path for one in assembly.reactions if one.path not in tensions and np.any(result.array(one.path))]
-    chosen = [*names[:8], *tensions[:6], *(p for p in masses if p in result), *names[8:], *tensions[6:], *forces]
+    masses = [path for path in masses if path in result]
+    moving = [path for path in masses if np.ptp(result.array(path)) > 0.0]
+    chosen = [*names[:8], *tensions[:6], *moving, *names[8:], *tensions[6:], *forces, *masses]
     return list(dict.fromkeys(chosen))
+
+
+def _shown_coordinates(assembly: Assembly) -> list[str]:
+    """Return the names of the coordinates; in place of an orientation in space the spin of the body."""
+    found: dict[str, None] = {}
+    for one in assembly.regular.names:
+        body, turn, _ = one.name.partition(".quaternion.")
+        found.update(dict.fromkeys([f"{body}.spin.{axis}" for axis in "xyz"] if turn else [one.name]))
+    return list(found)
 
 
 def sparkline(values: NDArray[np.float64], width: int = 24) -> str:

@@ -58,7 +58,9 @@ class Constraint:
     @property
     def label(self) -> str:
         """Path of the constraint, for messages and reports."""
-        return f"{self.key[0]}.{self.key[1]}" + (f"[{self.key[2]}]" if "." in self.reaction else "")
+        path, law, number = self.key
+        is_one_of_several = "." in self.reaction or self.reaction.endswith(f"_{number + 1}")
+        return f"{path}.{law}" + (f"[{number}]" if is_one_of_several else "")
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ __all__ = ["as_text", "count_of", "facts", "shorten", "title"]
 _SHOWN = 12
 """Of a long list, so many are named."""
 
+_ARRAY = 4
 _WIDTH = 100
 _LABEL = 18
 
@@ -51,23 +53,48 @@ def count_of(number: int, one: str, many: str = "") -> str:
     return f"{number} {one if number == 1 else many or one + 's'}"
 
 
-def shorten(names: Iterable[str], shown: int = _SHOWN) -> str:
-    """Return names with commas: arrays as ``rod[0..9]``, and of a long list the first ones, the last, and how many."""
+def shorten(names: Iterable[str], shown: int = _SHOWN, least: int = _ARRAY) -> str:
+    """Return names with commas, and of a long list the first ones, the last, and how many.
+
+    Parameters
+    ----------
+    names
+        The names. Vectors in space are written as ``rod.force.x/y/z``, arrays as ``rod[0..9]``.
+    shown
+        Of a longer list, so many are named.
+    least
+        So many elements of an array are written as one.
+    """
     listed = list(names)
-    short = list(_arrays(listed))
+    short = list(_arrays(list(_vectors(listed)), least))
     if len(short) <= shown:
         return ", ".join(short)
     return f"{', '.join(short[: shown - 2])}, ... {short[-1]} ({len(listed)} in all)"
 
 
-def _arrays(names: Sequence[str]) -> Iterator[str]:
+def _vectors(names: Sequence[str]) -> Iterator[str]:
+    """Yield names with three or four components that follow each other as one."""
+    keyed = [(match[1], match[3]) if (match := _COMPONENT.match(name)) else (name, "") for name in names]
+    for _, group in groupby(range(len(names)), key=keyed.__getitem__):
+        found = [names[i] for i in group]
+        if len(found) == len(set(found)) >= _IN_SPACE:
+            yield "/".join([found[0], *(name.rpartition(".")[2] for name in found[1:])])
+        else:
+            yield from found
+
+
+_COMPONENT = re.compile(r"(.*)\.([wxyz])('?)$")
+_IN_SPACE = 3
+
+
+def _arrays(names: Sequence[str], least: int) -> Iterator[str]:
     """Yield names with the elements of an array that follow each other as one."""
     run: list[tuple[str, int, str]] = []
     for name in [*names, ""]:
         match = _ELEMENT.match(name)
         entry = (match[1], int(match[2]), match[3]) if match else None
         if run and entry != (run[0][0], run[0][1] + len(run), run[0][2]):
-            if len(run) >= _ARRAY:
+            if len(run) >= least:
                 yield f"{run[0][0]}[{run[0][1]}..{run[-1][1]}]{run[0][2]}"
             else:
                 yield from (f"{before}[{number}]{after}" for before, number, after in run)
@@ -79,8 +106,6 @@ def _arrays(names: Sequence[str]) -> Iterator[str]:
 
 
 _ELEMENT = re.compile(r"(.*?)\[(\d+)\](.*)$")
-_ARRAY = 4
-"""So many elements of an array are written as one."""
 
 
 def facts(report: MechanismReport) -> Iterator[tuple[str, str]]:
@@ -147,11 +172,21 @@ def _warnings(report: MechanismReport) -> Iterator[tuple[str, str]]:
     if report.starts_singular:
         yield "singular start", "here constraints lose rank; the motion from this position is not unique"
     if report.repeated:
-        yield "start", f"{shorten(report.repeated)} follows from the other start values"
+        follow = "follows" if len(report.repeated) == 1 else "follow"
+        yield "start", f"{shorten(report.repeated)} {follow} from the other start values"
     own = set(report.coordinates)
     free = [*report.free_coordinates, *(f"{name}'" if name in own else name for name in report.free_speeds)]
     if free:
-        yield "start", f"nothing fixes {shorten(free)}: guesses and zeros decide"
+        yield "start", f"nothing fixes {shorten(_by_their_names(free))}: guesses and zeros decide"
+
+
+def _by_their_names(free: Sequence[str]) -> list[str]:
+    """Return what a start leaves free, each once; orientations as such, since no start gives their coordinates."""
+    named = (f"the orientation of {match[1]}" if (match := _TURN.match(name)) else name for name in free)
+    return list(dict.fromkeys(named))
+
+
+_TURN = re.compile(r"(.*)\.quaternion\.[wxyz]$")
 
 
 def _forms(report: MechanismReport) -> Iterator[tuple[str, str]]:
