@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from atwood import (
     Point,
     Scalar,
     Scene,
+    StartError,
     connector,
     constraint,
     parameter,
@@ -21,6 +24,7 @@ from atwood import (
     sweep,
 )
 from atwood.pipeline import assemble
+from atwood.solve.start import find_start
 
 from ..helpers.runs import FORMS
 
@@ -82,6 +86,19 @@ def test_a_wheel_on_a_seesaw_keeps_two_freedoms() -> None:
     assert reduced.energy.max_drift < 1e-9
     for path in reduced.paths:
         assert np.max(np.abs(reduced[path] - dae[path])) < 1e-6, path
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-7])
+def test_an_assembly_is_for_the_start_that_gave_its_constants(size: float) -> None:
+    scene = wheel_on_a_slope()
+    for name in ("contact", "wheel"):
+        scene[name].radius = 0.5 * size
+    scene.start.update({"contact.displacement": 0.3 * size, "contact.speed": 0.2 * size})
+    made = assemble(scene)
+    find_start(made)
+    start = {**made.flat.start, "contact.displacement": (0.3 + 1e-4) * size}
+    with pytest.raises(StartError, match="made for another start"):
+        find_start(replace(made, flat=replace(made.flat, start=start)))
 
 
 def upright() -> Scene:
@@ -238,6 +255,8 @@ def test_rolling_is_not_integrable() -> None:
     for scene, expected in ((RollingDiscScene(), False), (RollingBall(), False), (on_blades(1), False)):
         made = starting(assemble(scene))
         assert integrable_together(made.mechanism, made.reduced) is expected
+    tiny = starting(assemble(RollingDiscScene(radius=1e-10, motion="straight", speed=1e-10)))
+    assert integrable_together(tiny.mechanism, tiny.reduced) is False  # sizes are compared with those of the scene
     for scene in (wheel_on_a_slope(), upright(), on_blades(2)):
         made = starting(assemble(scene))
         assert integrable_together(made.mechanism, made.reduced) is True

@@ -169,10 +169,27 @@ def test_which_way_round_is_known_of_every_joint(kind: type[Component], is_turne
             assert wrong == ["second"]
 
 
+@pytest.mark.parametrize("size", [1e-9, 1e6])
+def test_gaps_are_seen_in_scenes_of_any_size(size: float) -> None:
+    scene = Scene()
+    ends = scene.add("left", Ground()), scene.add("right", Ground(position=(4.0 * size, 0.0, 0.0)))
+    place = ends[0].frame
+    for number, length in enumerate((1.0, 1.0, 1.9)):
+        pivot, link = scene.add(f"pivot{number}", Pivot()), scene.add(f"link{number}", Link(length=length * size))
+        scene.connect(place, pivot.a)
+        scene.connect(pivot.b, link.a)
+        place = link.b
+    last = scene.add("last", Pivot())
+    scene.connect(place, last.a)
+    scene.connect(last.b, ends[1].frame)
+    with pytest.raises(StartError, match=re.escape(f"misses by {0.1 * size:.4g} m (the loop")):
+        find_start(assemble(scene))
+
+
 def test_gaps_of_joints_are_distances_and_angles() -> None:
     assembly = assemble(hinged_askew(0.0))
     equations = assembly.reduced
-    (gap,) = find_gaps(assembly, equations, 0.0, np.array([0.3]))
+    (gap,) = find_gaps(assembly, equations, 0.0, np.array([0.3]), 1.0)
     assert gap.distance == pytest.approx(2.0 * math.sin(0.15), rel=1e-12)  # the chord that the bar's end went
     assert gap.angle < 1e-12
 

@@ -55,13 +55,12 @@ def integrable_together(mechanism: Mechanism, equations: Equations) -> bool | No
     # How forms and fields change along each field, one sweep each.
     moving = [*forms.ravel(), *(component for field in fields for component in field[1])]
     changes = [jvp(moving, field[0]) for field in fields]
-    numbers = Places(equations, equations.time).values(
-        mechanism, [*moving, *(entry for change in changes for entry in change)]
-    )
+    places = Places(equations, equations.time)
+    numbers = places.values(mechanism, [*moving, *(entry for change in changes for entry in change)])
     if len(numbers) < NEEDED:
         return None
-    q = len(equations.coordinates)
-    return all(_vanishes(row, m, n + 1, q) for row in numbers)
+    sizes, q = places.sizes(mechanism), len(equations.coordinates)
+    return all(_vanishes(row, sizes, m, q) for row in numbers)
 
 
 def _fields(equations: Equations) -> list[tuple[dict[Expression, Expression | float], list[Expression]]]:
@@ -81,8 +80,12 @@ def _fields(equations: Equations) -> list[tuple[dict[Expression, Expression | fl
     return found
 
 
-def _vanishes(numbers: FloatArray, m: int, fields: int, q: int) -> bool:
-    """Return whether the derivatives of forms vanish on the directions that the forms leave, at one place."""
+def _vanishes(numbers: FloatArray, sizes: FloatArray, m: int, q: int) -> bool:
+    """Return whether the derivatives of forms vanish on the directions that the forms leave, at one place.
+
+    Displacements along the fields are counted in their sizes, and each form in that of its largest coefficient.
+    """
+    fields = len(sizes)
     moving, changes = numbers[: m * fields + fields * q], numbers[m * fields + fields * q :]
     changes = changes.reshape(fields, len(moving))
     forms, components = moving[: m * fields].reshape(m, fields), moving[m * fields :].reshape(fields, q)
@@ -94,8 +97,11 @@ def _vanishes(numbers: FloatArray, m: int, fields: int, q: int) -> bool:
     along = weights.T.reshape(fields, fields, fields - 1)
     left = of_forms.transpose(1, 0, 2)
     derivatives = left - left.transpose(0, 2, 1) - np.einsum("kl,ijl->kij", forms[:, :-1], along)
-    _, sizes, directions = np.linalg.svd(forms / np.maximum(np.max(np.abs(forms), axis=1, keepdims=True), 1e-300))
-    free = directions[int(np.sum(sizes > 1e-9)) :]
+    forms, both = forms * sizes, np.outer(sizes, sizes)
+    units = np.maximum(np.max(np.abs(forms), axis=1), 1e-300)
+    left, derivatives = (one * both / units[:, None, None] for one in (left, derivatives))
+    _, strengths, directions = np.linalg.svd(forms / units[:, None])
+    free = directions[int(np.sum(strengths > 1e-9)) :]
     rest = np.einsum("ai,kij,bj->kab", free, derivatives, free)
-    largest = max(float(np.max(np.abs(left), initial=0.0)), float(np.max(np.abs(forms))))
+    largest = max(float(np.max(np.abs(left), initial=0.0)), 1.0)
     return bool(np.max(np.abs(rest), initial=0.0) <= _NOTHING * largest)

@@ -21,7 +21,7 @@ from atwood.mechanics.elimination import SOLVED, eliminate_linear
 from atwood.mechanics.equations import Integral, put_in_place
 from atwood.mechanics.forces import Site, local_map
 from atwood.mechanics.inertia import Masses
-from atwood.mechanics.mechanism import Mechanism, decide
+from atwood.mechanics.mechanism import Mechanism, decide, extent
 from atwood.mechanics.motion import Motion, Movement
 from atwood.mechanics.pfaffian import (
     NEEDED,
@@ -134,11 +134,12 @@ def _held_still(
     made: list[Integral] = []
     assert mechanism.places is not None
     start = {**table.values, **mechanism.places["reduced"]}
+    state: Movement | None = None
     for number, (path, one, given) in enumerate(values):
         if given is SOLVED:
             continue
         value = substitute([given], solution)[0] if solution else given
-        state = motion.finish(solution)
+        state = state or motion.finish(solution)
         alone = (
             None
             if switches([value])
@@ -148,7 +149,8 @@ def _held_still(
             continue
         symbol = state.coordinates[alone]
         (slope,) = jvp([value], {symbol: 1.0})
-        near, away = (evaluate([slope], {**start, symbol: start[symbol] + far})[0] for far in (0.0, 0.5))
+        step = 0.5 * (extent(mechanism) or 1.0) if state.names[alone].unit == "m" else 0.5
+        near, away = (evaluate([slope], {**start, symbol: start[symbol] + far})[0] for far in (0.0, step))
         if not abs(near) > 1e-3 * abs(away):
             continue
         constant = table.graph.convert(table.scalar(f"place {count + len(made)}", start[symbol]))
@@ -157,6 +159,7 @@ def _held_still(
         values[number] = (path, one, SOLVED)
         made.append(Integral(((path, one.law.name, one.index),), symbol - constant, constant, False))
         start = {**start, **table.values}
+        state = None  # it is another motion now
     return made
 
 
@@ -186,7 +189,7 @@ def _forms(mechanism: Mechanism, site: Site, state: Movement, rolling: OnVelocit
         local = mechanism.locals_[path]
         mapping = local_map(site, local, state.kinematics)
         (form,) = pfaffian_forms(state, [(path, one, put_in_place(one.value, mapping))])
-        velocities = [s for connector in local.connectors.values() for s in (*connector.velocity, *connector.spin)]
+        velocities = local.velocities
         slopes = substitute(vjp([one.value], [one.value.graph.constant(1.0)], velocities), mapping)
         moved = jacobian([mapping.get(s, s) for s in velocities], list(state.speeds))
         terms = tuple((c, slopes[r] * e) for r, c, e in zip(moved.rows, moved.columns, moved.entries, strict=True))

@@ -20,6 +20,10 @@ __all__ = ["Gap", "find_gaps"]
 FloatArray = NDArray[np.float64]
 
 
+_NOTHING = 1e-9
+"""What is less, in radians or as a share of the scene's extent, is rounding."""
+
+
 @dataclass(frozen=True)
 class Gap:
     """What a joint lacks.
@@ -41,12 +45,12 @@ class Gap:
     distance: float
     angle: float
 
-    def describe(self) -> str:
-        """Return the gap in words, as in ``0.1 m`` or ``0.1 m and 3 deg``; without what is rounding beside the rest."""
+    def describe(self, length: float) -> str:
+        """Return the gap in words, as in ``0.1 m`` or ``0.1 m and 3 deg``, without what is rounding."""
         said = []
-        if self.distance > 1e-9 * max(1.0, self.angle):
+        if self.distance > _NOTHING * length * max(1.0, self.angle):
             said.append(f"{self.distance:.4g} m")
-        if self.angle > 1e-9:
+        if self.angle > _NOTHING:
             said.append(f"{np.degrees(self.angle):.4g} deg")
         return " and ".join(said) or "nothing"
 
@@ -55,7 +59,7 @@ class Gap:
         return float(np.hypot(self.distance / length, self.angle))
 
 
-def find_gaps(assembly: Assembly, equations: Equations, t: float, q: FloatArray) -> list[Gap]:
+def find_gaps(assembly: Assembly, equations: Equations, t: float, q: FloatArray, length: float) -> list[Gap]:
     """Return the gaps of all joints that close loops, and of ties, in the order of declaration.
 
     Parameters
@@ -64,6 +68,8 @@ def find_gaps(assembly: Assembly, equations: Equations, t: float, q: FloatArray)
         The scene, in generalized coordinates.
     t, q
         Time and coordinates.
+    length
+        Extent of the scene, m.
     """
     table = assembly.mechanism.table.values
     place = {**table, equations.time: t, **dict(zip(equations.coordinates, np.asarray(q).tolist(), strict=True))}
@@ -82,7 +88,8 @@ def find_gaps(assembly: Assembly, equations: Equations, t: float, q: FloatArray)
         known = {**table, equations.time: t, **numbers}
         lengths = [c.value for c in constraints if c.law.options.unit == "N"]
         turns = [c.value for c in constraints if c.law.options.unit != "N"]
-        found.append(Gap(path, _least(lengths, local, known, _shifted), _least(turns, local, known, _rotated)))
+        distance = _least(lengths, local, known, _shifted, length)
+        found.append(Gap(path, distance, _least(turns, local, known, _rotated, 1.0)))
     return found
 
 
@@ -119,8 +126,11 @@ def _rotated(symbols: LocalConnector, known: Numbers, by: FloatArray) -> dict[Ex
     return found
 
 
-def _least(values: Sequence[Expression], local: LocalPart, known: Numbers, moved: Moved) -> float:
-    """Return the size of the least movement of a connector that makes values zero; without one, their own size."""
+def _least(values: Sequence[Expression], local: LocalPart, known: Numbers, moved: Moved, unit: float) -> float:
+    """Return the size of the least movement of a connector that makes values zero; without one, their own size.
+
+    What counts as one is given by `unit`: the extent of the scene, or a radian.
+    """
     if not values:
         return 0.0
     miss = np.array(evaluate(values, known))
@@ -136,14 +146,14 @@ def _least(values: Sequence[Expression], local: LocalPart, known: Numbers, moved
         def at(d: FloatArray, symbols: LocalConnector = symbols) -> FloatArray:
             return np.array(evaluate(values, {**known, **moved(symbols, known, d)}))
 
-        h = 1e-6 * max(own, 1e-3)
+        h = 1e-6 * max(own, 1e-3 * unit)
         for _ in range(50):
             now = at(by)
-            if float(np.linalg.norm(now)) <= 1e-13 * max(own, 1.0):
+            if float(np.linalg.norm(now)) <= 1e-13 * max(own, unit):
                 break
             slope = np.array([(at(by + h * e) - at(by - h * e)) / (2.0 * h) for e in np.eye(n)]).T
             # Of all movements that would do to first order the least one: not only the least change of this one.
             by = np.linalg.lstsq(slope, slope @ by - now, rcond=1e-9)[0]
-        if float(np.linalg.norm(at(by))) <= 1e-9 * max(own, 1.0) and np.all(np.isfinite(by)):
+        if float(np.linalg.norm(at(by))) <= 1e-9 * max(own, unit) and np.all(np.isfinite(by)):
             return float(np.linalg.norm(by))
     return own

@@ -154,7 +154,8 @@ def find_placement(assembly: Assembly, start: Start) -> Placement:
     if np.array_equal(start.rough, start.coordinates):
         return Placement((), guesses, (), start.length)
     level, _ = sort_targets(assembly, equations)
-    opened = [one for one in find_gaps(assembly, equations, t, start.rough) if one.size(start.length) > _STILL]
+    gaps = find_gaps(assembly, equations, t, start.rough, start.length)
+    opened = [one for one in gaps if one.size(start.length) > _STILL]
     opened.sort(key=lambda one: -one.size(start.length))
     bodies = _Bodies(assembly, equations)
     distances, angles = bodies.apart(t, start.rough, start.coordinates)

@@ -49,7 +49,7 @@ def in_a_line(placement: Placement) -> str:
         text.append(f"placed by the solver, as not all was said of {what}: {_few(placed)}")
     if placement.opened and text:
         first = placement.opened[0]
-        text.append(f"{first.part} was open by {first.describe()}")
+        text.append(f"{first.part} was open by {first.describe(length)}")
     return "; ".join(text)
 
 
@@ -82,7 +82,7 @@ def _tables(placement: Placement) -> Iterator[str]:
         yield from _table(("guess", "asked", "found", "off by", "unit"), guesses)
     if placement.opened:
         yield ""
-        yield from _table(("was open", "by"), [(one.part, one.describe()) for one in placement.opened])
+        yield from _table(("was open", "by"), [(one.part, one.describe(length)) for one in placement.opened])
 
 
 def _found(guess: GuessMet, length: float) -> tuple[str, str]:

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import AtwoodError, KernelEvaluationError, StartError
-from atwood.expr import evaluate
+from atwood.expr import evaluate, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import regular_to_maximal
 from atwood.forms.starting import starting
 from atwood.solve.charts import Reassemble, enter_charts, from_regular, own_names
 from atwood.solve.missing import missing_at
-from atwood.solve.scales import motion_scales, scene_length
+from atwood.solve.scales import coordinate_scales, motion_scales, scene_length
 from atwood.solve.start_positions import solve_positions
 from atwood.solve.start_speeds import solve_speeds
 from atwood.solve.start_targets import sort_targets
@@ -151,9 +151,12 @@ def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
     q = dict(zip(before.coordinates, start.coordinates.tolist(), strict=True))
     u = dict(zip(before.speeds, start.speeds.tolist(), strict=True))
     place = {**assembly.mechanism.table.values, before.time: start.time, **q}
+    sizes = np.maximum(coordinate_scales(before, start.length), np.abs(start.coordinates))
     for one in after.integrals:
         (missed,) = evaluate([one.value], place)
-        if not abs(missed) <= 1e-9 * max(start.length, 1.0, *(abs(value) for value in q.values())):
+        slopes = jacobian([one.value], before.coordinates)
+        terms = np.abs(evaluate(slopes.entries, place)) * sizes[list(slopes.columns)]
+        if not abs(missed) <= 1e-9 * float(np.max(terms, initial=0.0)):
             raise StartError(
                 f"the equations were made for another start, and a constant of integration differs by {missed:g}",
                 where=one.keys[-1][0],

@@ -116,8 +116,13 @@ def _what_stays_open(failed: Failed) -> str:
         return ""
     if np.any(np.abs(best.missing[system.constraints :]) > 1e-6 / _HELD * units[system.constraints :]):
         return ""
-    worst = _largest(find_gaps(failed.assembly, failed.equations, failed.time, best.coordinates), failed.length)
-    return f"; with {'it' if len(fixed) == 1 else 'them'}, {worst.part} stays open by {worst.describe()} at least"
+    worst = _largest(_gaps(failed, best.coordinates), failed.length)
+    by = worst.describe(failed.length)
+    return f"; with {'it' if len(fixed) == 1 else 'them'}, {worst.part} stays open by {by} at least"
+
+
+def _gaps(failed: Failed, q: FloatArray) -> list[Gap]:
+    return find_gaps(failed.assembly, failed.equations, failed.time, q, failed.length)
 
 
 def _largest(gaps: Sequence[Gap], length: float) -> Gap:
@@ -127,13 +132,13 @@ def _largest(gaps: Sequence[Gap], length: float) -> Gap:
 def _open_loop(failed: Failed, system: System, best: Nearest) -> StartError:
     """Return the error that names the loop that cannot close."""
     best = _in_one_joint(failed, system, best)
-    gaps = find_gaps(failed.assembly, failed.equations, failed.time, best.coordinates)
+    gaps = _gaps(failed, best.coordinates)
     worst = _largest(gaps, failed.length)
     others = [one for one in gaps if one is not worst and one.size(failed.length) > 0.01 * worst.size(failed.length)]
     loop = _loop_through(failed.assembly, worst.part)
-    text = f"the loop cannot close here: the nearest position found misses by {worst.describe()}"
+    text = f"the loop cannot close here: the nearest position found misses by {worst.describe(failed.length)}"
     if others:
-        text += f" (and by {', '.join(f'{one.describe()} at {one.part}' for one in others[:4])})"
+        text += f" (and by {', '.join(f'{one.describe(failed.length)} at {one.part}' for one in others[:4])})"
     if loop:
         text += f" (the loop of {', '.join(loop)})"
     lengths = _lengths_that_close(failed, system, best)
@@ -150,7 +155,7 @@ def _in_one_joint(failed: Failed, system: System, best: Nearest) -> Nearest:
     """
     equations = failed.equations
     holding = [one for one in equations.constraints if one.value is not None]
-    gaps = find_gaps(failed.assembly, equations, failed.time, best.coordinates)
+    gaps = _gaps(failed, best.coordinates)
     worst = _largest(gaps, failed.length).part
     others = np.array([one.key[0] != worst for one in holding])
     if not np.any(others):
@@ -212,14 +217,15 @@ def far_from_guess(failed: Failed, found: FloatArray, wrong: Sequence[str]) -> S
     elsewhere = f"guess near to {', '.join(places[:_SHOWN])}{', ...' if len(places) > _SHOWN else ''}."
     if wrong:
         return wrong_way_round(failed, wrong[0], f"It closes the right way elsewhere; {elsewhere}")
-    gaps = find_gaps(assembly, equations, failed.time, failed.nearest)
+    gaps = _gaps(failed, failed.nearest)
     open_ones = [gap for gap in gaps if gap.size(failed.length) > _CLOSED]
     if not open_ones:
         text, where = "what is fixed cannot hold near the guess", (failed.level.fixed or guessed)[0].path
         return StartError(text, where=where, advice=f"It holds elsewhere; {elsewhere}")
     worst = _largest(open_ones, failed.length)
+    by = worst.describe(failed.length)
     return StartError(
-        f"the loop does not close near the guess: the nearest position found there misses by {worst.describe()}",
+        f"the loop does not close near the guess: the nearest position found there misses by {by}",
         where=worst.part,
         advice=f"It closes elsewhere; {elsewhere}",
     )
