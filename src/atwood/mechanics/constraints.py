@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from atwood.errors import UnsupportedError
-from atwood.expr import Expression, depends_on, jvp, substitute
+from atwood.expr import Expression, depends_on, jvp, live, substitute
 from atwood.mechanics.equations import Constraint, Integral, constraint_levels, put_in_place
 from atwood.mechanics.forces import (
     Site,
@@ -58,7 +58,12 @@ class LeftOver:
 
 def holds_velocities(mechanism: Mechanism) -> bool:
     """Return whether a scene has a constraint on velocities."""
-    return any(is_on_velocities(local, one.value) for local in mechanism.locals_.values() for one in local.constraints)
+    for local in mechanism.locals_.values():
+        if local.constraints:
+            read = {node.index for node in live([one.value for one in local.constraints])}
+            if any(symbol.index in read for symbol in local.velocities):
+                return True
+    return False
 
 
 def find_constraints(mechanism: Mechanism, forest: Forest, placements: Placements) -> LeftOver:
@@ -212,10 +217,10 @@ def _differentiated(
     graph, path = site.graph, local.part.path
     directions = _first_directions(local, time)
     mapping = local_map(site, local, kinematics)
-    for symbol, acceleration in kinematics.joint_accelerations.items():
-        if symbol in local.formulas:
-            directions[rate_symbol(symbol)] = graph.symbol(f"{symbol.name}''")
-            mapping[graph.symbol(f"{symbol.name}''")] = acceleration
+    for symbol in local.formulas:
+        if symbol in kinematics.joint_accelerations:
+            changing = directions[rate_symbol(symbol)] = graph.symbol(f"{symbol.name}''")
+            mapping[changing] = kinematics.joint_accelerations[symbol]
     for name, symbols in local.connectors.items():
         node = site.node(path, name)
         body = site.bodies.body_of[node]

@@ -292,11 +292,12 @@ def constraint_forces(
 
 def joint_slopes(local: LocalPart, value: Expression) -> list[tuple[Expression, Expression]]:
     """Return the derivatives of a function with respect to the joint coordinates that it depends on."""
+    if not local.formulas or not depends_on(value, list(local.formulas)):
+        return []
     read = [symbol for symbol in local.formulas if depends_on(value, [symbol])]
-    slopes = vjp([value], [value.graph.constant(1.0)], read) if read else []
-    return list(zip(read, slopes, strict=True))
+    return list(zip(read, vjp([value], [value.graph.constant(1.0)], read), strict=True))
 
 
 def is_on_velocities(local: LocalPart, value: Expression) -> bool:
     """Return whether a constraint is one on velocities, and not on positions."""
-    return depends_on(value, [s for one in local.connectors.values() for s in (*one.velocity, *one.spin)])
+    return depends_on(value, local.velocities)

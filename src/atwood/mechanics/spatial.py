@@ -125,6 +125,7 @@ class _Walk:
         self.nodes: dict[int, _State] = {}
         self.references: dict[int, _State] = {}
         self.known: dict[Expression, Expression] = {}
+        self.charts = {chart.coordinates: chart for chart in forest.charts}
 
     def spread(self, body: Body, node: int, state: _State) -> None:
         """Place all nodes of a body, and its reference point, from one of its nodes."""
@@ -174,7 +175,7 @@ class _Walk:
         """Work out how a body is turned, from its own chart or across its joint."""
         joint, child = attachment.joint, attachment.body
         if attachment.chart:
-            chart = next(one for one in self.forest.charts if one.coordinates == attachment.chart)
+            chart = self.charts[attachment.chart]
             values = [self.course.values[i] for i in chart.coordinates]
             spin = Vector(*(self.course.spins[i] for i in attachment.spin))
             spin_rate = Vector(*(self.course.spin_rates[i] for i in attachment.spin))

@@ -78,11 +78,14 @@ def localize(
     for path, part in flat.parts.items():
         _check_space(path, part, space.name)
     held = find_held(flat)
+    counted: dict[str, set[str]] = {}
+    for one in (one for several in held.values() for one in several):
+        counted.setdefault(one.joint, set()).add(one.coordinate)
     found: dict[str, LocalPart] = {}
     for path in sorted(flat.parts, key=lambda path: path in held):  # joints before what takes hold of them
         taken = [(one, found[one.joint]) for one in held.get(path, ())]
-        counted = {one.coordinate for several in held.values() for one in several if one.joint == path}
-        found[path] = _localize_part(flat.parts[path], flat, space, time, table, modes, sides, taken, counted)
+        part, own = flat.parts[path], counted.get(path, ())
+        found[path] = _localize_part(part, flat, space, time, table, modes, sides, taken, own)
     return {path: found[path] for path in flat.parts}
 
 

@@ -113,7 +113,16 @@ class LocalPart:
     formulas: Mapping[Expression, tuple[Expression, Expression | None]] = field(default_factory=dict)
     borrowed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
+    @property
+    def velocities(self) -> list[Expression]:
+        """The symbols that say how fast its connectors move and turn."""
+        return [symbol for one in self.connectors.values() for symbol in (*one.velocity, *one.spin)]
+
     def is_idle(self, solved: Collection[tuple[str, str, int]]) -> bool:
         """Return whether all that it does is held by constraints, as (part, law, number), that are solved anyhow."""
         keys = [(self.part.path, one.law.name, one.index) for one in self.constraints]
-        return bool(keys) and all(key in solved for key in keys) and not (self.potentials or self.dissipations)
+        return (
+            bool(keys)
+            and all(key in solved for key in keys)
+            and not (self.potentials or self.dissipations or self.loads)
+        )
