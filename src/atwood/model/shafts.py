@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from atwood.errors import ConnectError, DeclarationError, UnsupportedError
+from atwood.errors import ConnectError, DeclarationError, UnsupportedError, suggestion
 from atwood.model.connectors import JointCoordinate
 from atwood.model.flatten import FlatScene
 
@@ -48,17 +48,17 @@ def find_held(flat: FlatScene) -> dict[str, tuple[Held, ...]]:
     ConnectError
         If such a part is connected to no joint, or joints are connected to each other.
     DeclarationError
-        If a joint takes hold of joints itself.
+        If a joint takes hold of joints itself, or offers a coordinate that it does not observe.
     UnsupportedError
         If the coordinate does not exist in the scene's space.
     """
     offered: dict[str, tuple[str, str]] = {}
     wanted: dict[str, tuple[str, str]] = {}
     for path, part in flat.parts.items():
-        for name, one in part.component.connectors().items():
-            if isinstance(one, JointCoordinate):
-                of = part.component.connector_specs()[name.partition("[")[0]].of
-                (offered if of else wanted)[f"{path}.{name}"] = (path, of or name)
+        for spec in part.component.connector_specs().values():
+            if issubclass(spec.kind, JointCoordinate):
+                for name in spec.names(part.component):
+                    (offered if spec.of else wanted)[f"{path}.{name}"] = (path, spec.of or name)
     if not offered and not wanted:
         return {}
     beside: dict[str, list[str]] = {}
@@ -69,6 +69,12 @@ def find_held(flat: FlatScene) -> dict[str, tuple[Held, ...]]:
     for full, (path, name) in wanted.items():
         joint, coordinate = _joint_at(full, beside, offered)
         laws = {law.name: law for law in flat.parts[joint].component.laws("observable")}
+        if coordinate not in laws:
+            raise DeclarationError(
+                f"it offers its coordinate {coordinate!r}, which is none of its observables",
+                where=joint,
+                advice=suggestion(coordinate, laws) or f"Give it an @observable of the name {coordinate!r}.",
+            )
         if not laws[coordinate].holds_in(flat.space):
             where = "on a line" if flat.space == "line" else f"in a {flat.space}"
             raise UnsupportedError(f"{where} the joint {joint} has no {coordinate}", where=full)
@@ -82,15 +88,18 @@ def find_held(flat: FlatScene) -> dict[str, tuple[Held, ...]]:
 
 def _joint_at(full: str, beside: Mapping[str, list[str]], offered: Mapping[str, tuple[str, str]]) -> tuple[str, str]:
     """Return the joint, and the name of its coordinate, that a connector is connected to."""
-    met = [full]
-    for one in met:  # grows while it is walked
-        met += [other for other in beside.get(one, ()) if other not in met]
+    met = {full: None}
+    waiting = [full]
+    for one in waiting:  # grows while it is walked
+        new = [other for other in beside.get(one, ()) if other not in met]
+        met.update(dict.fromkeys(new))
+        waiting += new
     joints = [one for one in met if one in offered]
     if len(joints) > 1:
         raise ConnectError(
             f"the joints {offered[joints[0]][0]} and {offered[joints[1]][0]} are connected to each other by it",
             where=joints[0],
-            advice="Put a Gear with ratio 1 between them.",
+            advice="Put a gear with ratio 1 between them.",
         )
     if not joints:
         raise ConnectError(
