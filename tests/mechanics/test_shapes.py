@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -226,6 +227,19 @@ def test_files_are_kept_and_may_be_others(tmp_path: Path) -> None:
     assert larger.why_new == ""
     (mass,) = report(larger).bodies
     assert mass.mass == pytest.approx(8.0 * 10.0 / 6.0, rel=1e-12)
+
+
+def test_a_file_is_looked_for_where_the_program_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files of one name, one size and one date in two folders are two files."""
+    for name, height in (("low", 0.1), ("high", 0.2)):
+        (tmp_path / name).mkdir()
+        write_binary(tmp_path / name / "egg.stl", ellipsoid_mesh(0.1, 0.1, height, 6))
+        os.utime(tmp_path / name / "egg.stl", ns=(10**18, 10**18))
+    part, masses = MeshBody(file="egg.stl", density=1.0), []
+    for name in ("low", "high"):
+        monkeypatch.chdir(tmp_path / name)
+        masses.append(part.total_mass())
+    assert masses[1] == pytest.approx(2.0 * masses[0], rel=1e-6)
 
 
 # -- welded together ----------------------------------------------------------------------------------------------

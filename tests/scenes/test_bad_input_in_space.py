@@ -11,6 +11,7 @@ from atwood import Component, Scene
 from atwood.errors import AtwoodError, ParameterError, StartError, TopologyError
 from atwood.pipeline import assemble, simulate
 from atwood.reporting import report
+from atwood.solve.immobile import Immobile
 from atwood_library import (
     Cylindrical,
     Force,
@@ -19,7 +20,9 @@ from atwood_library import (
     PointMass,
     RigidBody,
     Rod,
+    RollingSphere,
     Slider,
+    Sphere,
     Spherical,
     Spring,
     Torque,
@@ -193,6 +196,27 @@ def test_a_structure_carries_its_load_and_says_that_it_is_one(form: str, rods: i
     tension = 3.0 * 9.81 * math.sqrt(2.0) / rods  # each carries its share at 45 degrees
     for i in range(rods):
         assert result.array(f"rod{i}.tension")[0] == pytest.approx(tension, rel=1e-9)
+
+
+def test_what_was_not_tried_is_not_claimed() -> None:
+    assert "it is not tried what would happen" in Immobile(None, 0).describe()
+    assert Immobile(None, 0).to_dict() == {"freed": None, "surplus": 0}
+    assert "it takes more than one of them" in Immobile((), 1).describe()
+
+
+def test_nothing_rolls_on_a_line() -> None:
+    scene = Scene(space="line")
+    ground, contact = scene.add("ground", Ground()), scene.add("contact", RollingSphere())
+    ball = scene.add("ball", Sphere())
+    scene.connect(ground.frame, contact.a)
+    scene.connect(contact.b, ball.frame)
+    with pytest.raises(AtwoodError, match="contact: RollingSphere exists in a plane and in space only"):
+        assemble(scene)
+
+
+def test_a_cone_that_is_no_stop() -> None:
+    with pytest.raises(AtwoodError, match="bend_stop"):
+        Spherical(bend_stop=math.pi)
 
 
 def test_what_moves_is_not_called_immobile() -> None:

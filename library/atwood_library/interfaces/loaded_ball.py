@@ -40,7 +40,11 @@ class LoadedBall(Component):
         (0.0, 0.0, 1.0), direction=True, doc="Axis of the cone in frame a, and what stays within it in frame b."
     )
     bend_stop: float | None = parameter(
-        None, unit="rad", above=0.0, doc="Angle between the axes at which the stop acts, below pi; none if not given."
+        None,
+        unit="rad",
+        above=0.0,
+        maximum=3.1,
+        doc="Angle between the axes at which the stop acts; none if not given.",
     )
     motor_x: float = signal(0.0, unit="N*m", doc="Torque on frame b along x of frame a, and against frame a.")
     motor_y: float = signal(0.0, unit="N*m", doc="Torque on frame b along y of frame a, and against frame a.")

@@ -31,6 +31,8 @@ class Rolling(Component):
     may itself move. Nothing keeps the body from pulling: a negative `normal_force` says that it would lift off.
     """
 
+    spaces = ("plane", "space")
+
     radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius.")
     normal: tuple[float, float, float] = parameter(
         (0.0, 0.0, 1.0), direction=True, doc="Normal of the plane in frame a, towards the body."

@@ -31,7 +31,7 @@ class MeshBody(Shape):
         return self._read()[1]
 
     def _read(self) -> tuple[TriangleMesh, MassProperties]:
-        path = Path(self.file)
+        path = Path(self.file).absolute()  # a relative one means another file from another folder
         try:
             known = os.stat(path)
             return _read(str(path), known.st_mtime_ns, known.st_size)

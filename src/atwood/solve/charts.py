@@ -27,6 +27,7 @@ __all__ = [
     "enter_charts",
     "from_regular",
     "longest_step",
+    "own_names",
     "restated",
     "to_regular",
 ]
@@ -36,7 +37,6 @@ Reassemble = Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float], 
 
 CHART = "chart"
 """Target of the event that a chart is to be left."""
-
 
 _NEARLY = 0.95
 """What is so near to where a chart is left leaves it with another that is there."""

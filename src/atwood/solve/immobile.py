@@ -32,11 +32,13 @@ class Immobile:
     ----------
     freed
         Joint laws and ties with the degrees of freedom that there would be without each; those that give fewest first.
+        None where there are too many to try each.
     surplus
-        How many of its constraints follow from the others, so that their reactions are not unique.
+        How many of its constraints follow from the others, so that their reactions are not unique; 0 where that was
+        not looked at.
     """
 
-    freed: tuple[tuple[str, int], ...]
+    freed: tuple[tuple[str, int], ...] | None
     surplus: int
 
     def describe(self) -> str:
@@ -44,7 +46,9 @@ class Immobile:
         text = "nothing can move: joints and ties hold every body where it is"
         if self.surplus:
             text += f", {self.surplus} of their constraints to spare"
-        if self.freed:
+        if self.freed is None:
+            text += f" (with more than {LARGEST_FULL} speeds it is not tried what would happen if one let go)"
+        elif self.freed:
             ways = [f"{name} ({count})" for name, count in self.freed[:_SHOWN]]
             more = len(self.freed) - _SHOWN
             text += f"; degrees of freedom if one let go: {', '.join(ways)}" + (f" and {more} more" if more > 0 else "")
@@ -54,7 +58,10 @@ class Immobile:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {"freed": [{"path": path, "degrees_of_freedom": n} for path, n in self.freed], "surplus": self.surplus}
+        freed = None
+        if self.freed is not None:
+            freed = [{"path": path, "degrees_of_freedom": count} for path, count in self.freed]
+        return {"freed": freed, "surplus": self.surplus}
 
 
 def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | None:
@@ -76,7 +83,7 @@ def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | 
     if equations.prescribed or any(depends_on(value, [equations.time]) for value in values):
         return None  # driven
     if len(equations.speeds) > LARGEST_FULL:
-        return Immobile((), 0)
+        return Immobile(None, 0)
     scales = motion_scales(equations, start.length)
     q, _ = maximal_state(assembly, start)
     slope = to_array(balance_of(assembly, "dae").at(start.time, q, np.zeros_like(scales)).slope)
