@@ -13,7 +13,7 @@ from atwood import expr as ex
 from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.kernels import compile_native, compile_program
 from atwood.kernels.llvm_engine import sincos_name
-from atwood.kernels.llvm_module import CodeOptions
+from atwood.kernels.llvm_module import CodeOptions, Part, write_module
 from atwood.pipeline import assemble
 from atwood_library.scenes import SCENES
 
@@ -286,6 +286,23 @@ def test_chunks_change_no_value():
         cut = compile_native(program, cache=False, options=CodeOptions(longest_chunk=longest, level=level))
         assert cut.scratch > 0
         np.testing.assert_allclose(cut.bind([0.3])([0.2]), expected, rtol=1e-14)
+
+
+def test_results_that_are_inputs_or_constants_are_stored_in_pieces():
+    # one long function of stores takes LLVM many times as long as all the rest
+    graph = ex.Graph()
+    x = tuple(graph.symbol(f"x{i}") for i in range(700))
+    out = (*x, ex.sin(x[0]), *(graph.one for _ in range(900)), x[3] * x[4], *reversed(x))
+    program = ex.Program("passed on", (ex.InputGroup("x", x),), (), (ex.OutputGroup("out", out),))
+    text = write_module([Part("kernel", program)], CodeOptions(sincos=sincos_name())).text
+    assert max(function.count("store double") for function in text.split("define ")) <= 300
+    numbers = np.linspace(0.5, 1.5, len(x))
+    found = compile_native(program, cache=False).bind([])(numbers)[0]
+    expected = [*numbers, math.sin(0.5), *[1.0] * 900, numbers[3] * numbers[4], *numbers[::-1]]
+    assert found == pytest.approx(expected, rel=1e-15)
+    numbers[600] = math.nan
+    with pytest.raises(KernelEvaluationError, match=r"out\[600\]"):
+        compile_native(program, cache=False).bind([])(numbers)
 
 
 def test_many_threads_call_one_kernel_at_once():

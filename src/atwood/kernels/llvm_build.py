@@ -12,9 +12,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from atwood.errors import UnsupportedError
 from atwood.expr.operations import ExternalFunction
 from atwood.kernels.cache import Cache, default_cache, make_key
@@ -123,13 +120,10 @@ def build_code(
     failures = Failures() if module.externals else None
     callbacks = _callbacks(module, failures) if failures is not None else {}
     addresses = {name: ctypes.cast(call, ctypes.c_void_p).value or 0 for name, call in callbacks.items()}
-    tables = None if module.tables is None else module.tables.arrays()
-    loaded = _load(code, names, require_symbols(functions) | addresses, tuple(callbacks.values()), tables)
+    loaded = load_code(code, names, require_symbols(functions) | addresses, tuple(callbacks.values()))
     if store is not None:
-        sizes = [] if tables is None else [one.nbytes for one in tables]
-        about = {"scratch": module.scratch, "library": functions, "tables": sizes}
-        data = b"" if tables is None else b"".join(one.tobytes() for one in tables)
-        store.write(key, json.dumps(about).encode() + b"\n" + data + code)
+        about = {"scratch": module.scratch, "library": functions}
+        store.write(key, json.dumps(about).encode() + b"\n" + code)
     return Built(loaded, module.scratch, False, failures)
 
 
@@ -141,32 +135,10 @@ def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
     line, _, code = content.partition(b"\n")
     try:
         about = json.loads(line)
-        tables = None
-        if about["tables"]:
-            first, second = about["tables"]
-            integers = np.frombuffer(code[:first], dtype=np.int32)
-            tables = (integers, np.frombuffer(code[first : first + second], dtype=np.float64))
-            code = code[first + second :]
-        loaded = _load(code, names, require_symbols(about["library"]), (), tables)
+        loaded = load_code(code, names, require_symbols(about["library"]), ())
         return Built(loaded, int(about["scratch"]), True, None)
     except (ValueError, KeyError, TypeError, RuntimeError, UnsupportedError):
         return None
-
-
-def _load(
-    code: bytes,
-    names: Sequence[str],
-    imports: dict[str, int],
-    kept: tuple[object, ...],
-    tables: tuple[NDArray[np.int32], NDArray[np.float64]] | None,
-) -> LoadedCode:
-    """Put object code into memory, and give its loops what they work on."""
-    if tables is None:
-        return load_code(code, names, imports, kept)
-    loaded = load_code(code, [*names, "use_tables"], imports, (*kept, *tables))
-    use = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(loaded.addresses.pop("use_tables"))
-    use(*(one.ctypes.data for one in tables))
-    return loaded
 
 
 def _key(parts: Sequence[Part], options: CodeOptions, more: str) -> str:
@@ -179,7 +151,7 @@ def _sources() -> str:
     """Return a hash of the files that write code, so that no change to them goes unnoticed."""
     total = sha256()
     here = Path(__file__).parent
-    for path in sorted([*here.glob("llvm_*.py"), *here.glob("rolled*.py")]):
+    for path in sorted(here.glob("llvm_*.py")):
         try:
             total.update(path.read_bytes())
         except OSError:

@@ -24,17 +24,18 @@ from atwood.expr.graph import Expression
 from atwood.expr.operations import ExternalFunction
 from atwood.expr.program import Program
 from atwood.kernels.llvm_layout import Body, Layout, lay_out, main_body, prologue_body
-from atwood.kernels.llvm_rolled import Tables, write_rolled, write_table_functions
 from atwood.kernels.llvm_solve import ROUTINES, Solver
 from atwood.kernels.llvm_text import LIBRARY_FUNCTIONS, Needs, Writer
 from atwood.kernels.llvm_unit import opening, write_unit
-from atwood.kernels.rolled import roll_large
 
 __all__ = ["CodeOptions", "ModuleText", "Part", "write_module"]
 
 _ARGUMENTS = (
     "ptr noalias readonly %inputs, ptr noalias readonly %derived, ptr noalias %scratch, ptr noalias readonly %outputs"
 )
+_STORES = 300
+"""So many results that are inputs or constants are stored in one function: more, and LLVM takes far longer for them."""
+
 _PASSED = "ptr %inputs, ptr %derived, ptr %scratch, ptr %outputs"
 
 
@@ -59,7 +60,6 @@ class CodeOptions:
     level: int = 1
     sincos: str = ""
     contract: bool = False
-    rolled_from: int = 6_000
 
 
 @dataclass(frozen=True)
@@ -76,15 +76,12 @@ class ModuleText:
         The functions of the C library that it calls.
     externals
         The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
-    tables
-        What its loops work on; ``use_tables`` must be called with them. None if there are no loops.
     """
 
     text: str
     scratch: int
     library: tuple[str, ...]
     externals: tuple[tuple[ExternalFunction, int], ...]
-    tables: Tables | None = None
 
 
 @dataclass(frozen=True)
@@ -132,18 +129,11 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
     """
     needs = Needs()
     parts: list[str] = []
-    tables: Tables | None = None
     scratch = 0
     for part in programs:
         name, program = part.name, part.program
         bodies = ((name, main_body(program, part.positions)), (f"{name}_values", prologue_body(program)))
         for function, body in bodies:
-            rolled = roll_large(body, options.rolled_from) if program.size >= options.rolled_from else None
-            if rolled is not None:
-                tables = tables or Tables()
-                parts.extend(write_rolled(function, rolled, options.sincos, needs, tables))
-                scratch = max(scratch, rolled.scratch)
-                continue
             layout = lay_out(body, options.longest_chunk)
             scratch = max(scratch, layout.scratch)
             try:
@@ -155,12 +145,10 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
     if options.contract:
         parts = [_contracted(text) for text in parts]
     parts.append(more)
-    if tables is not None:
-        parts.append(write_table_functions())
     if needs.elimination:
         parts.append(ROUTINES)
     parts.extend(_declarations(needs, options.sincos))
-    return ModuleText("\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals), tables)
+    return ModuleText("\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals))
 
 
 def _contracted(text: str) -> str:
@@ -184,25 +172,37 @@ def _write_function(
     held = frozenset(f"out{group}" for group in whole.packed) if whole is not None else frozenset()
     solver = Solver(layout.regions)
     parts: list[str] = []
+    computed = {node.index for chunk in layout.chunks for unit in chunk for node in unit}
+    passed_on = [
+        (node, target) for index, node in results.items() if index not in computed for target in targets[index]
+    ]
+    cuts = range(0, len(passed_on), _STORES) if len(passed_on) > _STORES else ()
+    pieces = [passed_on[k : k + _STORES] for k in cuts]
+    alone = len(layout.chunks) == 1 and not pieces
     for number, chunk in enumerate(layout.chunks):
-        writer = Writer(places, options.sincos, needs, held)
+        writer = Writer(places, options.sincos, needs, held if alone else frozenset())
         solver.start_chunk()
         for unit in chunk:
             write_unit(writer, solver, unit)
             for node in unit:
                 if node.index in layout.slots:
                     writer.store(writer.value(node), "scratch", layout.slots[node.index])
-                if results.pop(node.index, None) is not None:
+                if node.index in results:
                     _write_result(writer, node, targets[node.index])
-        if number == len(layout.chunks) - 1:
-            for node in results.values():
+        if number == len(layout.chunks) - 1 and not pieces:
+            for node in (one for index, one in results.items() if index not in computed):
                 _write_result(writer, node, targets[node.index])
-        if whole is not None:
-            _pack(writer, whole.lanes)
-        if len(layout.chunks) == 1:
+        if alone:
+            if whole is not None:
+                _pack(writer, whole.lanes)
             return [_as_function(name, writer)]
         parts.append(_as_chunk(f"{name}.{number}", writer))
-    parts.append(_write_calls(name, len(layout.chunks)))
+    for piece in pieces:
+        writer = Writer(places, options.sincos, needs, frozenset())
+        for node, target in piece:
+            _write_result(writer, node, [target])
+        parts.append(_as_chunk(f"{name}.{len(parts)}", writer))
+    parts.append(_write_calls(name, len(parts)))
     return parts
 
 
