@@ -33,7 +33,9 @@ def main() -> None:
 
     \b
     atwood list                          the scenes there are
+    atwood list --parts                  the parts they are made of
     atwood info four-bar                 bodies, joints, freedom, equations
+    atwood info Pivot                    connectors, parameters, quantities
     atwood run double-pendulum           its motion and its forces
     atwood compare double-pendulum       what each form costs for which error
     atwood sweep double-pendulum --vary mass2=0.5:2:16
@@ -59,10 +61,16 @@ def _scene_options(function: F) -> F:
 
 
 @main.command("list", short_help="List the scenes of the installed libraries.")
+@click.option("--parts", is_flag=True, help="List the parts instead: bodies, joints, forces, sensors.")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output.")
 @reporting_errors
-def list_command(as_json: bool) -> None:
-    """List the scenes of the installed libraries."""
+def list_command(parts: bool, as_json: bool) -> None:
+    """List the scenes of the installed libraries, or the parts that they are made of."""
+    if parts:
+        from atwood.cli.parts import list_parts
+
+        list_parts(as_json)
+        return
     from atwood.cli.listing import list_scenes
 
     list_scenes(as_json)
@@ -85,8 +93,16 @@ _ORIENTATION = click.option(
 def info_command(
     scene: str, settings: tuple[str, ...], starts: tuple[str, ...], as_json: bool, moved: bool, orientation: str
 ) -> None:
-    """Say what SCENE is made of: bodies, joints, freedom, constraints, and what its equations cost."""
+    """Say what SCENE is made of: bodies, joints, freedom, constraints, and what its equations cost.
+
+    With the name of a part, such as Pivot: its connectors, parameters, inputs and quantities.
+    """
     from atwood.cli.info import show_info
+    from atwood.cli.parts import looks_like_a_part, show_part
+
+    if looks_like_a_part(scene):
+        show_part(scene, as_json, changed=bool(settings or starts or moved))
+        return
 
     show_info(scene, settings, starts, as_json, moved, orientation)
 

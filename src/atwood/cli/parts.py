@@ -1,0 +1,197 @@
+"""`atwood list --parts` and `atwood info PART`: the parts of the libraries, and what each of them has."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from atwood.cli.libraries import all_libraries
+from atwood.cli.output import console, print_json
+from atwood.errors import UsageError, near_matches, suggestion
+
+if TYPE_CHECKING:
+    from atwood.model.component import Component
+
+__all__ = ["library_parts", "list_parts", "looks_like_a_part", "show_part"]
+
+_EVERYWHERE = ("line", "plane", "space")
+
+
+def looks_like_a_part(text: str) -> bool:
+    """Return whether a word is written as the classes of parts are, and not as scenes or files."""
+    return text.isidentifier() and text[0].isupper()
+
+
+def library_parts() -> dict[str, type[Component]]:
+    """Return the parts that the installed libraries offer, by name, in the order of where they are defined."""
+    from atwood.model.component import Component
+
+    found: dict[str, type[Component]] = {}
+    for library in all_libraries():
+        try:
+            module = importlib.import_module(library)
+        except ImportError as error:
+            raise UsageError(f"the library cannot be loaded ({error})", where=library) from error
+        offered = [getattr(module, name) for name in getattr(module, "__all__", ())]
+        kinds = [kind for kind in offered if isinstance(kind, type) and issubclass(kind, Component)]
+        for kind in sorted(kinds, key=lambda kind: kind.__module__):
+            found.setdefault(kind.__name__, kind)
+    return found
+
+
+def list_parts(as_json: bool) -> None:
+    """Show the parts of the installed libraries, with one line each.
+
+    Parameters
+    ----------
+    as_json
+        Whether to write JSON.
+    """
+    parts = library_parts()
+    if as_json:
+        print_json({"parts": [{"name": name, "summary": _said(kind)[0]} for name, kind in parts.items()]})
+        return
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_column(style="cyan", no_wrap=True)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    before = ""
+    for name, kind in parts.items():
+        group = kind.__module__.split(".")[-2]
+        table.add_row("" if group == before else group, name, Text(_said(kind)[0]))
+        before = group
+    console().print(table)
+
+
+def show_part(name: str, as_json: bool, changed: bool = False) -> None:
+    """Show what a part has: connectors, parameters, inputs, and the quantities that results have of it.
+
+    Parameters
+    ----------
+    name
+        The name of its class.
+    as_json
+        Whether to write JSON.
+    changed
+        Whether options were given that only a scene has.
+
+    Raises
+    ------
+    UsageError
+        If no library has such a part, or something of it is to be changed.
+    """
+    kinds = library_parts()
+    if name not in kinds:
+        raise _no_such_part(name, kinds)
+    if changed:
+        raise UsageError(
+            "--set, --start and --moved are for scenes, and this is a part", where=name, advice="Leave them out."
+        )
+    kind = kinds[name]
+    tables = {heading: rows for heading, rows in _tables(kind) if rows}
+    if as_json:
+        print_json({"part": name, "spaces": kind.spaces, "text": " ".join(_said(kind)), **tables})
+        return
+    from rich.table import Table
+    from rich.text import Text
+
+    out = console()
+    out.print(Text.assemble((name, "bold"), _only_in(kind.spaces)))
+    out.print(Text("\n".join(_said(kind))))
+    for heading, rows in tables.items():
+        table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
+        for column in rows[0]:
+            table.add_column(heading if column == "name" else column, no_wrap=column != "meaning")
+        for row in rows:
+            table.add_row(*(Text(value) for value in row.values()))
+        out.print()
+        out.print(table)
+
+
+def _no_such_part(name: str, kinds: Iterable[str]) -> UsageError:
+    """Return the error for a name that is no part; it may be the class of a scene."""
+    from atwood.cli.scenes import bundled_scenes
+
+    scene = next((scene for scene, kind in bundled_scenes().items() if kind.__name__ == name), "")
+    advice = suggestion(name, kinds) if near_matches(name, kinds) else "See `atwood list --parts`."
+    return UsageError("there is no such part", where=name, advice=f"The scene is {scene!r}." if scene else advice)
+
+
+def _tables(kind: type[Component]) -> Iterator[tuple[str, list[dict[str, str]]]]:
+    """Yield the headings and rows of what a part has."""
+    yield (
+        "connectors",
+        [
+            {"name": f"{name}[...]" if one.count else name, "kind": one.kind.__name__, "meaning": one.doc}
+            for name, one in kind.connector_specs().items()
+        ],
+    )
+    yield (
+        "parameters",
+        [
+            {"name": name, "default": _value(one), "unit": _unit(one.unit.text), "meaning": one.doc}
+            for name, one in kind.parameter_specs().items()
+        ],
+    )
+    yield (
+        "inputs",
+        [{"name": name, "unit": _unit(one.unit.text), "meaning": one.doc} for name, one in kind.signal_specs().items()],
+    )
+    yield "quantities", list(_quantities(kind))
+    yield "parts", list(_own_parts(kind))
+
+
+def _own_parts(kind: type[Component]) -> Iterator[dict[str, str]]:
+    """Yield the parts of a part that is made of others; their quantities are read as ``part.quantity``."""
+    from atwood.model.composite import Model
+
+    if issubclass(kind, Model):
+        for name, part in kind().parts.items():
+            yield {"name": name, "kind": type(part).__name__, "meaning": _said(type(part))[0]}
+
+
+def _quantities(kind: type[Component]) -> Iterator[dict[str, str]]:
+    """Yield what results have of a part: what it observes, and the reactions of its constraints."""
+    for law in kind.laws("observable"):
+        options: Any = law.options
+        yield {"name": law.name, "unit": _unit(options.unit), "meaning": options.doc + _only_in(options.spaces)}
+    for law in kind.laws("constraint"):
+        options = law.options
+        for reaction in options.reactions:
+            yield {"name": reaction, "unit": _unit(options.unit), "meaning": options.doc + _only_in(options.spaces)}
+
+
+def _value(one: Any) -> str:
+    """Return the default of a parameter as a reader writes it."""
+    from atwood.model.deferred import Deferred
+    from atwood.model.fields import MISSING
+
+    if one.default is MISSING:
+        return "required"
+    if one.default is None:
+        return "none"
+    if isinstance(one.default, Deferred):
+        return "follows"
+    if isinstance(one.default, tuple):
+        return f"({', '.join(f'{number:g}' for number in one.default)})"
+    chosen = one.default if isinstance(one.default, str) else f"{one.default:g}"
+    return f"{chosen} of {', '.join(one.choices)}" if one.choices else chosen
+
+
+def _unit(text: str) -> str:
+    return "" if text == "1" else text
+
+
+def _only_in(spaces: Sequence[str]) -> str:
+    """Return where alone something exists, or nothing if it exists everywhere."""
+    return "" if set(spaces) == set(_EVERYWHERE) else f" ({' and '.join(spaces)} only)"
+
+
+def _said(kind: type) -> list[str]:
+    """Return what a class says about itself, line by line."""
+    lines = (kind.__doc__ or "").strip().split("\n")
+    return [line.strip() for line in lines]

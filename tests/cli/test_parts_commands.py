@@ -1,0 +1,82 @@
+"""Looking up parts by the command line: what there is, and what each has."""
+
+import json
+
+import pytest
+from click.testing import CliRunner, Result
+
+import atwood_library
+from atwood import Component
+from atwood.cli import main
+
+PARTS = [name for name in atwood_library.__all__ if issubclass(getattr(atwood_library, name), Component)]
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, arguments, catch_exceptions=False)
+
+
+def test_every_part_is_listed_with_a_line() -> None:
+    listed = json.loads(run("list", "--parts", "--json").output)["parts"]
+    assert sorted(one["name"] for one in listed) == sorted(PARTS)
+    assert all(one["summary"].endswith(".") for one in listed)
+    text = run("list", "--parts").output
+    assert all(name in text for name in PARTS)
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_every_part_says_what_it_has(name: str) -> None:
+    kind = getattr(atwood_library, name)
+    data = json.loads(run("info", name, "--json").output)
+    assert [one["name"] for one in data.get("parameters", [])] == list(kind.parameter_specs())
+    assert [one["name"].removesuffix("[...]") for one in data.get("connectors", [])] == list(kind.connector_specs())
+    assert [one["name"] for one in data.get("inputs", [])] == list(kind.signal_specs())
+    text = run("info", name).output
+    for heading in ("connectors", "parameters", "inputs", "quantities", "parts"):
+        assert all(one["name"] in text for one in data.get(heading, []))
+
+
+def test_a_hinge_has_its_quantities_with_units_and_spaces() -> None:
+    data = json.loads(run("info", "Pivot", "--json").output)
+    units = {one["name"]: one["unit"] for one in data["quantities"]}
+    assert units == {
+        "angle": "rad", "angular_velocity": "rad/s", "torque": "N*m", "force": "N", "bearing_1": "N*m",
+        "bearing_2": "N*m",
+    }  # fmt: skip
+    meanings = {one["name"]: one["meaning"] for one in data["quantities"]}
+    assert meanings["angle"].endswith("(plane and space only)")
+    assert meanings["torque"].endswith("(space only)")
+    assert not meanings["force"].endswith("only)")
+
+
+def test_defaults_are_written_as_a_reader_would() -> None:
+    def default(part: str, name: str) -> str:
+        rows = json.loads(run("info", part, "--json").output)["parameters"]
+        return next(one["default"] for one in rows if one["name"] == name)
+
+    assert default("MeshBody", "file") == "required"
+    assert default("Pivot", "axis") == "(0, -1, 0)"
+    assert default("Box", "density") == "none"
+    assert default("Rope", "starts") == "taut of taut, slack"
+
+
+def test_a_part_made_of_parts_names_them() -> None:
+    parts = json.loads(run("info", "Wheel", "--json").output)["parts"]
+    assert {one["name"]: one["kind"] for one in parts} == {
+        "bearing": "Pivot", "rim": "Rim", "contact": "RollingDisc"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("Pivott",), "Pivott: there is no such part. Did you mean 'Pivot'?"),
+        (("Zzz",), "See `atwood list --parts`."),
+        (("LagrangeTop",), "The scene is 'lagrange-top'."),
+        (("Pivot", "--set", "stiffness=1"), "this is a part"),
+    ],
+)
+def test_what_is_no_part_is_refused(arguments: tuple[str, ...], said: str) -> None:
+    result = run("info", *arguments)
+    assert result.exit_code != 0
+    assert said in result.output
