@@ -13,6 +13,7 @@ from atwood.pipeline import assemble, simulate
 from atwood.reporting import report
 from atwood.solve.immobile import Immobile
 from atwood_library import (
+    Bar,
     Cylindrical,
     Force,
     Ground,
@@ -196,6 +197,19 @@ def test_a_structure_carries_its_load_and_says_that_it_is_one(form: str, rods: i
     tension = 3.0 * 9.81 * math.sqrt(2.0) / rods  # each carries its share at 45 degrees
     for i in range(rods):
         assert result.array(f"rod{i}.tension")[0] == pytest.approx(tension, rel=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e9])
+@pytest.mark.parametrize("form", FORMS)
+def test_slender_bars_on_hinges_have_inertia_at_any_size(size: float, form: str) -> None:
+    """What a hinge holds does not turn, however long the bar is beside a radian."""
+    scene = Scene(space="space", gravity=9.81 * size)
+    ground, hinge = scene.add("ground", Ground()), scene.add("hinge", Pivot())
+    bar = scene.add("bar", Bar(length=size, axis="x"))
+    scene.connect(ground.frame, hinge.a)
+    scene.connect(hinge.b, bar.a)
+    made = simulate(scene, form=form, t_end=0.1, outputs=2)
+    assert made["hinge.angle"][-1] == pytest.approx(-0.5 * 1.5 * 9.81 * 0.1**2, rel=1e-3)
 
 
 def test_what_was_not_tried_is_not_claimed() -> None:

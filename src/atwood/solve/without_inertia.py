@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from atwood.errors import StartError
 from atwood.forms.assembly import Assembly
-from atwood.solve.matrices import Matrix, is_full
+from atwood.solve.matrices import Matrix, is_full, row_scales, scaled
 from atwood.solve.scales import motion_names
 
 __all__ = ["check_inertia"]
@@ -43,16 +43,18 @@ def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatA
         if moving is not None:
             raise _without_inertia(assembly, moving)
         return
-    scaled = mass * sizes[:, None] * sizes[None, :]
+    weighed = mass * sizes[:, None] * sizes[None, :]
     if slope.shape[0]:
-        _, values, directions = np.linalg.svd(slope * sizes)
+        # Each row by its own size: lengths and angles of constraints are not compared with each other.
+        rows = scaled(slope, sizes, row_scales(slope, sizes))
+        _, values, directions = np.linalg.svd(rows)
         rank = int(np.sum(values > 1e-9 * values[0]))
         free = directions[rank:]
     else:
         free = np.eye(n)
     if not len(free):
         return
-    values, vectors = np.linalg.eigh(free @ scaled @ free.T)
+    values, vectors = np.linalg.eigh(free @ weighed @ free.T)
     if values[0] > 1e-14 * max(values[-1], 1e-300):
         return
     raise _without_inertia(assembly, np.abs(vectors[:, 0] @ free))
