@@ -73,3 +73,15 @@ def test_what_a_start_leaves_free_is_said_in_its_own_words() -> None:
 
 def test_several_start_values_follow() -> None:
     assert any("top.z_axis.z follow from the other start values" in line for line in lines("info", "lagrange-top"))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("", "it defines no scene, but functions: hung."), (":hang", "the file defines no 'hang'. Did you mean 'hung'?")],
+)
+def test_a_file_with_functions_says_their_names(tmp_path: Path, name: str, said: str) -> None:
+    file = tmp_path / "hung.py"
+    file.write_text(f"{HUNG}\n\ndef other(length):\n    return hung()\n")
+    result = CliRunner().invoke(main, ["info", f"{file}{name}"])
+    assert result.exit_code != 0
+    assert said in result.output

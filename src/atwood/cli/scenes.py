@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import importlib.util
+import inspect
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -123,16 +124,19 @@ def _scene_in_file(file: Path, name: str) -> Model:
     module = _load(file)
     where = f"{file}:{name}"
     if not hasattr(module, name):
-        names = _candidates(module)
+        names = [*_candidates(module), *_functions(module)]
         raise UsageError(f"the file defines no {name!r}", where=where, advice=suggestion(name, names))
     return _as_scene(getattr(module, name), file, where)
 
 
 def _only_scene(file: Path) -> tuple[Model, str]:
     """Return the scene of a file that defines just one."""
-    names = list(_candidates(_load(file)))
+    module = _load(file)
+    names = list(_candidates(module))
     if len(names) != 1:
-        listed = f"it defines {', '.join(names)}" if names else "it defines no scene"
+        functions = ", ".join(_functions(module))
+        no_scene = f"it defines no scene, but functions: {functions}" if functions else "it defines no scene"
+        listed = f"it defines {', '.join(names)}" if names else no_scene
         raise UsageError(f"which scene? {listed}", where=str(file), advice=f"Write {file}:NAME.")
     return _scene_in_file(file, names[0]), names[0]
 
@@ -150,6 +154,17 @@ def _candidates(module: ModuleType) -> Mapping[str, Any]:
             or (isinstance(value, type) and issubclass(value, Scene) and value.__module__ == module.__name__)
         )
     }
+
+
+def _functions(module: ModuleType) -> list[str]:
+    """Return the functions that a module itself defines and that can be called without arguments."""
+    found = []
+    for name, value in vars(module).items():
+        if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_"):
+            needed = inspect.signature(value).parameters.values()
+            if all(one.default is not one.empty or "VAR" in one.kind.name for one in needed):
+                found.append(name)
+    return found
 
 
 def _as_scene(value: Any, file: Path, where: str) -> Model:
