@@ -57,7 +57,15 @@ def test_defaults_are_written_as_a_reader_would() -> None:
     assert default("MeshBody", "file") == "required"
     assert default("Pivot", "axis") == "(0, -1, 0)"
     assert default("Box", "density") == "none"
-    assert default("Rope", "starts") == "taut of taut, slack"
+    assert default("Rope", "starts") == "taut (or slack)"
+
+
+def test_a_connector_says_with_which_choice_it_is_there() -> None:
+    rows = json.loads(run("info", "Force", "--json").output)["connectors"]
+    assert {one["name"]: one["meaning"].partition(" (")[2] for one in rows} == {
+        "point": "with resolved_in=world or other)", "frame": "with resolved_in=body)",
+        "other": "with resolved_in=other)",
+    }  # fmt: skip
 
 
 def test_a_part_made_of_parts_names_them() -> None:

@@ -60,7 +60,7 @@ REFUSED = {
     "hidden name": (aw.DeclarationError, lambda s: s.add("_bob", Bob()), "letter first"),
     "trailing newline": (aw.DeclarationError, lambda s: s.add("bob\n", Bob()), "letters"),
     "no component": (aw.DeclarationError, lambda s: s.add("x", 3), "no component"),
-    "a class": (aw.DeclarationError, lambda s: s.add("x", Bob), "Call the class"),
+    "a class": (aw.DeclarationError, lambda s: s.add("x", Bob), r"Call the class: Bob\(\) and not Bob"),
     "a part that is there": (aw.DeclarationError, lambda s: s.add("x", s.bar), "already there as 'bar'"),
     "a part of a class": (aw.DeclarationError, lambda s: s.add("x", Pendulum.bar), "already there as 'Pendulum.bar'"),
     "one object twice": (aw.DeclarationError, lambda s: s.add("x", [Bob()] * 2), "twice"),

@@ -126,7 +126,11 @@ def _tables(kind: type[Component]) -> Iterator[tuple[str, list[dict[str, str]]]]
     yield (
         "connectors",
         [
-            {"name": f"{name}[...]" if one.count else name, "kind": one.kind.__name__, "meaning": one.doc}
+            {
+                "name": f"{name}[...]" if one.count else name,
+                "kind": one.kind.__name__,
+                "meaning": one.doc + _only_with(one),
+            }
             for name, one in kind.connector_specs().items()
         ],
     )
@@ -179,7 +183,8 @@ def _value(one: Any) -> str:
     if isinstance(one.default, tuple):
         return f"({', '.join(f'{number:g}' for number in one.default)})"
     chosen = one.default if isinstance(one.default, str) else f"{one.default:g}"
-    return f"{chosen} of {', '.join(one.choices)}" if one.choices else chosen
+    others = [word for word in one.choices if word != chosen]
+    return f"{chosen} (or {', '.join(others)})" if others else chosen
 
 
 def _unit(text: str) -> str:
@@ -189,6 +194,12 @@ def _unit(text: str) -> str:
 def _only_in(spaces: Sequence[str]) -> str:
     """Return where alone something exists, or nothing if it exists everywhere."""
     return "" if set(spaces) == set(_EVERYWHERE) else f" ({' and '.join(spaces)} only)"
+
+
+def _only_with(connector: Any) -> str:
+    """Return with which words of which choices alone a connector is there."""
+    told = [f"{choice}={' or '.join(words)}" for choice, words in connector.when.items()]
+    return f" (with {', '.join(told)})" if told else ""
 
 
 def _said(kind: type) -> list[str]:

@@ -206,7 +206,7 @@ class Model(_State, Component):
     def _check_is_free(self, name: str, part: Any) -> None:
         where = self.path or type(self).__name__
         if not isinstance(part, Component):
-            advice = "Call the class: Rod() and not Rod." if isinstance(part, type) else ""
+            advice = f"Call the class: {part.__name__}() and not {part.__name__}." if isinstance(part, type) else ""
             raise DeclarationError(f"{name!r} is given {part!r}, which is no component", where=where, advice=advice)
         if part._declared or part._parent is not None:
             there = part._declared or part.path
