@@ -5,7 +5,7 @@ import pickle
 import pytest
 
 from atwood import errors
-from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion
+from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion, suggestion_in_parts
 
 
 @pytest.mark.parametrize(
@@ -59,3 +59,19 @@ def test_a_suggestion_lists_a_short_choice_and_says_nothing_of_a_long_one() -> N
     assert suggestion("zzz", ["mass", "length"]) == "There is 'length', 'mass'"
     assert suggestion("zzz", [f"parameter{i}" for i in range(40)]) == ""
     assert suggestion("zzz", []) == ""
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("hinge.rate", "hinge has angle, force.x/y/z."),
+        ("hinge.angel", "Did you mean 'hinge.angle'?"),
+        ("hing.angle", "Did you mean 'hinge.angle'?"),
+        ("car.wheel.rate", "car.wheel has turns."),
+        ("car.motor.rate", "car has wheel.turns, speed."),
+        ("zzz", ""),
+    ],
+)
+def test_what_a_part_has_is_said_where_nothing_looks_alike(path, expected):
+    known = ["hinge.angle", "hinge.force.x", "hinge.force.y", "hinge.force.z", "car.wheel.turns", "car.speed"]
+    assert suggestion_in_parts(path, known) == expected

@@ -24,6 +24,7 @@ __all__ = [
     "UsageError",
     "near_matches",
     "suggestion",
+    "suggestion_in_parts",
 ]
 
 
@@ -147,6 +148,39 @@ def suggestion(word: str, choices: Iterable[str]) -> str:
 
 
 _SHORT_LIST = 12
+
+
+def suggestion_in_parts(path: str, known: Iterable[str], verb: str = "has") -> str:
+    """Return a hint for a quantity that does not exist: what looks alike in its part, or what that part has.
+
+    Parameters
+    ----------
+    path
+        What was written.
+    known
+        The paths of the quantities there are.
+    verb
+        What the part does with them, as in "hinge has angle, force.x/y/z".
+    """
+    choices, part = list(known), path
+    own = [name for name in choices if name.startswith(f"{part}.")]
+    while not own and "." in part:
+        part = part.rpartition(".")[0]
+        own = [name for name in choices if name.startswith(f"{part}.")]
+    tails = [name.removeprefix(f"{part}.") for name in own]
+    close = near_matches(path.removeprefix(f"{part}."), tails)
+    if not own or close:
+        return suggestion(path, [f"{part}.{tail}" for tail in close] or near_matches(path, choices))
+    return f"{part} {verb} {', '.join(_vectors(tails))}."
+
+
+def _vectors(names: Iterable[str]) -> list[str]:
+    """Return names with the components of a vector as one, such as ``position.x/y/z``."""
+    axes: dict[str, list[str]] = {}
+    for name in names:
+        stem, _, last = name.rpartition(".")
+        axes.setdefault(f"{stem}." if last in ("x", "y", "z") else name, []).append(last)
+    return [stem + "/".join(last) if stem.endswith(".") else stem for stem, last in axes.items()]
 
 
 def _either(names: list[str]) -> str:

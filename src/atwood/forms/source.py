@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from atwood.errors import StartError, UsageError, near_matches, suggestion
+from atwood.errors import StartError, UsageError, suggestion, suggestion_in_parts
 from atwood.model.composite import Model
 from atwood.model.flatten import FlatScene
 from atwood.model.scene import Scene
@@ -96,28 +96,12 @@ def no_start_quantity(path: str, known: Mapping[str, Observable]) -> StartError:
     """
     message = "there is no such quantity to start with"
     choices = [name for name, one in known.items() if one.unit in _POSITIONS_AND_SPEEDS]
-    part, own = path, [name for name in choices if name.startswith(f"{path}.")]
-    if f"{path}.x" in own:
-        parts = " and ".join(name for name in own if name.count(".") == path.count(".") + 1)
-        return StartError(message, where=path, advice=f"It is a vector: give {parts}, each with a number.")
-    while not own and "." in part:
-        part = part.rpartition(".")[0]
-        own = [name for name in choices if name.startswith(f"{part}.")]
-    tails = [name.removeprefix(f"{part}.") for name in own]
-    close = near_matches(path.removeprefix(f"{part}."), tails)
-    if not own or close:
-        named = [f"{part}.{tail}" for tail in close] or near_matches(path, choices)
-        return StartError(message, where=path, advice=suggestion(path, named))
-    return StartError(message, where=path, advice=f"{part} can start with {', '.join(_vectors(tails))}.")
-
-
-def _vectors(names: Sequence[str]) -> list[str]:
-    """Return names with the components of a vector as one, such as ``position.x/y/z``."""
-    axes: dict[str, list[str]] = {}
-    for name in names:
-        stem, _, last = name.rpartition(".")
-        axes.setdefault(f"{stem}." if last in ("x", "y", "z") else name, []).append(last)
-    return [stem + "/".join(last) if stem.endswith(".") else stem for stem, last in axes.items()]
+    parts = [name for name in choices if name.rpartition(".")[0] == path]
+    if f"{path}.x" in parts:
+        return StartError(
+            message, where=path, advice=f"It is a vector: give {' and '.join(parts)}, each with a number."
+        )
+    return StartError(message, where=path, advice=suggestion_in_parts(path, choices, "can start with"))
 
 
 _POSITIONS_AND_SPEEDS = ("1", "m", "rad", "m/s", "rad/s")

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import ResultError, UsageError, suggestion
+from atwood.errors import ResultError, UsageError, suggestion_in_parts
 from atwood.result.about import describe_run
 from atwood.result.result import Result
 
@@ -100,7 +100,7 @@ class SavedResult:
 
     def _known(self, path: str) -> str:
         if path not in self.quantities:
-            raise ResultError("there is no such quantity", where=path, advice=suggestion(path, self.paths))
+            raise ResultError("there is no such quantity", where=path, advice=suggestion_in_parts(path, self.paths))
         return path
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import ResultError, suggestion
+from atwood.errors import ResultError, suggestion_in_parts
 from atwood.expr import depends_on, substitute
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Constraint, Equations
@@ -198,7 +198,7 @@ class Result:
 
     def _known(self, path: str) -> str:
         if path not in self:
-            raise ResultError("there is no such quantity", where=path, advice=suggestion(path, self.paths))
+            raise ResultError("there is no such quantity", where=path, advice=suggestion_in_parts(path, self.paths))
         return path
 
     def _fill(self, paths: tuple[str, ...]) -> None:
