@@ -16,7 +16,7 @@ from atwood.errors import StartError, UsageError, suggestion
 from atwood.expr import Graph
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import LEVELS
-from atwood.forms.places import regular_to_maximal
+from atwood.forms.places import to_maximal
 from atwood.forms.source import Source
 from atwood.forms.starting import with_places
 from atwood.mechanics.build import Mechanism, check_closures, make_gravity
@@ -131,7 +131,7 @@ def _with_start(assembly: Assembly) -> Assembly:
     """
     start = find_start(assembly)
     reduced, maximal = assembly.regular, assembly.maximal
-    q, _ = assembly.kernel(regular_to_maximal(assembly))([start.time], start.coordinates, start.speeds)
+    q, _ = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
     time = {assembly.mechanism.time: start.time}
     places = {
         "reduced": {**time, **dict(zip(reduced.coordinates, start.coordinates.tolist(), strict=True))},

@@ -13,6 +13,7 @@ from typing import Any
 from atwood import Model
 from atwood.expr import Expression, OutputGroup, Program, atan2, cos, sin, substitute
 from atwood.forms.assembly import Assembly
+from atwood.forms.places import to_maximal
 from atwood.forms.program import state_groups
 from atwood.mechanics.equations import Equations
 from atwood.pipeline import assemble
@@ -104,14 +105,14 @@ def with_directions(scene: Model, form: str = "reduced", level: str = "ggl") -> 
 def turn_directed(assembly: Assembly) -> Assembly:
     """Replace the angles of an assembly that nothing has been made of yet."""
     plain, maximal = assembly.reduced, assembly.maximal
-    to_maximal = assembly.to_maximal
+    placing = to_maximal(assembly)
     reduced, angles = directions_of(plain)
-    positions, speeds = (substitute(list(group.expressions), angles) for group in to_maximal.outputs)
+    positions, speeds = (substitute(list(group.expressions), angles) for group in placing.outputs)
     turned: list[Expression] = []
     for place, one in zip(positions, maximal.names, strict=True):
         turned += [cos(place), sin(place)] if one.unit == "rad" else [place]
     outputs = (OutputGroup("q", tuple(turned)), OutputGroup("u", tuple(speeds)))
-    program = Program(to_maximal.name, state_groups(reduced), to_maximal.parameters, outputs)
+    program = Program(placing.name, state_groups(reduced), placing.parameters, outputs)
     made = {"reduced": reduced, "maximal": directions_of(maximal)[0], "to maximal": program}
     assembly.shared._made.update(made)
     return assembly

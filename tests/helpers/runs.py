@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from atwood import Model, Result, Scene
 from atwood.forms.assembly import Assembly
+from atwood.forms.places import to_maximal
 from atwood.pipeline import assemble, simulate
 from atwood.solve.problem import Plan, make_plan, pack_state
 from atwood.solve.start import Start, find_start
@@ -79,7 +80,7 @@ def prepare(scene: Model, form: str, level: str = "ggl") -> Prepared:
     start = find_start(assembly)
     q, u = start.coordinates, start.speeds
     if form == "dae":
-        q, u = (np.asarray(x, dtype=float) for x in assembly.kernel(assembly.to_maximal)([start.time], q, u))
+        q, u = (np.asarray(x, dtype=float) for x in assembly.kernel(to_maximal(assembly))([start.time], q, u))
     plan = make_plan(assembly, start.time, q, u, start.length, assembly.flat.t_end - start.time)
     return Prepared(assembly, start, plan, q, u)
 

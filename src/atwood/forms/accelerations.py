@@ -29,6 +29,7 @@ from atwood.expr import (
     substitute,
 )
 from atwood.expr.collect import cost
+from atwood.forms.places import to_maximal
 from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.mechanics.augmented import (
     Step,
@@ -202,7 +203,7 @@ class _Tree:
         self.differences = True
         self.rewrites = rates_are_speeds(self.maximal)
         self.angles = [q for q, c in zip(self.reduced.coordinates, self.reduced.names, strict=True) if c.unit == "rad"]
-        outputs = assembly.to_maximal.outputs
+        outputs = to_maximal(assembly).outputs
         symbols = (*self.maximal.coordinates, *self.maximal.speeds)
         self.places = dict(zip(symbols, (*outputs[0].expressions, *outputs[1].expressions), strict=True))
         self.bodies = self._bodies_of_speeds()

@@ -14,7 +14,6 @@ from atwood.errors import ParameterError, UsageError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.collect import collect
 from atwood.forms.dae import dae_form, keep_constraints
-from atwood.forms.places import maximal_program
 from atwood.forms.program import (
     BalanceProgram,
     FormProgram,
@@ -393,9 +392,3 @@ class Assembly:
         """Return a program of (t, q, u) in the coordinates of the given equations."""
         outputs = (OutputGroup(name, tuple(expressions)),)
         return Program(f"{self.flat.name} {name}", state_groups(equations), self.parameters, outputs)
-
-    @property
-    def to_maximal(self) -> Program:
-        """The program of (t, q, u) of the reduced form that gives maximal coordinates and speeds."""
-        parts = f"{self.flat.name} to maximal coordinates", self.reduced, self.maximal, self.parameters
-        return self.shared.get("to maximal", lambda: maximal_program(*parts))

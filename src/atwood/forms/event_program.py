@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, solve, substitute
 from atwood.forms.assembly import Assembly
+from atwood.forms.places import to_maximal
 from atwood.forms.program import state_groups
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.release import release_program
@@ -110,7 +111,7 @@ def _reactions(assembly: Assembly, wanted: set[Expression], kept: Sequence[int])
             value = maximal.graph.zero
         found[one.symbol] = value
     if assembly.form == "reduced":
-        outputs = assembly.to_maximal.outputs
+        outputs = to_maximal(assembly).outputs
         symbols = (*maximal.coordinates, *maximal.speeds)
         places = dict(zip(symbols, (*outputs[0].expressions, *outputs[1].expressions), strict=True))
         found = dict(zip(found, substitute(list(found.values()), places), strict=True))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from atwood.expr import Expression, OutputGroup, Program
 from atwood.forms.program import state_groups
@@ -12,21 +11,25 @@ from atwood.mechanics.equations import Equations
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = ["maximal_program", "regular_to_maximal"]
+__all__ = ["to_maximal"]
 
 
-def maximal_program(name: str, reduced: Equations, maximal: Equations, parameters: Collection[Expression]) -> Program:
+def to_maximal(assembly: Assembly, given: Literal["reduced", "regular"] = "reduced") -> Program:
     """Return the program of (t, q, u) in generalized coordinates that gives maximal coordinates and speeds.
 
     Parameters
     ----------
-    name
-        Named in messages.
-    reduced, maximal
-        The equations in either coordinates.
-    parameters
-        The symbols of parameters.
+    assembly
+        The scene.
+    given
+        Which generalized coordinates: those of the reduced form, or the same with quaternions, in which starts are.
     """
+    equations = assembly.in_coordinates(given)
+    key = "to maximal" if equations is assembly.reduced else "regular to maximal"
+    return assembly.shared.get(key, lambda: _make(assembly, equations, assembly.maximal))
+
+
+def _make(assembly: Assembly, reduced: Equations, maximal: Equations) -> Program:
     forest = maximal.forest
     positions: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.coordinates)
     speeds: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.speeds)
@@ -47,18 +50,5 @@ def maximal_program(name: str, reduced: Equations, maximal: Equations, parameter
         positions[coordinate] = kinematics.placements.joint_coordinates[symbol]
         speeds[speed] = kinematics.joint_rates[symbol]
     outputs = (OutputGroup("q", tuple(positions)), OutputGroup("u", tuple(speeds)))
-    return Program(name, state_groups(reduced), tuple(parameters), outputs)
-
-
-def regular_to_maximal(assembly: Assembly) -> Program:
-    """Return the same program for generalized coordinates with quaternions, in which starts are.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    """
-    if assembly.regular is assembly.reduced:
-        return assembly.to_maximal
-    parts = f"{assembly.flat.name} to maximal coordinates", assembly.regular, assembly.maximal, assembly.parameters
-    return assembly.shared.get("regular to maximal", lambda: maximal_program(*parts))
+    name = f"{assembly.flat.name} to maximal coordinates"
+    return Program(name, state_groups(reduced), assembly.parameters, outputs)

@@ -16,7 +16,7 @@ from atwood.errors import SolveError
 from atwood.expr import OutputGroup, Program, depends_on, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import event_program
-from atwood.forms.places import regular_to_maximal
+from atwood.forms.places import to_maximal
 from atwood.mechanics.watches import Watch, list_watches
 from atwood.solve.balance import Balance, BalanceValues, balance_of, least_norm
 from atwood.solve.charts import CHART, Reassemble, chart_watches, enter_charts
@@ -362,8 +362,8 @@ def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[in
     Speeds of bodies change with generalized speeds as their places do with displacements along these.
     """
     equations = after.regular
-    to_maximal = regular_to_maximal(after)
-    slope = jacobian(list(to_maximal.outputs[1].expressions), list(equations.speeds))
-    outputs = (*to_maximal.outputs, OutputGroup("slopes", tuple(slope.entries)))
-    program = Program(f"{after.flat.name} change of mode", to_maximal.inputs, after.parameters, outputs)
+    placing = to_maximal(after, "regular")
+    slope = jacobian(list(placing.outputs[1].expressions), list(equations.speeds))
+    outputs = (*placing.outputs, OutputGroup("slopes", tuple(slope.entries)))
+    program = Program(f"{after.flat.name} change of mode", placing.inputs, after.parameters, outputs)
     return program, slope.rows, slope.columns

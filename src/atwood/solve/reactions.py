@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from atwood.errors import SolveError
 from atwood.forms.accelerations import acceleration_program
 from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.places import to_maximal
 from atwood.mechanics.release import release_program
 from atwood.solve.balance import balance_of
 from atwood.solve.columns import masses_at
@@ -34,7 +35,7 @@ def maximal_state(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArra
     """Return maximal coordinates and speeds, each of shape (number, samples), from those of the form."""
     if assembly.form == "dae":
         return q, u
-    big_q, big_u = assembly.kernel(assembly.to_maximal, vectorized=True)(t[None, :], q, u)
+    big_q, big_u = assembly.kernel(to_maximal(assembly), vectorized=True)(t[None, :], q, u)
     return turning_of(assembly, "dae").normalized(big_q), big_u
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from atwood.errors import AtwoodError, KernelEvaluationError, StartError
 from atwood.expr import evaluate, jacobian
 from atwood.forms.assembly import Assembly
-from atwood.forms.places import regular_to_maximal
+from atwood.forms.places import to_maximal
 from atwood.forms.starting import starting
 from atwood.solve.charts import Reassemble, enter_charts, from_regular, own_names
 from atwood.solve.missing import missing_at
@@ -71,7 +71,7 @@ def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]
 
 def maximal_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
     """Return a start in maximal coordinates, whatever the form of an assembly."""
-    q, u = assembly.kernel(regular_to_maximal(assembly))([start.time], start.coordinates, start.speeds)
+    q, u = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
     return turning_of(assembly, "dae").normalized(np.asarray(q, dtype=float)), np.asarray(u, dtype=float)
 
 
