@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-from atwood import Component, Frame, Scalar, as_vector, connector, dissipation, observable, parameter
-from atwood_library.interfaces.bearings import twist_rate
+from atwood import Scalar, dissipation, observable, parameter
+from atwood_library.interfaces.twisted import Twisted
 
 
-class TorsionDamper(Component):
+class TorsionDamper(Twisted):
     """A massless torsion damper between two frames, linear in the rate of the angle between them about an axis.
 
     Rayleigh function ``1/2 c w^2`` (Goldstein, section 1.5). In space the rate is that of the twist about the axis, as
     in a `TorsionSpring`; where both frames share the axis it is the relative angular velocity along it.
     """
 
-    spaces = ("plane", "space")
-
     damping: float = parameter(1.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a rate of one radian a second.")
-    axis: tuple[float, float, float] = parameter(
-        (0.0, -1.0, 0.0),
-        turning=True,
-        doc="Axis in both frames; the angle is right-handed about it, so counter-clockwise in a plane unless reversed.",
-    )
-    a: Frame = connector(Frame, "The frame that the angle is measured from.")
-    b: Frame = connector(Frame, "The other frame.")
 
     @dissipation
     def rayleigh_function(self) -> Scalar:
@@ -33,7 +24,7 @@ class TorsionDamper(Component):
     @observable(unit="rad/s", doc="Rate of the angle of frame b from frame a about the axis.")
     def rate(self) -> Scalar:
         """Return the rate of the angle."""
-        return twist_rate(self.a, self.b, as_vector(self.axis), self.in_space)
+        return self.twisting()
 
     @observable(unit="N*m", doc="Torque on frame b about the axis.")
     def torque(self) -> Scalar:

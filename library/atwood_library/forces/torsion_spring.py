@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
-from atwood import Component, Frame, Scalar, as_vector, connector, event, is_zero, observable, parameter, potential
-from atwood_library.interfaces.bearings import twist_about, twist_cosine, twist_rate
+from atwood import Scalar, as_vector, event, is_zero, observable, parameter, potential
+from atwood_library.interfaces.bearings import twist_cosine
+from atwood_library.interfaces.twisted import Twisted
 
 _NEARLY_HALF_A_TURN = math.cos(0.999 * math.pi)
 
 
-class TorsionSpring(Component):
+class TorsionSpring(Twisted):
     """A massless torsion spring between two frames, linear in the angle between them about an axis.
 
     Potential energy ``1/2 c (phi - phi0)^2``. It acts on the orientations only; a joint keeps the frames together.
@@ -21,29 +22,14 @@ class TorsionSpring(Component):
     it within half a turn either way, where the run stops; the spring of a `Pivot` counts turns.
     """
 
-    spaces = ("plane", "space")
-
     stiffness: float = parameter(1.0, unit="N*m/rad", minimum=0.0, doc="Torque for a twist by one radian.")
     natural_angle: float = parameter(0.0, unit="rad", doc="Angle without torque.")
-    axis: tuple[float, float, float] = parameter(
-        (0.0, -1.0, 0.0),
-        turning=True,
-        doc="Axis in both frames; the angle is right-handed about it, so counter-clockwise in a plane unless reversed.",
-    )
-    a: Frame = connector(Frame, "The frame that the angle is measured from.")
-    b: Frame = connector(Frame, "The other frame.")
 
     @potential
     def elastic_energy(self) -> Scalar:
         """Return the elastic energy."""
         twist = self.twist() - self.natural_angle
         return 0.5 * self.stiffness * twist * twist
-
-    def twist(self) -> Scalar:
-        """Return the angle about the axis."""
-        if self.in_space:
-            return twist_about(self.a, self.b, as_vector(self.axis))
-        return -as_vector(self.axis).y * (self.b.angle - self.a.angle)
 
     @event(direction=-1, target="stop", message="the twist has come to half a turn", spaces=("space",))
     def comes_to_half_a_turn(self) -> Scalar:
@@ -66,7 +52,7 @@ class TorsionSpring(Component):
     @observable(unit="rad/s", doc="Rate of the angle.", spaces=("plane", "space"))
     def rate(self) -> Scalar:
         """Return the rate of the angle."""
-        return twist_rate(self.a, self.b, as_vector(self.axis), self.in_space)
+        return self.twisting()
 
     @observable(unit="N*m", doc="Torque on frame b about the axis.", spaces=("plane", "space"))
     def torque(self) -> Scalar:
