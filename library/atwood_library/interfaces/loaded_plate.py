@@ -17,15 +17,17 @@ from atwood import (
     force,
     is_zero,
     normals,
+    observable,
     parameter,
     potential,
     signal,
 )
+from atwood_library.interfaces.bearings import rate_along
 from atwood_library.interfaces.loads import beyond_rim, damper_function
 
 
 class LoadedPlate(Component):
-    """A joint with `displacement_1` and `displacement_2` on a plane of frame a through its origin, with normal `axis`.
+    """A joint between a and b with two displacements on a plane of frame a through its origin, with normal `axis`.
 
     The spring pulls towards the origin, the damper against the motion over the plane, and the stop is a round rim.
     """
@@ -65,3 +67,29 @@ class LoadedPlate(Component):
         push = joint.a.to_world(first * self.actuator_1 + second * self.actuator_2)
         yield Load(joint.b, force=push)
         yield Load(joint.a, force=-push, torque=cross(joint.b.position - joint.a.position, -push))
+
+    @observable(unit="m", doc="Displacement along the first direction of the plane.", rate="speed_1", spaces=("space",))
+    def displacement_1(self) -> Scalar:
+        """Return the displacement."""
+        joint: Any = self
+        return dot(joint.b.position - joint.a.position, joint.a.to_world(normals(as_vector(joint.axis))[0]))
+
+    @observable(
+        unit="m", doc="Displacement along the second direction of the plane.", rate="speed_2", spaces=("space",)
+    )
+    def displacement_2(self) -> Scalar:
+        """Return the displacement."""
+        joint: Any = self
+        return dot(joint.b.position - joint.a.position, joint.a.to_world(normals(as_vector(joint.axis))[1]))
+
+    @observable(unit="m/s", doc="Rate of the first displacement.", spaces=("space",))
+    def speed_1(self) -> Scalar:
+        """Return the rate, as seen from frame a."""
+        joint: Any = self
+        return rate_along(joint.a, joint.b, normals(as_vector(joint.axis))[0])
+
+    @observable(unit="m/s", doc="Rate of the second displacement.", spaces=("space",))
+    def speed_2(self) -> Scalar:
+        """Return the rate, as seen from frame a."""
+        joint: Any = self
+        return rate_along(joint.a, joint.b, normals(as_vector(joint.axis))[1])

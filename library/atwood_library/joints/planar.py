@@ -17,7 +17,7 @@ from atwood import (
     parameter,
     turn,
 )
-from atwood_library.interfaces.bearings import angle_about, axes_parallel, rate_about, rate_along
+from atwood_library.interfaces.bearings import angle_about, axes_parallel, rate_about
 from atwood_library.interfaces.loaded_plate import LoadedPlate
 from atwood_library.interfaces.loaded_twist import LoadedTwist
 
@@ -71,28 +71,6 @@ class Planar(LoadedPlate, LoadedTwist):
         axis = as_vector(self.axis)
         first, second = normals(axis)
         return Placement(first * displacement_1 + second * displacement_2, turn(axis, angle), axes="a")
-
-    @observable(unit="m", doc="Displacement along the first direction of the plane.", rate="speed_1", spaces=("space",))
-    def displacement_1(self) -> Scalar:
-        """Return the displacement."""
-        return dot(self.b.position - self.a.position, self.a.to_world(normals(as_vector(self.axis))[0]))
-
-    @observable(
-        unit="m", doc="Displacement along the second direction of the plane.", rate="speed_2", spaces=("space",)
-    )
-    def displacement_2(self) -> Scalar:
-        """Return the displacement."""
-        return dot(self.b.position - self.a.position, self.a.to_world(normals(as_vector(self.axis))[1]))
-
-    @observable(unit="m/s", doc="Rate of the first displacement.", spaces=("space",))
-    def speed_1(self) -> Scalar:
-        """Return the rate, as seen from frame a."""
-        return rate_along(self.a, self.b, normals(as_vector(self.axis))[0])
-
-    @observable(unit="m/s", doc="Rate of the second displacement.", spaces=("space",))
-    def speed_2(self) -> Scalar:
-        """Return the rate, as seen from frame a."""
-        return rate_along(self.a, self.b, normals(as_vector(self.axis))[1])
 
     @observable(
         unit="rad", doc="Angle of frame b about the normal.", periodic=True, rate="angular_velocity", spaces=("space",)

@@ -13,10 +13,8 @@ from atwood import (
     dot,
     joint,
     normals,
-    observable,
     parameter,
 )
-from atwood_library.interfaces.bearings import rate_along
 from atwood_library.interfaces.loaded_plate import LoadedPlate
 
 
@@ -50,25 +48,3 @@ class PointOnPlane(LoadedPlate):
         """Place the point on the plane."""
         first, second = normals(as_vector(self.axis))
         return Placement(first * displacement_1 + second * displacement_2, axes="a")
-
-    @observable(unit="m", doc="Displacement along the first direction of the plane.", rate="speed_1", spaces=("space",))
-    def displacement_1(self) -> Scalar:
-        """Return the displacement."""
-        return dot(self.b.position - self.a.position, self.a.to_world(normals(as_vector(self.axis))[0]))
-
-    @observable(
-        unit="m", doc="Displacement along the second direction of the plane.", rate="speed_2", spaces=("space",)
-    )
-    def displacement_2(self) -> Scalar:
-        """Return the displacement."""
-        return dot(self.b.position - self.a.position, self.a.to_world(normals(as_vector(self.axis))[1]))
-
-    @observable(unit="m/s", doc="Rate of the first displacement.", spaces=("space",))
-    def speed_1(self) -> Scalar:
-        """Return the rate, as seen from frame a."""
-        return rate_along(self.a, self.b, normals(as_vector(self.axis))[0])
-
-    @observable(unit="m/s", doc="Rate of the second displacement.", spaces=("space",))
-    def speed_2(self) -> Scalar:
-        """Return the rate, as seen from frame a."""
-        return rate_along(self.a, self.b, normals(as_vector(self.axis))[1])
