@@ -126,17 +126,10 @@ def _localize_part(
         if not isinstance(one, JointCoordinate)
     }
     grips = find_grips(taken, graph)
-    binding = Binding(
-        values=values,
-        motions={
-            **{name: local_motion(symbols, space) for name, symbols in connectors.items()},
-            **{one.connector: Motion(value=one.value, rate=one.rate) for one in grips},
-        },
-        time=time,
-        space=space.name,
-        line=space.line,
-        sides=None if sides is None else {(a, b): s for (path, a, b), s in sides.items() if path == part.path},
-    )
+    motions = {name: local_motion(symbols, space) for name, symbols in connectors.items()}
+    motions.update({one.connector: Motion(value=one.value, rate=one.rate) for one in grips})
+    own_sides = None if sides is None else {(a, b): s for (path, a, b), s in sides.items() if path == part.path}
+    binding = Binding(values=values, motions=motions, time=time, space=space.name, line=space.line, sides=own_sides)
     for one in grips:
         connectors.update(one.connectors)
     bound = bind(component, binding)
@@ -149,9 +142,12 @@ def _localize_part(
         found = [_call(part, law, functools.partial(_scalar, bound, law, graph)) for law in laws(kind)]
         return tuple(one for one in found if not one.is_zero)
 
+    def listed_laws(kind: Any) -> list[Any]:
+        return [one for law in laws(kind) for one in _call(part, law, functools.partial(_listed, bound, law))]
+
     potentials, dissipations = scalar_laws("potential"), scalar_laws("dissipation")
     _check_reads(part, connectors, potentials, dissipations)
-    inertias = [one for law in laws("inertia") for one in _call(part, law, functools.partial(_listed, bound, law))]
+    inertias = listed_laws("inertia")
     joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws("joint"))
     own = [symbol for joint in joints for symbol in joint.coordinates]
     formulas = formulas_of(part, bound, own, graph) if space.name == "space" else {}
@@ -164,7 +160,7 @@ def _localize_part(
         body_inertias=tuple(one for one in inertias if isinstance(one, BodyInertia)),
         potentials=potentials,
         dissipations=dissipations,
-        loads=tuple(one for law in laws("force") for one in _call(part, law, functools.partial(_listed, bound, law))),
+        loads=tuple(listed_laws("force")),
         constraints=(
             *(one for law in laws("constraint") for one in _local_constraints(part, law, bound, graph)),
             *counting_constraints(part, counted, formulas, graph),
