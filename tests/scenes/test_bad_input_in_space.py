@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atwood import Component, Scene
-from atwood.errors import AtwoodError, ParameterError, StartError, TopologyError
+from atwood import Component, Scene, sin
+from atwood.errors import AtwoodError, ParameterError, SolveError, StartError, TopologyError
 from atwood.pipeline import assemble, simulate
 from atwood.reporting import report
 from atwood.solve.immobile import Immobile
 from atwood_library import (
     Bar,
     Cylindrical,
+    Drive,
     Force,
     Ground,
     Pivot,
@@ -288,6 +289,19 @@ def test_velocities_that_joints_do_not_let_through(form: str) -> None:
     error = refused(scene, form)
     assert error.where.startswith("bob.velocity")
     assert "2 free coordinates" in error.advice
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_drive_of_what_a_ball_joint_holds(form: str) -> None:
+    # Not even the start can be projected: its places fit, its speeds do not.
+    scene = Scene(space="space")
+    ground, body = scene.add("ground", Ground()), scene.add("body", RigidBody(mass=1.0, moments=(1.0, 1.0, 1.0)))
+    drive, ball = scene.add("drive", Drive(motion=lambda t: 0.3 * sin(2.0 * t))), scene.add("ball", Spherical())
+    for joint in (drive, ball):
+        scene.connect(ground.frame, joint.a)
+        scene.connect(joint.b, body.frame)
+    with pytest.raises((SolveError, TopologyError), match=r"hold.*missed|contradicts what is held"):
+        simulate(scene, t_end=0.25, form=form)
 
 
 @pytest.mark.parametrize("form", FORMS)

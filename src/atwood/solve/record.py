@@ -183,6 +183,11 @@ class Recorder:
         self._samples[0][-1].shown[-1] = True
         return self.end
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing has been recorded, and nothing waits."""
+        return not any(self._samples)
+
     def segment(self, impact: bool) -> Segment:
         """Return what was recorded."""
         self.settle()

@@ -192,6 +192,8 @@ class _Walk:
         stretch = Stretch(self.plan, self.probe, options, self.choice, *ahead, self.show, self.statistics)
         recorder = Recorder(self.plan)
         outcome = run_stretch(stretch, recorder, t, q, u)
+        if recorder.is_empty and outcome.error is not None:  # not even the start could be projected
+            raise outcome.error
         self.segments.append(recorder.segment(self.impact))
         self.statistics = self.statistics + outcome.statistics
         self.restated += outcome.restated
