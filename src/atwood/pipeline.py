@@ -28,7 +28,7 @@ from atwood.model.flatten import FlatScene, flatten
 from atwood.model.local import LocalPart, ParameterTable, localize
 from atwood.model.space import make_space
 from atwood.result.result import Result
-from atwood.solve.options import RunOptions
+from atwood.solve.options import RunOptions, end_of_run
 from atwood.solve.run import run
 from atwood.solve.sides import actual_sides, sides_differ
 from atwood.solve.start import find_start
@@ -197,7 +197,7 @@ def simulate(
     form: str = "reduced",
     level: str = "ggl",
     orientation: str = "quaternion",
-    t_end: float | None = None,
+    t_end: float | str | None = None,
     rtol: float = 1e-8,
     outputs: Any = 201,
     max_steps: int | None = None,
@@ -217,7 +217,7 @@ def simulate(
     form, level, orientation
         See `assemble`.
     t_end
-        Time of the end, s; the scene's own if not given.
+        Time of the end, s, or text such as ``"2 min"``; the scene's own if not given.
     rtol
         Relative tolerance of the solver; absolute tolerances are this share of the scene's own sizes.
     outputs
@@ -260,7 +260,7 @@ def simulate(
     )
     flat = assembly.flat
     options = RunOptions(
-        t_end=flat.t_end if t_end is None else float(t_end),
+        t_end=end_of_run(t_end, flat.t_end),
         relative_tolerance=rtol,
         outputs=outputs,
         max_steps=max_steps,

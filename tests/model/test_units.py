@@ -87,3 +87,10 @@ def test_other_texts_are_refused_with_the_place(text):
 def test_a_text_without_a_number_has_no_quantity():
     assert split_quantity("m") is None
     assert split_quantity("3e2 m/s") == (300.0, "m/s")
+
+
+def test_hertz_do_not_say_whether_they_count_turns():
+    with pytest.raises(ParameterError, match=r"turns or radians.*rpm"):
+        parse_quantity("50 Hz", parse_unit("rad/s"), "body.spin.z")
+    assert parse_quantity("50 Hz", parse_unit("1/s"), "x") == 50.0
+    assert math.isclose(parse_quantity("50 rev/s", parse_unit("rad/s"), "x"), 100.0 * math.pi)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from atwood import Scene, SolveError, UsageError, connect
-from atwood.model.flatten import FlatScene
 from atwood.pipeline import simulate
 from atwood.result.result import Result
 from atwood.study import Comparison, compare
@@ -109,14 +108,14 @@ def test_a_closed_form_for_another_start_is_not_used() -> None:
 
 
 def test_a_failed_run_stays_in_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
-    inner = compare_module.run_flat
+    inner = compare_module.run_form
 
-    def fail(flat: FlatScene, form: str, level: str, rtol: float, *rest: Any) -> Result:
+    def fail(assembled: Any, form: str, level: str, rtol: float, *rest: Any) -> Result:
         if rtol < 1e-5:
             raise SolveError("the step became too small")
-        return inner(flat, form, level, rtol, *rest)
+        return inner(assembled, form, level, rtol, *rest)
 
-    monkeypatch.setattr(compare_module, "run_flat", fail)
+    monkeypatch.setattr(compare_module, "run_form", fail)
     found = compare(Pendulum(), rtols=(1e-4, 1e-6), forms=("reduced",))
     assert [row.reason for row in found.rows] == ["", "the step became too small"] * 2
     assert found.rows[1].error is None

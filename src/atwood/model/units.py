@@ -178,6 +178,12 @@ def parse_quantity(text: str, unit: Unit, where: str) -> float:
         raise ParameterError(
             f"{unit_text!r} does not measure what is asked for here", where=where, advice=f"Give it in {unit.text}."
         )
+    if "Hz" in re.findall(r"[A-Za-z]+", unit_text) and "rad" in re.findall(r"[A-Za-z]+", unit.text):
+        raise ParameterError(
+            f"{unit_text!r} leaves open whether it counts turns or radians",
+            where=where,
+            advice=f"Give it in rpm, rev/s or {unit.text}.",
+        )
     ratio = given.factor / unit.factor
     inverse = round(1.0 / ratio) if ratio < 1.0 else 0
     if inverse and math.isclose(inverse * ratio, 1.0, rel_tol=1e-15):  # 35 cm is 35/100 m, the float 0.35 exactly

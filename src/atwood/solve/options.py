@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import UsageError
+from atwood.errors import AtwoodError, UsageError
+from atwood.model.units import parse_quantity, parse_unit
 
-__all__ = ["SOLVERS", "RunOptions", "sample_times"]
+__all__ = ["SOLVERS", "RunOptions", "end_of_run", "sample_times"]
 
 FloatArray = NDArray[np.float64]
 
@@ -63,6 +64,31 @@ class RunOptions:
     structure: bool = False
 
 
+def end_of_run(t_end: float | str | None, own: float) -> float:
+    """Return the time of the end, s.
+
+    Parameters
+    ----------
+    t_end
+        What was asked for: seconds, or text with a unit of time; nothing for the scene's own.
+    own
+        The scene's own, s.
+
+    Raises
+    ------
+    UsageError
+        If it is no time.
+    """
+    if t_end is None:
+        return own
+    try:
+        return parse_quantity(t_end, parse_unit("s"), "t_end") if isinstance(t_end, str) else float(t_end)
+    except (TypeError, ValueError, AtwoodError):
+        raise UsageError(
+            f"the end of a run cannot be {t_end!r}", advice="Give seconds, or text such as '2 min'."
+        ) from None
+
+
 def sample_times(t: float, options: RunOptions, at_least: int = 0) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return all sample times with the start, and which of them are outputs.
 
@@ -80,9 +106,15 @@ def sample_times(t: float, options: RunOptions, at_least: int = 0) -> tuple[Floa
             raise UsageError("there must be at least two outputs, the start and the end")
         asked = np.linspace(t, options.t_end, int(options.outputs))
     else:
-        asked = np.asarray(options.outputs, dtype=float)
+        try:
+            asked = np.asarray(options.outputs, dtype=float)
+        except (TypeError, ValueError):
+            asked = np.empty((0, 0))
         if asked.ndim != 1 or not len(asked) or not np.all(np.isfinite(asked)) or np.any(np.diff(asked) <= 0.0):
-            raise UsageError("output times must be finite and rise")
+            raise UsageError(
+                f"outputs cannot be {str(options.outputs)[:60]!r}",
+                advice="Give their number, or the times themselves, finite and rising.",
+            )
         if asked[0] < t or asked[-1] > options.t_end:
             raise UsageError(f"output times must lie between {t:g} and {options.t_end:g}")
     filling = np.linspace(t, options.t_end, max(options.samples, at_least) + 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,11 @@ import numpy as np
 from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.forms.dae import LEVELS
 from atwood.model.composite import Model
-from atwood.model.flatten import FlatScene, flatten
+from atwood.model.flatten import flatten
 from atwood.pipeline import FORMS, assemble_flat
 from atwood.solve.choice import implicit_solver
-from atwood.solve.options import SOLVERS
-from atwood.study.reference import Reference, find_reference, run_flat, scaled_difference
+from atwood.solve.options import SOLVERS, end_of_run
+from atwood.study.reference import Assembled, Reference, find_reference, run_form, scaled_difference
 from atwood.study.verdict import judge
 
 __all__ = ["Comparison", "ComparisonRow", "Reference", "compare"]
@@ -147,7 +148,7 @@ class Comparison:
 def compare(
     scene: Model,
     *,
-    t_end: float | None = None,
+    t_end: float | str | None = None,
     rtols: Sequence[float] = TOLERANCES,
     forms: Sequence[str] = FORMS,
     levels: Sequence[str] = ("ggl", "index1-projected", "index1"),
@@ -193,18 +194,19 @@ def compare(
     """
     flat = flatten(scene, name)
     _check(forms, levels, rtols)
-    kinds = list(_kinds(flat, forms, levels))
+    assembled = cache(lambda form, level: assemble_flat(flat, form=form, level=level))
+    kinds = list(_kinds(assembled, forms, levels))
     total = len(kinds) * len(rtols) + 2
     watch = progress or (lambda what, done, of: None)
-    end = flat.t_end if t_end is None else float(t_end)
+    end = end_of_run(t_end, flat.t_end)
     patience = None if max_seconds is None else 10.0 * max_seconds
-    reference = find_reference(scene, flat, end, outputs, patience, lambda what: watch(what, 0, total))
+    reference = find_reference(scene, flat, assembled, end, outputs, patience, lambda what: watch(what, 0, total))
     rows: list[ComparisonRow] = []
     for form, level, solver in kinds:
         for rtol in sorted(rtols, reverse=True):
             row = ComparisonRow(form, level, SOLVERS[solver], rtol)
             watch(f"{row.label} at rtol {rtol:g}", len(rows) + 2, total)
-            rows.append(_measure(flat, row, solver, reference, max_seconds))
+            rows.append(_measure(assembled, row, solver, reference, max_seconds))
     return Comparison(flat.name, float(reference.time[-1]), reference, tuple(rows))
 
 
@@ -216,13 +218,13 @@ def _check(forms: Sequence[str], levels: Sequence[str], rtols: Sequence[float]) 
         raise UsageError("tolerances must lie between 0 and 1")
 
 
-def _kinds(flat: FlatScene, forms: Sequence[str], levels: Sequence[str]) -> Iterator[tuple[str, str, str]]:
+def _kinds(assembled: Assembled, forms: Sequence[str], levels: Sequence[str]) -> Iterator[tuple[str, str, str]]:
     """Yield forms with their levels and solvers; without constraints the levels of the dae form are all one.
 
     IDA solves every form, so that form and method are told apart; the explicit method comes on top where it can.
     """
     shared = implicit_solver()
-    assembly = assemble_flat(flat, form="dae")
+    assembly = assembled("dae", "ggl")
     if "reduced" in forms:
         yield "reduced", "", shared
         if assembly.reduced.coordinates and not assembly.reduced.constraints:
@@ -233,13 +235,13 @@ def _kinds(flat: FlatScene, forms: Sequence[str], levels: Sequence[str]) -> Iter
 
 
 def _measure(
-    flat: FlatScene, row: ComparisonRow, solver: str, reference: Reference, max_seconds: float | None
+    assembled: Assembled, row: ComparisonRow, solver: str, reference: Reference, max_seconds: float | None
 ) -> ComparisonRow:
     """Make one run, and return its row with numbers, or with the reason why there are none."""
     blank = (row.form, row.level, row.solver, row.rtol)
     end = float(reference.time[-1])
     try:
-        result = run_flat(flat, row.form, row.level or "ggl", row.rtol, end, reference.time, max_seconds, solver)
+        result = run_form(assembled, row.form, row.level or "ggl", row.rtol, end, reference.time, max_seconds, solver)
     except AtwoodError as problem:
         return ComparisonRow(*blank, reason=problem.message)
     if result.status != "finished" or len(result.time) != len(reference.time):
@@ -251,7 +253,7 @@ def _measure(
     return ComparisonRow(
         *blank,
         error=error,
-        wall_s=_integration_time(flat, row, solver, end, result.statistics.seconds),
+        wall_s=_integration_time(assembled, row, solver, end, result.statistics.seconds),
         steps=result.statistics.steps,
         energy_drift=result.energy.max_drift,
         constraint_drift=max(missed["position"], missed["velocity"]),
@@ -260,11 +262,11 @@ def _measure(
     )
 
 
-def _integration_time(flat: FlatScene, row: ComparisonRow, solver: str, end: float, taken: float) -> float:
+def _integration_time(assembled: Assembled, row: ComparisonRow, solver: str, end: float, taken: float) -> float:
     """Return the time of the integration alone: handing out states can take longer than making them."""
     if taken > _LONG:
         return taken
-    runs = (run_flat(flat, row.form, row.level or "ggl", row.rtol, end, 2, None, solver, 1) for _ in range(3))
+    runs = (run_form(assembled, row.form, row.level or "ggl", row.rtol, end, 2, None, solver, 1) for _ in range(3))
     return min(run.statistics.seconds for run in runs)
 
 

@@ -10,12 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import AtwoodError, SolveError
+from atwood.forms.assembly import Assembly
 from atwood.model.composite import Model
 from atwood.model.flatten import FlatScene
-from atwood.pipeline import assemble_flat, simulate
+from atwood.pipeline import simulate
 from atwood.result.result import Result
 
-__all__ = ["Reference", "compared_paths", "find_reference", "run_flat", "scaled_difference"]
+__all__ = ["Assembled", "Reference", "compared_paths", "find_reference", "run_form", "scaled_difference"]
+
+Assembled = Callable[[str, str], Assembly]
+"""Gives a scene in a form and at a level of the constraints."""
 
 FloatArray = NDArray[np.float64]
 
@@ -64,7 +68,13 @@ class Reference:
 
 
 def find_reference(
-    scene: Model, flat: FlatScene, t_end: float, outputs: int, max_seconds: float | None, watch: Callable[[str], object]
+    scene: Model,
+    flat: FlatScene,
+    assembled: Assembled,
+    t_end: float,
+    outputs: int,
+    max_seconds: float | None,
+    watch: Callable[[str], object],
 ) -> Reference:
     """Return the reference of a scene: its closed form where it has one that holds, else its tightest solution.
 
@@ -72,6 +82,8 @@ def find_reference(
     ----------
     scene, flat
         The scene, and the same as leaves.
+    assembled
+        Gives the scene in a form and at a level.
     t_end
         Time of the end, s. A run that an event stops earlier shortens the comparison.
     outputs
@@ -86,7 +98,7 @@ def find_reference(
     SolveError
         If no tight solution can be found.
     """
-    tight, note = _tight_solutions(flat, t_end, outputs, max_seconds, watch)
+    tight, note = _tight_solutions(flat, assembled, t_end, outputs, max_seconds, watch)
     (best, said), (second, other) = tight
     paths = compared_paths(best)
     scales = {path: best.run.start.length if best.unit(path) == "m" else 1.0 for path in paths}
@@ -106,7 +118,12 @@ def find_reference(
 
 
 def _tight_solutions(
-    flat: FlatScene, t_end: float, outputs: int, max_seconds: float | None, watch: Callable[[str], object]
+    flat: FlatScene,
+    assembled: Assembled,
+    t_end: float,
+    outputs: int,
+    max_seconds: float | None,
+    watch: Callable[[str], object],
 ) -> tuple[list[tuple[Result, str]], str]:
     """Return two tight solutions of the scene and what each is, and why they end earlier than asked for if they do."""
     found: list[tuple[Result, str]] = []
@@ -116,11 +133,11 @@ def _tight_solutions(
         said = f"the {form} form at rtol {rtol:g}"
         watch(f"reference: {said}")
         try:
-            result = run_flat(flat, form, "ggl", rtol, t_end, outputs, max_seconds)
+            result = run_form(assembled, form, "ggl", rtol, t_end, outputs, max_seconds)
             if result.status == "stopped" and not found:  # compare what comes before the event
                 note = f"The comparison ends earlier than asked for: {result.message}."
                 t_end = flat.t_start + _BEFORE * (float(result.time[-1]) - flat.t_start)
-                result = run_flat(flat, form, "ggl", rtol, t_end, outputs, max_seconds)
+                result = run_form(assembled, form, "ggl", rtol, t_end, outputs, max_seconds)
         except AtwoodError as error:
             reasons.append(f"{said}: {error.message}")
             continue
@@ -135,8 +152,8 @@ def _tight_solutions(
     )
 
 
-def run_flat(
-    flat: FlatScene,
+def run_form(
+    assembled: Assembled,
     form: str,
     level: str,
     rtol: float,
@@ -150,14 +167,13 @@ def run_flat(
 
     Parameters
     ----------
-    flat
-        The scene.
+    assembled
+        Gives the scene in a form and at a level; what it made before is used again.
     form, level, rtol, t_end, outputs, max_seconds, solver, samples
         See `atwood.simulate`.
     """
-    assembly = assemble_flat(flat, form=form, level=level)
     result = simulate(
-        assembly,
+        assembled(form, level),
         t_end=t_end,
         rtol=rtol,
         outputs=outputs,

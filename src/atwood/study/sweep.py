@@ -17,7 +17,7 @@ from atwood.model.composite import Model
 from atwood.pipeline import assemble
 from atwood.solve.choice import check_solver
 from atwood.solve.driver import SolverOptions
-from atwood.solve.options import RunOptions, sample_times
+from atwood.solve.options import RunOptions, end_of_run, sample_times
 from atwood.study.cases import Cases, make_cases
 from atwood.study.sweep_batch import run_batches, why_not_batched
 from atwood.study.sweep_result import Sweep, SweepStatistics
@@ -37,7 +37,7 @@ def sweep(
     start: Mapping[str, Any] | None = None,
     combine: str = "grid",
     quantities: Iterable[str] | None = None,
-    t_end: float | None = None,
+    t_end: float | str | None = None,
     outputs: Any = None,
     form: str = "reduced",
     level: str = "ggl",
@@ -105,7 +105,7 @@ def sweep(
         raise UsageError("it was assembled from leaves, so that its scene is not known", where=assembly.flat.name)
     cases = make_cases(source, vary, start, combine)
     first = _first(assembly, cases)
-    end = assembly.flat.t_end if t_end is None else float(t_end)
+    end = end_of_run(t_end, assembly.flat.t_end)
     order = Order(
         first,
         cases,
