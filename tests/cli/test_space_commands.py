@@ -64,6 +64,15 @@ def test_parameters_of_arrays_keep_their_values_and_units() -> None:
     assert row[1:3] == ["0", "N*m/rad"]
 
 
+@pytest.mark.parametrize("width", [40, 60, 80])
+def test_no_name_and_no_value_is_cut_where_the_terminal_is_narrow(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    listing = lines("info", "simple-pendulum")
+    rows = [line.split() for line in listing[listing.index("") + 2 :]]
+    assert ["rod.length", "1", "m"] in [row[:3] for row in rows]
+    assert not any("…" in line for line in listing)
+
+
 def test_what_a_start_leaves_free_is_said_in_its_own_words() -> None:
     text = " ".join(" ".join(lines("info", "free-body")).split())
     assert "the orientation of body" in text

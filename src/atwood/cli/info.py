@@ -74,7 +74,7 @@ def _print(found: MechanismReport, moved: bool) -> None:
     listing.add_column("parameter", no_wrap=True)
     listing.add_column("value", justify="right", no_wrap=True)
     listing.add_column("unit", no_wrap=True)
-    listing.add_column("meaning", overflow="ellipsis", no_wrap=True)
+    listing.add_column("meaning", overflow="fold")
     for (_, value, unit, meaning), paths in list(groups.items())[:_SHOWN]:
         listing.add_row(shorten(paths, 3, least=2), f"{value:g}", "" if unit == "1" else unit, meaning)
     out.print(listing)
