@@ -5,14 +5,14 @@ All of them are absent, and cost nothing, while their parameters are zero or not
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, Load, Scalar, dissipation, force, is_zero, parameter, potential, signal
+from atwood import Scalar, dissipation, parameter, potential
+from atwood_library.interfaces.axis_motor import AxisMotor
 from atwood_library.interfaces.loads import damper_function, elastic_energy
 
 
-class LoadedHinge(Component):
+class LoadedHinge(AxisMotor):
     """A joint between frames a and b with the observables `angle` and `angular_velocity`, which can carry loads."""
 
     stiffness: float = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring for one radian.")
@@ -23,7 +23,6 @@ class LoadedHinge(Component):
     )
     lower_stop: float | None = parameter(None, unit="rad", doc="Angle below which a stop acts; none if not given.")
     upper_stop: float | None = parameter(None, unit="rad", doc="Angle above which a stop acts; none if not given.")
-    motor: float = signal(0.0, unit="N*m", doc="Torque of the motor on frame b, and against frame a.")
 
     @potential
     def spring_energy(self) -> Scalar:
@@ -37,13 +36,3 @@ class LoadedHinge(Component):
         """Return half the power of the damper."""
         joint: Any = self
         return damper_function(lambda: (joint.angular_velocity(),), self.damping)
-
-    @force
-    def motor_torque(self) -> Iterable[Load]:
-        """Return the torque of the motor on both frames."""
-        if is_zero(self.motor):
-            return
-        joint: Any = self
-        torque = joint.axis_in_world() * self.motor
-        yield Load(joint.b, torque=torque)
-        yield Load(joint.a, torque=-torque)

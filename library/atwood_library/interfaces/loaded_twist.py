@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, Load, Scalar, dissipation, force, is_zero, parameter, potential, signal
+from atwood import Scalar, dissipation, parameter, potential
+from atwood_library.interfaces.axis_motor import AxisMotor
 from atwood_library.interfaces.loads import damper_function, elastic_energy
 
 
-class LoadedTwist(Component):
+class LoadedTwist(AxisMotor):
     """A joint with `angle` and `angular_velocity` about an axis, beside displacements with loads of their own."""
 
     torsional_stiffness: float = parameter(
@@ -28,7 +28,6 @@ class LoadedTwist(Component):
     upper_angle_stop: float | None = parameter(
         None, unit="rad", doc="Angle above which a stop acts; none if not given."
     )
-    motor: float = signal(0.0, unit="N*m", doc="Torque of the motor on frame b, and against frame a.")
 
     @potential
     def torsion_energy(self) -> Scalar:
@@ -42,13 +41,3 @@ class LoadedTwist(Component):
         """Return half the power of the torsion damper."""
         joint: Any = self
         return damper_function(lambda: (joint.angular_velocity(),), self.torsional_damping)
-
-    @force
-    def motor_torque(self) -> Iterable[Load]:
-        """Return the torque of the motor on both frames."""
-        if is_zero(self.motor):
-            return
-        joint: Any = self
-        torque = joint.axis_in_world() * self.motor
-        yield Load(joint.b, torque=torque)
-        yield Load(joint.a, torque=-torque)

@@ -1,0 +1,24 @@
+"""AxisMotor: a motor about the axis of a joint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from atwood import Component, Load, force, is_zero, signal
+
+
+class AxisMotor(Component):
+    """A joint between frames a and b with an `axis_in_world`, about which a motor turns b against a."""
+
+    motor: float = signal(0.0, unit="N*m", doc="Torque of the motor on frame b, and against frame a.")
+
+    @force
+    def motor_torque(self) -> Iterable[Load]:
+        """Return the torque of the motor on both frames."""
+        if is_zero(self.motor):
+            return
+        joint: Any = self
+        torque = joint.axis_in_world() * self.motor
+        yield Load(joint.b, torque=torque)
+        yield Load(joint.a, torque=-torque)
