@@ -376,3 +376,10 @@ def test_a_direction_that_is_none_is_refused(axis):
 def test_words_are_directions_only():
     with pytest.raises(ParameterError, match="not 3 numbers"):
         Weld(displacement="x")
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_contradiction_is_told_in_the_angles_that_were_given(form: str) -> None:
+    error = refused(hung(Pivot(axis=(0.0, 0.0, 1.0)), {"body.theta": 0.5, "body.phi": 0.1}), form)
+    assert error.where == "body.theta"
+    assert "body.theta = 0.5, body.phi = 0.1 cannot all hold" in error.message

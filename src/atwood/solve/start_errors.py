@@ -16,7 +16,7 @@ from atwood.solve.closing import Nearest, closest, closest_of_all, units_of_rows
 from atwood.solve.gaps import Gap, find_gaps
 from atwood.solve.matrices import independent_rows, row_scales, scaled
 from atwood.solve.start_system import MET, System
-from atwood.solve.start_targets import Level, Target
+from atwood.solve.start_targets import Level, Target, as_said
 
 __all__ = ["Failed", "contradiction", "explain_positions", "far_from_guess", "freedom_at", "wrong_way_round"]
 
@@ -220,7 +220,7 @@ def far_from_guess(failed: Failed, found: FloatArray, wrong: Sequence[str]) -> S
     gaps = _gaps(failed, failed.nearest)
     open_ones = [gap for gap in gaps if gap.size(failed.length) > _CLOSED]
     if not open_ones:
-        text, where = "what is fixed cannot hold near the guess", (failed.level.fixed or guessed)[0].path
+        text, where = "what is fixed cannot hold near the guess", (failed.level.fixed or guessed)[0].where
         return StartError(text, where=where, advice=f"It holds elsewhere; {elsewhere}")
     worst = _largest(open_ones, failed.length)
     by = worst.describe(failed.length)
@@ -244,7 +244,7 @@ def wrong_way_round(failed: Failed, part: str, advice: str = "") -> StartError:
         What to do, if more is known.
     """
     loop = _loop_through(failed.assembly, part)
-    fixed = [f"{one.path} = {one.value:g}" for one in failed.level.fixed]
+    fixed = as_said(failed.level.fixed)
     return StartError(
         "the loop closes near the guess only with this joint the wrong way round: its two frames would be half a turn "
         "away from how it joins them" + (f" (the loop of {', '.join(loop)})" if loop else ""),
@@ -314,11 +314,11 @@ def contradiction(fixed: Sequence[Target], missing: FloatArray, freedom: int, re
         What else there is to say.
     """
     failing = [target for target, miss in zip(fixed, missing, strict=True) if not abs(miss) <= MET]
-    names = [f"{target.path} = {target.value:g}" for target in failing or fixed]
+    names = as_said(failing or fixed)
     count = f"The mechanism has {freedom} free coordinate{'s' if freedom != 1 else ''}"
     return StartError(
         f"the start values contradict each other or the constraints: {', '.join(names)} cannot all hold{remark}",
-        where=(failing or fixed)[0].path if fixed else "",
+        where=(failing or fixed)[0].where if fixed else "",
         advice=f"{count if freedom else 'Nothing in the mechanism can move'}; "
         "fix fewer values, or give some as guesses (on the command line: --start PATH=free).",
     )

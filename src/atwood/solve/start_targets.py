@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -16,7 +16,7 @@ from atwood.forms.source import no_start_quantity
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.observables import Observable
 
-__all__ = ["Level", "Target", "said", "sort_targets"]
+__all__ = ["Level", "Target", "as_said", "said", "sort_targets"]
 
 FloatArray = NDArray[np.float64]
 
@@ -27,11 +27,31 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class Target:
-    """A quantity with the value that it is to have at the start."""
+    """A quantity with the value that it is to have at the start.
+
+    Attributes
+    ----------
+    path, value, observable
+        The quantity, its value, and what computes it.
+    given
+        What was said instead, where a part says it in another way: paths and values of its Euler angles, for one.
+    """
 
     path: str
     value: float
     observable: Observable
+    given: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def where(self) -> str:
+        """The path under which it was said."""
+        return self.given[0][0] if self.given else self.path
+
+
+def as_said(targets: Iterable[Target]) -> list[str]:
+    """Return targets in the words in which they were given, each of these once."""
+    words = (pair for one in targets for pair in (one.given or ((one.path, one.value),)))
+    return [f"{path} = {value:g}" for path, value in dict(words).items()]
 
 
 @dataclass(frozen=True)
@@ -46,17 +66,23 @@ def sort_targets(assembly: Assembly, equations: Equations) -> tuple[Level, Level
     """Return what is said of positions and of speeds at the start."""
     levels = (Level([], []), Level([], []))
     for is_fixed, given in ((True, assembly.flat.start), (False, assembly.flat.guess)):
-        for path, value in _restated(assembly, given).items():
+        restated, origins = _restated(assembly, given)
+        for path, value in restated.items():
             number = assembly.shared.get(("start level", path), partial(_find_level, assembly, equations, path))
             level = levels[number]
-            target = Target(path, value, assembly.start_observables[path])
+            target = Target(path, value, assembly.start_observables[path], origins.get(path, ()))
             (level.fixed if is_fixed else level.guessed).append(target)
     return levels
 
 
-def _restated(assembly: Assembly, given: Mapping[str, float]) -> dict[str, float]:
+Origins = dict[str, tuple[tuple[str, float], ...]]
+"""For the path of a value that was said in another way, what was said."""
+
+
+def _restated(assembly: Assembly, given: Mapping[str, float]) -> tuple[dict[str, float], Origins]:
     """Return start values with those that a part says in another way said so; see `Component.restate_start`."""
     found = dict(given)
+    origins: Origins = {}
     said: dict[str, dict[str, float]] = {}
     for key, value in given.items():
         path, _, name = key.rpartition(".")
@@ -78,7 +104,9 @@ def _restated(assembly: Assembly, given: Mapping[str, float]) -> dict[str, float
             for name in own:
                 del found[f"{path}.{name}"]
             found.update({f"{path}.{name}": value for name, value in restated.items()})
-    return found
+            instead = tuple((f"{path}.{name}", value) for name, value in own.items() if name not in restated)
+            origins.update({f"{path}.{name}": instead for name in restated if name not in own})
+    return found, origins
 
 
 def _find_level(assembly: Assembly, equations: Equations, path: str) -> int:
