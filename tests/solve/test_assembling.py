@@ -23,6 +23,7 @@ from atwood_library import (
     PointMass,
     RigidBody,
     Rod,
+    Rope,
     Screw,
     Slider,
     Spherical,
@@ -431,3 +432,19 @@ def test_what_nothing_holds_up_hangs() -> None:
     for i in range(3):
         assert result[f"bob{i}.position.y"][0] == pytest.approx(0.0, abs=1e-12)
         assert result[f"bob{i}.position.z"][0] == pytest.approx(-math.sqrt(0.75) * (i + 1), rel=1e-12)
+
+
+def test_a_rope_that_cannot_be_taut_could_start_slack() -> None:
+    scene = Scene(space="space")
+    ground, rope, bob = (
+        scene.add("ground", Ground()),
+        scene.add("rope", Rope(length=1.0)),
+        scene.add("bob", PointMass()),
+    )
+    scene.connect(ground.frame, rope.a)
+    scene.connect(rope.b, bob.point)
+    scene.start.update({f"bob.position.{axis}": 0.4 for axis in "xyz"})
+    with pytest.raises(StartError, match=r"rope stays open by 0\.307\d* m .*can also start slack: starts='slack'"):
+        simulate(scene)
+    scene.set("rope.starts", "slack")
+    assert simulate(scene, t_end=0.1).status == "finished"

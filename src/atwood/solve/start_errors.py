@@ -118,7 +118,17 @@ def _what_stays_open(failed: Failed) -> str:
         return ""
     worst = _largest(_gaps(failed, best.coordinates), failed.length)
     by = worst.describe(failed.length)
-    return f"; with {'it' if len(fixed) == 1 else 'them'}, {worst.part} stays open by {by} at least"
+    ways = _other_ways_to_start(failed.assembly, worst.part)
+    return f"; with {'it' if len(fixed) == 1 else 'them'}, {worst.part} stays open by {by} at least{ways}"
+
+
+def _other_ways_to_start(assembly: Assembly, path: str) -> str:
+    """Return, in words, in which other modes a part can start, such as a rope that is slack."""
+    component = assembly.flat.parts[path].component
+    others = [mode for mode in component.modes if mode != assembly.modes.get(path)]
+    if not others or not component.mode_parameter:
+        return ""
+    return f" (it can also start {' or '.join(others)}: {component.mode_parameter}={others[0]!r})"
 
 
 def _gaps(failed: Failed, q: FloatArray) -> list[Gap]:
