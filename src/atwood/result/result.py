@@ -270,10 +270,11 @@ class Result:
             for passage in segment.passages:
                 clear &= ~passage.leaves_open(t)
             values, power = np.full((len(segment.assembly.reactions), len(t)), np.nan), np.zeros(len(t))
-            values[:, clear], power[clear] = self._solver(segment).at(
-                t[clear], segment.coordinates[:, clear], segment.speeds[:, clear]
-            )
-            power[~clear] = np.interp(t[~clear], t[clear], power[clear])
+            if np.any(clear):  # otherwise it is a stretch within a moment, in which no work is done
+                values[:, clear], power[clear] = self._solver(segment).at(
+                    t[clear], segment.coordinates[:, clear], segment.speeds[:, clear]
+                )
+                power[~clear] = np.interp(t[~clear], t[clear], power[clear])
             self._reaction_cache[id(segment)] = values, power
         return self._reaction_cache[id(segment)]
 
