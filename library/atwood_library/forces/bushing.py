@@ -9,7 +9,6 @@ from atwood import (
     Vector,
     as_vector,
     connector,
-    cross,
     dissipation,
     dot,
     event,
@@ -18,6 +17,7 @@ from atwood import (
     parameter,
     potential,
 )
+from atwood_library.interfaces.bearings import velocity_seen
 from atwood_library.interfaces.rotation_vector import half_turn_margin, rotation_vector
 
 _ZERO = (0.0, 0.0, 0.0)
@@ -70,8 +70,7 @@ class Bushing(Component):
     @dissipation
     def rayleigh_function(self) -> Scalar:
         """Return half the dissipated power."""
-        arm = self.b.position - self.a.position
-        seen = self.b.velocity - self.a.velocity - cross(self.a.angular_velocity, arm)
+        seen = velocity_seen(self.a, self.b)
         spin = self.a.to_frame(self.b.angular_velocity - self.a.angular_velocity)
         power = _half_square(as_vector(self.damping), self._kept(self.a.to_frame(seen)))
         return power + _half_square(as_vector(self.turning_damping), self._kept_turns(spin))

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from atwood import Component, Load, force, is_zero, signal
+from atwood_library.interfaces.loads import turn_apart
 
 
 class AxisMotor(Component):
@@ -19,6 +20,4 @@ class AxisMotor(Component):
         if is_zero(self.motor):
             return
         joint: Any = self
-        torque = joint.axis_in_world() * self.motor
-        yield Load(joint.b, torque=torque)
-        yield Load(joint.a, torque=-torque)
+        yield from turn_apart(joint.a, joint.b, joint.axis_in_world() * self.motor)

@@ -17,6 +17,7 @@ __all__ = [
     "twist_cosine",
     "twist_rate",
     "unturned_torque",
+    "velocity_seen",
 ]
 
 
@@ -80,8 +81,13 @@ def rate_about(a: Frame, b: Frame, axis: Vector) -> Scalar:
 
 def rate_along(a: Frame, b: Point, axis: Vector) -> Scalar:
     """Return the speed of b along an axis of frame a, as seen from frame a, m/s."""
-    seen = b.velocity - a.velocity - cross(a.angular_velocity, b.position - a.position)
-    return dot(seen, a.to_world(axis))
+    return dot(velocity_seen(a, b), a.to_world(axis))
+
+
+def velocity_seen(a: Frame, b: Point) -> Vector:
+    """Return the velocity of b as seen from frame a, in world axes, m/s (Goldstein, section 4.9)."""
+    seen: Vector = b.velocity - a.velocity - cross(a.angular_velocity, b.position - a.position)
+    return seen
 
 
 def twist_about(a: Frame, b: Frame, axis: Vector) -> Scalar:

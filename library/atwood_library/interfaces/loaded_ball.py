@@ -20,7 +20,7 @@ from atwood import (
     potential,
     signal,
 )
-from atwood_library.interfaces.loads import beyond_bend, damper_function
+from atwood_library.interfaces.loads import beyond_bend, damper_function, turn_apart
 
 
 class LoadedBall(Component):
@@ -77,6 +77,4 @@ class LoadedBall(Component):
         if all(is_zero(motor) for motor in (self.motor_x, self.motor_y, self.motor_z)):
             return
         joint: Any = self
-        torque = joint.a.to_world(Vector(self.motor_x, self.motor_y, self.motor_z))
-        yield Load(joint.b, torque=torque)
-        yield Load(joint.a, torque=-torque)
+        yield from turn_apart(joint.a, joint.b, joint.a.to_world(Vector(self.motor_x, self.motor_y, self.motor_z)))

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from atwood import Component, Load, Scalar, as_vector, dissipation, force, is_zero, parameter, potential, signal
-from atwood_library.interfaces.loads import damper_function, elastic_energy
+from atwood_library.interfaces.loads import damper_function, elastic_energy, turn_apart
 
 
 class LoadedCross(Component):
@@ -58,6 +58,4 @@ class LoadedCross(Component):
         joint: Any = self
         for frame, axis, motor in ((joint.a, joint.axis_a, self.motor_a), (joint.b, joint.axis_b, self.motor_b)):
             if not is_zero(motor):
-                torque = frame.to_world(as_vector(axis)) * motor
-                yield Load(joint.b, torque=torque)
-                yield Load(joint.a, torque=-torque)
+                yield from turn_apart(joint.a, joint.b, frame.to_world(as_vector(axis)) * motor)

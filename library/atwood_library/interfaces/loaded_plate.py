@@ -11,7 +11,6 @@ from atwood import (
     Scalar,
     Vector,
     as_vector,
-    cross,
     dissipation,
     dot,
     force,
@@ -23,7 +22,7 @@ from atwood import (
     signal,
 )
 from atwood_library.interfaces.bearings import rate_along
-from atwood_library.interfaces.loads import beyond_rim, damper_function
+from atwood_library.interfaces.loads import beyond_rim, damper_function, push_apart
 
 
 class LoadedPlate(Component):
@@ -65,8 +64,7 @@ class LoadedPlate(Component):
         joint: Any = self
         first, second = normals(as_vector(joint.axis))
         push = joint.a.to_world(first * self.actuator_1 + second * self.actuator_2)
-        yield Load(joint.b, force=push)
-        yield Load(joint.a, force=-push, torque=cross(joint.b.position - joint.a.position, -push))
+        yield from push_apart(joint.a, joint.b, push)
 
     @observable(unit="m", doc="Displacement along the first direction of the plane.", rate="speed_1", spaces=("space",))
     def displacement_1(self) -> Scalar:

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, Load, Scalar, cross, dissipation, force, is_zero, parameter, potential, signal
-from atwood_library.interfaces.loads import damper_function, elastic_energy
+from atwood import Component, Load, Scalar, dissipation, force, is_zero, parameter, potential, signal
+from atwood_library.interfaces.loads import damper_function, elastic_energy, push_apart
 
 
 class LoadedSlide(Component):
@@ -42,7 +42,4 @@ class LoadedSlide(Component):
         if is_zero(self.actuator):
             return
         joint: Any = self
-        push = joint.axis_in_world() * self.actuator
-        yield Load(joint.b, force=push)
-        arm = joint.b.position - joint.a.position
-        yield Load(joint.a, force=-push, torque=cross(arm, -push))
+        yield from push_apart(joint.a, joint.b, joint.axis_in_world() * self.actuator)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
-from atwood import Scalar, Vector, cos, dot, is_zero, maximum, minimum, sin
+from atwood import Frame, Load, Point, Scalar, Vector, cos, cross, dot, is_zero, maximum, minimum, sin
 
-__all__ = ["beyond_bend", "beyond_rim", "damper_function", "elastic_energy"]
+__all__ = ["beyond_bend", "beyond_rim", "damper_function", "elastic_energy", "push_apart", "turn_apart"]
 
 
 def elastic_energy(
@@ -100,3 +100,15 @@ def beyond_bend(cosine: Callable[[], Scalar], stiffness: float, limit: float | N
     beyond = maximum((cos(limit) - cosine()) / sin(limit), 0.0)
     energy: Scalar = 0.5 * stiffness * beyond * beyond
     return energy
+
+
+def turn_apart(a: Frame, b: Frame, torque: Vector) -> Iterator[Load]:
+    """Yield a torque on frame b, in world axes, N m, and its reaction on frame a."""
+    yield Load(b, torque=torque)
+    yield Load(a, torque=-torque)
+
+
+def push_apart(a: Frame, b: Point, push: Vector) -> Iterator[Load]:
+    """Yield a force on b, in world axes, N, and its reaction on frame a at the place of b."""
+    yield Load(b, force=push)
+    yield Load(a, force=-push, torque=cross(b.position - a.position, -push))

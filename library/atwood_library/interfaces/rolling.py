@@ -19,6 +19,7 @@ from atwood import (
     observable,
     parameter,
 )
+from atwood_library.interfaces.bearings import rate_along
 
 __all__ = ["Rolling"]
 
@@ -127,24 +128,20 @@ class Rolling(Component):
         """Return the displacement."""
         return dot(self.b.position - self.a.position, self.a.to_world(self.directions()[1]))
 
-    def seen(self) -> Vector:
-        """Return the velocity of the centre as seen from the plane, in world axes."""
-        return self.b.velocity - self.a.velocity - cross(self.a.angular_velocity, self.b.position - self.a.position)
-
     @observable(unit="m/s", doc="Rate of the displacement along the line.", spaces=("plane",))
     def speed(self) -> Scalar:
         """Return the velocity along the line."""
-        return dot(self.seen(), self.a.to_world(self.directions()[0]))
+        return rate_along(self.a, self.b, self.directions()[0])
 
     @observable(unit="m/s", doc="Rate of the displacement along the first direction.", spaces=("space",))
     def speed_1(self) -> Scalar:
         """Return the velocity along the first direction."""
-        return dot(self.seen(), self.a.to_world(self.directions()[0]))
+        return rate_along(self.a, self.b, self.directions()[0])
 
     @observable(unit="m/s", doc="Rate of the displacement along the second direction.", spaces=("space",))
     def speed_2(self) -> Scalar:
         """Return the velocity along the second direction."""
-        return dot(self.seen(), self.a.to_world(self.directions()[1]))
+        return rate_along(self.a, self.b, self.directions()[1])
 
     @observable(unit="m", doc="Position of the contact in world axes.", spaces=("plane", "space"))
     def contact(self) -> Vector:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from atwood import FREE, Component, Frame, Placement, Scalar, Vector, connector, cross, joint, observable
+from atwood import FREE, Component, Frame, Placement, Scalar, Vector, connector, joint, observable
+from atwood_library.interfaces.bearings import velocity_seen
 
 
 class FreeJoint(Component):
@@ -37,5 +38,4 @@ class FreeJoint(Component):
     @observable(unit="m/s", doc="Velocity of b as seen from frame a, in the axes of a.", spaces=("space",))
     def velocity(self) -> Vector:
         """Return the velocity."""
-        arm = self.b.position - self.a.position
-        return self.a.to_frame(self.b.velocity - self.a.velocity - cross(self.a.angular_velocity, arm))
+        return self.a.to_frame(velocity_seen(self.a, self.b))

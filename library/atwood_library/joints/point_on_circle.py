@@ -25,7 +25,9 @@ from atwood import (
     parameter,
     sin,
 )
+from atwood_library.interfaces.bearings import velocity_seen
 from atwood_library.interfaces.loaded_hinge import LoadedHinge
+from atwood_library.interfaces.loads import push_apart
 
 
 class PointOnCircle(LoadedHinge):
@@ -69,8 +71,9 @@ class PointOnCircle(LoadedHinge):
     def angular_velocity(self) -> Scalar:
         """Return the rate of the angle as seen from frame a."""
         arm = self.b.position - self.a.position
-        seen = self.b.velocity - self.a.velocity - cross(self.a.angular_velocity, arm)
-        return dot(cross(arm, seen), self.a.to_world(as_vector(self.axis))) / (self.radius * self.radius)
+        return dot(cross(arm, velocity_seen(self.a, self.b)), self.a.to_world(as_vector(self.axis))) / (
+            self.radius * self.radius
+        )
 
     @force
     def motor_torque(self) -> Iterable[Load]:
@@ -79,5 +82,4 @@ class PointOnCircle(LoadedHinge):
             return
         arm = self.b.position - self.a.position
         push = cross(self.a.to_world(as_vector(self.axis)), arm) * (self.motor / (self.radius * self.radius))
-        yield Load(self.b, force=push)
-        yield Load(self.a, force=-push, torque=cross(arm, -push))
+        yield from push_apart(self.a, self.b, push)
