@@ -1,0 +1,33 @@
+"""The kinds of trials, and the modules that make them."""
+
+from __future__ import annotations
+
+import importlib
+import time
+import traceback
+from collections.abc import Callable
+
+from .trial import Discarded, Finding, Trial
+
+KINDS: dict[str, str] = {}
+"""Name of a kind and its module, whose `check(seed)` makes a trial."""
+
+
+def checker(kind: str) -> Callable[[int], Trial]:
+    """Return the function that makes trials of a kind."""
+    check: Callable[[int], Trial] = importlib.import_module(f".{KINDS[kind]}", __package__).check
+    return check
+
+
+def run_trial(kind: str, seed: int) -> tuple[Trial, float]:
+    """Make one trial; return it with the seconds that it took. Whatever it raises is a finding."""
+    began = time.perf_counter()
+    try:
+        trial = checker(kind)(seed)
+    except Discarded as reason:
+        trial = Trial((f"discarded: {reason}",))
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        what = f"{type(error).__name__} from {last.name} in {last.filename.rsplit('/', 1)[-1]}"
+        trial = Trial(("raised",), (Finding("crash", what, traceback.format_exc()),))
+    return trial, time.perf_counter() - began
