@@ -359,6 +359,7 @@ def test_ctrl_c_shows_and_saves_what_is_done(tmp_path: Path) -> None:
     file = tmp_path / "part.npz"
     script = (
         "import os, signal, threading\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it\n"
         "from atwood.cli import main\n"
         "import atwood.solve.record as recording\n"
         "inner, timers = recording.Recorder.take, []\n"

@@ -375,6 +375,7 @@ class TestLimits:
         here = Path(__file__).resolve()
         script = (
             "import os, signal, sys, threading; sys.path.insert(0, sys.argv[1]); import test_ida_driver as tests\n"
+            "signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it\n"
             "tests.open_session = tests.DRIVERS[sys.argv[2]]\n"
             "session = tests.start(tests.oscillator(), tests.LOOSE, [1, 0], [0, -1])\n"
             "session.advance(1.0)\n"

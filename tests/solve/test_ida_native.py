@@ -634,5 +634,17 @@ class TestLife:
         assert_allclose(session.advance(6.0).y[0], math.cos(6.0), atol=1e-6)
 
     def test_ctrl_c_has_its_own_handler_back(self) -> None:
-        self.open().advance(1.0)
-        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
+        try:
+            self.open().advance(1.0)
+            assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+    def test_an_interrupt_that_is_ignored_stays_ignored(self) -> None:
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            self.open().advance(1.0)
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        finally:
+            signal.signal(signal.SIGINT, before)
