@@ -52,12 +52,9 @@ from atwood.expr.operations import ExternalFunction
 from atwood.model.component import Component
 from atwood.model.composite import Model, connect
 from atwood.model.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
+from atwood.model.contributions import BodyInertia, Load, Placement, PointInertia
 from atwood.model.fields import parameter, signal
 from atwood.model.laws import (
-    BodyInertia,
-    Load,
-    Placement,
-    PointInertia,
     constraint,
     dissipation,
     event,

@@ -16,7 +16,8 @@ import atwood_library
 from atwood.expr import Graph, evaluate
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, Motion
-from atwood.model.laws import BodyInertia, Load, Placement, PointInertia, scalars
+from atwood.model.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.laws import scalars
 from atwood.model.space import FIXED_AXES, make_space, planar_axes
 from atwood.model.units import parse_si_unit
 

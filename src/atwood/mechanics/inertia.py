@@ -10,7 +10,7 @@ import numpy as np
 from atwood.errors import DeclarationError, ParameterError
 from atwood.expr import Expression, Scalar, evaluate, is_zero
 from atwood.mechanics.orientation import NodeTurn, rotate
-from atwood.model.laws import BodyInertia
+from atwood.model.contributions import BodyInertia
 from atwood.model.local import LocalPart
 from atwood.model.rotation import Axes, from_axes, transposed
 from atwood.model.space import Space

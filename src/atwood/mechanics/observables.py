@@ -15,7 +15,7 @@ from atwood.mechanics.kinematics import Kinematics
 from atwood.mechanics.orientation import NodeTurn, node_axes, spin_in_world
 from atwood.model.component import Binding
 from atwood.model.connectors import Frame, JointCoordinate, Motion
-from atwood.model.laws import BodyInertia
+from atwood.model.contributions import BodyInertia
 from atwood.model.local import LocalPart
 from atwood.model.rotation import from_axes, to_axes
 from atwood.model.space import FIXED_AXES

@@ -9,7 +9,7 @@ from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.forces import Forces, in_joint_coordinates, local_map, part_forces
 
-__all__ = ["applied_power"]
+__all__ = ["applied_power", "switched_energy"]
 
 
 def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
@@ -43,4 +43,24 @@ def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
             total = total + c * w
     for symbol, force_on_joint in forces.on_joints.items():
         total = total + force_on_joint * kinematics.joint_rates[symbol]
+    return total
+
+
+def switched_energy(mechanism: Mechanism, equations: Equations) -> Expression:
+    """Return the energy, J, of the potentials that act in some modes only, which comes and goes with these.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    equations
+        Its equations in one form.
+    """
+    kinematics = equations.kinematics
+    signals = resolve_signals(mechanism, equations.site, kinematics)
+    total = equations.graph.constant(0.0)
+    for local in mechanism.locals_.values():
+        mapping = {**local_map(equations.site, local, kinematics), **signals}
+        for value in in_joint_coordinates(local, kinematics, local.switched)[0]:
+            total = total + substitute([value], mapping)[0]
     return total

@@ -17,7 +17,7 @@ from atwood.mechanics.forces import Forces, constraint_forces, in_coordinates, l
 from atwood.mechanics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.observables import Reaction
 from atwood.mechanics.orientation import inertial_torque, spin_in_world, torque_components
-from atwood.model.laws import BodyInertia
+from atwood.model.contributions import BodyInertia
 from atwood.model.space import Space
 from atwood.model.vector import Vector, cross
 from atwood.topology.bodies import Body

@@ -10,21 +10,15 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, overload
 
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
-from atwood.model.connectors import Frame, JointCoordinate, Point
 from atwood.model.quantities import ObservableLaw
-from atwood.model.rotation import FreeRotation, Rotation
 from atwood.model.units import parse_si_unit
-from atwood.model.vector import ZERO, Vector, as_vector
+from atwood.model.vector import Vector
 
 __all__ = [
-    "BodyInertia",
-    "Load",
-    "Placement",
-    "PointInertia",
     "constraint",
     "dissipation",
     "event",
@@ -58,92 +52,10 @@ class Law:
 
 
 @dataclass(frozen=True)
-class PointInertia:
-    """Kinetic energy ``1/2 sum_ij m_ij v_i . v_j`` of material points.
+class ActingOptions:
+    """In which modes a potential, a Rayleigh function or loads act; in all when empty."""
 
-    Attributes
-    ----------
-    points
-        Where the velocities are taken.
-    masses
-        The symmetric mass matrix m_ij, kg, row by row.
-    """
-
-    points: Sequence[Point]
-    masses: Sequence[Sequence[Scalar]]
-
-
-@dataclass(frozen=True)
-class BodyInertia:
-    """Inertia of a rigid body.
-
-    Attributes
-    ----------
-    frame
-        The frame it is fixed in.
-    mass
-        Mass, kg.
-    center_of_mass
-        Position of the centre of mass in the axes of the frame, m.
-    moment
-        Moment of inertia about the axis through the centre of mass, normal to the plane, kg m^2; in space not read.
-    tensor
-        Inertia tensor about the centre of mass in the axes of the frame, row by row, kg m^2; needed in space.
-    """
-
-    frame: Frame
-    mass: Scalar
-    center_of_mass: Vector
-    moment: Scalar
-    tensor: Sequence[Sequence[Scalar]] | None = None
-
-
-@dataclass(frozen=True)
-class Load:
-    """A force and a torque on whatever is connected at a connector, in world axes.
-
-    Attributes
-    ----------
-    at
-        Where they act.
-    force
-        N.
-    torque
-        N m; only at a frame.
-    """
-
-    at: Point
-    force: Vector = ZERO
-    torque: Vector = ZERO
-
-    def __post_init__(self) -> None:
-        if isinstance(self.at, JointCoordinate):
-            raise DeclarationError(
-                "a load acts on a point or a frame, and not on a joint's coordinate",
-                advice="Write it as a @potential of the coordinate and of time, or as a @dissipation of its rate.",
-            )
-        object.__setattr__(self, "force", as_vector(self.force))
-        object.__setattr__(self, "torque", as_vector(self.torque))
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Where connector b of a joint is, seen from connector a.
-
-    Attributes
-    ----------
-    displacement
-        Position of b minus position of a, m.
-    rotation
-        Rotation of frame b from frame a: an angle in the plane, counter-clockwise, rad, which in space is one about
-        -y; in space also a `Rotation`, or `FREE` where every rotation is free. None for a joint between points.
-    axes
-        ``"a"`` if the displacement is given in the axes of frame a, ``"world"`` if in world axes.
-    """
-
-    displacement: Vector
-    rotation: Scalar | Rotation | FreeRotation = None
-    axes: Literal["a", "world"] = "world"
+    modes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -201,22 +113,66 @@ def _mark(function: _F, law: Law) -> _F:
     return function
 
 
-def potential(function: _F) -> _F:
-    """Mark a method that returns a potential energy, J, from positions, angles and time."""
-    return _mark(function, Law("potential", function.__name__))
+def _acting(kind: Kind, function: _F | None, modes: Sequence[str]) -> _F | Callable[[_F], _F]:
+    """Mark a method by itself, or return what marks one with options."""
+    options = ActingOptions((modes,) if isinstance(modes, str) else tuple(modes))
+    if function is None:
+        return lambda method: _mark(method, Law(kind, method.__name__, options))
+    return _mark(function, Law(kind, function.__name__, options))
 
 
-def dissipation(function: _F) -> _F:
+@overload
+def potential(function: _F) -> _F: ...
+@overload
+def potential(*, modes: Sequence[str] = ()) -> Callable[[_F], _F]: ...
+def potential(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Callable[[_F], _F]:
+    """Mark a method that returns a potential energy, J, from positions, angles and time.
+
+    Parameters
+    ----------
+    function
+        The method, where the mark has no options.
+    modes
+        The modes of the component in which it acts; all when empty. Energy that is there when such a mode is entered,
+        or left, counts as work that was put in, or taken out, at that moment.
+    """
+    return _acting("potential", function, modes)
+
+
+@overload
+def dissipation(function: _F) -> _F: ...
+@overload
+def dissipation(*, modes: Sequence[str] = ()) -> Callable[[_F], _F]: ...
+def dissipation(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Callable[[_F], _F]:
     """Mark a method that returns a Rayleigh function, W: half the dissipated power, from velocities.
 
     The force on each connector is minus the derivative with respect to its velocity (Goldstein, section 1.5).
+
+    Parameters
+    ----------
+    function
+        The method, where the mark has no options.
+    modes
+        The modes of the component in which it acts; all when empty.
     """
-    return _mark(function, Law("dissipation", function.__name__))
+    return _acting("dissipation", function, modes)
 
 
-def force(function: _F) -> _F:
-    """Mark a method that returns the loads it puts on its connectors, an iterable of `Load`."""
-    return _mark(function, Law("force", function.__name__))
+@overload
+def force(function: _F) -> _F: ...
+@overload
+def force(*, modes: Sequence[str] = ()) -> Callable[[_F], _F]: ...
+def force(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Callable[[_F], _F]:
+    """Mark a method that returns the loads it puts on its connectors, an iterable of `Load`.
+
+    Parameters
+    ----------
+    function
+        The method, where the mark has no options.
+    modes
+        The modes of the component in which they act; all when empty.
+    """
+    return _acting("force", function, modes)
 
 
 def inertia(function: _F) -> _F:

@@ -15,10 +15,11 @@ from atwood.errors import AtwoodError, DeclarationError, ParameterError, Unsuppo
 from atwood.expr import Expression, Graph, Scalar, depends_on
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, JointCoordinate, Motion
+from atwood.model.contributions import BodyInertia, Placement, PointInertia
 from atwood.model.fields import ParameterSpec
 from atwood.model.flatten import FlatScene, Part
 from atwood.model.grips import counting_constraints, find_grips, formulas_of
-from atwood.model.laws import BodyInertia, Law, Placement, PointInertia, scalars
+from atwood.model.laws import Law, scalars
 from atwood.model.local_parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart
 from atwood.model.shafts import Held, find_held
 from atwood.model.space import FIXED_AXES, Space, planar_axes
@@ -138,14 +139,16 @@ def _localize_part(
     def laws(kind: Any) -> list[Law]:
         return [law for law in component.laws(kind) if law.holds_in(space.name) and law.acts_in(mode)]
 
-    def scalar_laws(kind: Any) -> tuple[Expression, ...]:
-        found = [_call(part, law, functools.partial(_scalar, bound, law, graph)) for law in laws(kind)]
+    def scalar_laws(kind: Any, only_in_modes: bool = False) -> tuple[Expression, ...]:
+        chosen = [law for law in laws(kind) if law.options.modes or not only_in_modes]
+        found = [_call(part, law, functools.partial(_scalar, bound, law, graph)) for law in chosen]
         return tuple(one for one in found if not one.is_zero)
 
     def listed_laws(kind: Any) -> list[Any]:
         return [one for law in laws(kind) for one in _call(part, law, functools.partial(_listed, bound, law))]
 
     potentials, dissipations = scalar_laws("potential"), scalar_laws("dissipation")
+    switched = scalar_laws("potential", only_in_modes=True)
     _check_reads(part, connectors, potentials, dissipations)
     inertias = listed_laws("inertia")
     joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws("joint"))
@@ -168,6 +171,7 @@ def _localize_part(
         signal_symbols=signal_symbols,
         formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in grips}},
         borrowed={full: end for one in grips for full, end in one.borrowed.items()},
+        switched=switched,
     )
 
 

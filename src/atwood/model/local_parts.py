@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 from atwood.expr import Expression
 from atwood.model.binding import Binding
+from atwood.model.contributions import BodyInertia, Load, Placement, PointInertia
 from atwood.model.flatten import Part
-from atwood.model.laws import BodyInertia, Law, Load, Placement, PointInertia
+from atwood.model.laws import Law
 from atwood.model.rotation import Axes
 from atwood.model.vector import Vector
 
@@ -97,6 +98,8 @@ class LocalPart:
         of the part's own, and everywhere of those that it takes hold of.
     borrowed
         Connectors of joints that it takes hold of, which are among its own under their full paths.
+    switched
+        Those of its potentials that act in some of its modes only.
     """
 
     part: Part
@@ -112,6 +115,7 @@ class LocalPart:
     signal_symbols: Mapping[str, Expression]
     formulas: Mapping[Expression, tuple[Expression, Expression | None]] = field(default_factory=dict)
     borrowed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    switched: tuple[Expression, ...] = ()
 
     @property
     def velocities(self) -> list[Expression]:

@@ -45,6 +45,7 @@ def make_ledger(
     potential: Sequence[FloatArray],
     power: Sequence[FloatArray | None],
     impacts: Sequence[bool],
+    switched: Sequence[FloatArray | None],
     shown: NDArray[np.bool_],
 ) -> EnergyLedger:
     """Return the ledger of a run from samples of each of its segments.
@@ -56,8 +57,10 @@ def make_ledger(
     power
         Power put in, W; None where there is none.
     impacts
-        For each segment, whether it began with an impact, which takes energy away. No other change of mode does; if
-        energy jumps there, that is drift.
+        For each segment, whether it began with an impact, which takes energy away.
+    switched
+        Samples of the potential energy that is there in some modes only, which counts as work when such a mode is
+        entered or left; None where there is none. If other energy jumps at a change of mode, that is drift.
     shown
         Which of all samples are outputs.
     """
@@ -65,6 +68,9 @@ def make_ledger(
     for i, (t, p) in enumerate(zip(times, power, strict=True)):
         if impacts[i]:
             carried += min(0.0, float(kinetic[i][0] - kinetic[i - 1][-1]))
+        if i:
+            after, before = switched[i], switched[i - 1]
+            carried += (0.0 if after is None else float(after[0])) - (0.0 if before is None else float(before[-1]))
         work.append(carried + (np.zeros(len(t)) if p is None else _integral(t, p)))
         carried = float(work[-1][-1])
     t_all, v_all, w_all = (np.concatenate(list(x)) for x in (kinetic, potential, work))

@@ -16,7 +16,7 @@ from atwood.errors import ResultError, suggestion_in_parts
 from atwood.expr import depends_on, substitute
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Constraint, Equations
-from atwood.mechanics.power import applied_power
+from atwood.mechanics.power import applied_power, switched_energy
 from atwood.model.quantities import Quantity
 from atwood.result.angles import unwrap
 from atwood.result.energy import EnergyLedger, make_ledger
@@ -283,7 +283,7 @@ class Result:
     @cached_property
     def energy(self) -> EnergyLedger:
         """Kinetic and potential energy, work, and how well they balance."""
-        kinetic, potential, power = [], [], []
+        kinetic, potential, power, switched = [], [], [], []
         for segment in self.run.segments:
             assembly = segment.assembly
             state = (segment.time[None, :], segment.coordinates, segment.speeds)
@@ -292,6 +292,7 @@ class Result:
             kinetic.append(energies[0])
             potential.append(energies[1])
             power.append(self._power(segment, state, idle))
+            switched.append(self._switched(segment, state, idle))
         if not all(np.all(np.isfinite(one)) for one in (*kinetic, *potential)):
             raise ResultError(
                 "the energy has no value somewhere along the run",
@@ -300,7 +301,7 @@ class Result:
             )
         impacts = [segment.impact for segment in self.run.segments]
         return make_ledger(
-            [segment.time for segment in self.run.segments], kinetic, potential, power, impacts, self._shown
+            [segment.time for segment in self.run.segments], kinetic, potential, power, impacts, switched, self._shown
         )
 
     def _without_energy(self) -> str:
@@ -309,6 +310,19 @@ class Result:
             if path.endswith("_energy") and not np.all(np.isfinite(self.samples(path))):
                 return path
         return self.assembly.flat.name
+
+    def _switched(
+        self, segment: Segment, state: tuple[FloatArray, ...], idle: tuple[FloatArray, ...]
+    ) -> FloatArray | None:
+        """Return the potential energy that is there in some modes only, or None if there is none."""
+        assembly = segment.assembly
+        program = assembly.known_program(
+            "switched energy", "switched energy", lambda: [switched_energy(assembly.mechanism, assembly.equations)]
+        )
+        if program.results[0].is_zero:
+            return None
+        found: FloatArray = assembly.kernel(program, vectorized=True)(*state, *idle)[0][0]
+        return found
 
     def _power(
         self, segment: Segment, state: tuple[FloatArray, ...], idle: tuple[FloatArray, ...]

@@ -18,7 +18,8 @@ from atwood.forms.program import state_groups
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.forces import local_map
 from atwood.model.component import bind
-from atwood.model.laws import Load, scalars
+from atwood.model.contributions import Load
+from atwood.model.laws import scalars
 from atwood.model.local import LocalPart
 from atwood.solve.driver import FloatArray
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from atwood.expr import Expression, depends_on, is_zero
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.orientation import body_offsets
-from atwood.model.laws import BodyInertia
+from atwood.model.contributions import BodyInertia
 from atwood.model.local import LocalPart
 from atwood.result.result import Result
 from atwood.view.joint_reading import numbers, read_joint

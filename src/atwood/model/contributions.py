@@ -1,0 +1,104 @@
+"""What laws return: inertia, loads, and the placements of joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from atwood.errors import DeclarationError
+from atwood.expr import Scalar
+from atwood.model.connectors import Frame, JointCoordinate, Point
+from atwood.model.rotation import FreeRotation, Rotation
+from atwood.model.vector import ZERO, Vector, as_vector
+
+__all__ = ["BodyInertia", "Load", "Placement", "PointInertia"]
+
+
+@dataclass(frozen=True)
+class PointInertia:
+    """Kinetic energy ``1/2 sum_ij m_ij v_i . v_j`` of material points.
+
+    Attributes
+    ----------
+    points
+        Where the velocities are taken.
+    masses
+        The symmetric mass matrix m_ij, kg, row by row.
+    """
+
+    points: Sequence[Point]
+    masses: Sequence[Sequence[Scalar]]
+
+
+@dataclass(frozen=True)
+class BodyInertia:
+    """Inertia of a rigid body.
+
+    Attributes
+    ----------
+    frame
+        The frame it is fixed in.
+    mass
+        Mass, kg.
+    center_of_mass
+        Position of the centre of mass in the axes of the frame, m.
+    moment
+        Moment of inertia about the axis through the centre of mass, normal to the plane, kg m^2; in space not read.
+    tensor
+        Inertia tensor about the centre of mass in the axes of the frame, row by row, kg m^2; needed in space.
+    """
+
+    frame: Frame
+    mass: Scalar
+    center_of_mass: Vector
+    moment: Scalar
+    tensor: Sequence[Sequence[Scalar]] | None = None
+
+
+@dataclass(frozen=True)
+class Load:
+    """A force and a torque on whatever is connected at a connector, in world axes.
+
+    Attributes
+    ----------
+    at
+        Where they act.
+    force
+        N.
+    torque
+        N m; only at a frame.
+    """
+
+    at: Point
+    force: Vector = ZERO
+    torque: Vector = ZERO
+
+    def __post_init__(self) -> None:
+        if isinstance(self.at, JointCoordinate):
+            raise DeclarationError(
+                "a load acts on a point or a frame, and not on a joint's coordinate",
+                advice="Write it as a @potential of the coordinate and of time, or as a @dissipation of its rate.",
+            )
+        object.__setattr__(self, "force", as_vector(self.force))
+        object.__setattr__(self, "torque", as_vector(self.torque))
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where connector b of a joint is, seen from connector a.
+
+    Attributes
+    ----------
+    displacement
+        Position of b minus position of a, m.
+    rotation
+        Rotation of frame b from frame a: an angle in the plane, counter-clockwise, rad, which in space is one about
+        -y; in space also a `Rotation`, or `FREE` where every rotation is free. None for a joint between points.
+    axes
+        ``"a"`` if the displacement is given in the axes of frame a, ``"world"`` if in world axes.
+    """
+
+    displacement: Vector
+    rotation: Scalar | Rotation | FreeRotation = None
+    axes: Literal["a", "world"] = "world"
