@@ -69,7 +69,7 @@ def test_a_suggestion_lists_a_short_choice_and_says_nothing_of_a_long_one() -> N
         ("hing.angle", "Did you mean 'hinge.angle'?"),
         ("car.wheel.rate", "car.wheel has turns."),
         ("car.motor.rate", "car has wheel.turns, speed."),
-        ("zzz", ""),
+        ("zzz", "There are quantities of hinge, car.wheel, car."),
     ],
 )
 def test_what_a_part_has_is_said_where_nothing_looks_alike(path, expected):

@@ -170,8 +170,16 @@ def suggestion_in_parts(path: str, known: Iterable[str], verb: str = "has") -> s
     tails = [name.removeprefix(f"{part}.") for name in own]
     close = near_matches(path.removeprefix(f"{part}."), tails)
     if not own or close:
-        return suggestion(path, [f"{part}.{tail}" for tail in close] or near_matches(path, choices))
+        whole = (name.removesuffix(".x").removesuffix(".y").removesuffix(".z") for name in choices)
+        parts = list(dict.fromkeys(name.rpartition(".")[0] for name in whole if "." in name))
+        near = [f"{part}.{tail}" for tail in close] or near_matches(path, choices) or near_matches(path, parts)
+        return suggestion(path, near) or (f"There are quantities of {', '.join(_first(parts))}." if parts else "")
     return f"{part} {verb} {', '.join(_vectors(tails))}."
+
+
+def _first(names: list[str]) -> list[str]:
+    """Return a list that can be read at a glance."""
+    return names if len(names) <= _SHORT_LIST else [*names[: _SHORT_LIST - 1], "..."]
 
 
 def _vectors(names: Iterable[str]) -> list[str]:

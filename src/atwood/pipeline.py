@@ -12,10 +12,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from atwood.errors import StartError, UsageError, suggestion
+from atwood.arguments import instance, number, optional, takes
+from atwood.errors import StartError
 from atwood.expr import Graph
 from atwood.forms.assembly import Assembly
-from atwood.forms.dae import LEVELS
 from atwood.forms.places import to_maximal
 from atwood.forms.source import Source
 from atwood.forms.starting import with_places
@@ -28,8 +28,22 @@ from atwood.model.flatten import FlatScene, flatten
 from atwood.model.local import LocalPart, ParameterTable, localize
 from atwood.model.space import make_space
 from atwood.result.result import Result
-from atwood.solve.options import RunOptions, end_of_run
+from atwood.solve.options import RunOptions
 from atwood.solve.run import run
+from atwood.solve.run_arguments import (
+    FORM,
+    LEVEL,
+    LIMITS,
+    NAME,
+    ORIENTATION,
+    OUTPUTS,
+    PROGRESS,
+    RTOL,
+    SAMPLES,
+    SOLVER,
+    STRUCTURE,
+    T_END,
+)
 from atwood.solve.sides import actual_sides, sides_differ
 from atwood.solve.start import find_start
 from atwood.topology.bodies import find_bodies
@@ -39,9 +53,10 @@ from atwood.topology.sides import find_sides
 
 __all__ = ["Assembly", "assemble", "assemble_flat", "simulate"]
 
-FORMS = ("reduced", "dae")
+SCENE = instance("a scene, or an assembly of one", Model, Assembly)
 
 
+@takes(scene=instance("a scene, such as Scene()", Model), form=FORM, level=LEVEL, orientation=ORIENTATION, name=NAME)
 def assemble(
     scene: Model,
     *,
@@ -105,10 +120,6 @@ def assemble_flat(
     sides
         On a line, the sign of lengths; as far as start values tell if not given.
     """
-    if form not in FORMS:
-        raise UsageError(f"there is no form {form!r}", advice=suggestion(form, FORMS))
-    if level not in LEVELS:
-        raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
     check_orientation(orientation, form)
     all_modes = {
         path: str(part.values.get(part.component.mode_parameter, part.component.modes[0]))
@@ -191,6 +202,21 @@ def read_mechanism(
     return mechanism
 
 
+@takes(
+    scene=SCENE,
+    form=FORM,
+    level=LEVEL,
+    orientation=ORIENTATION,
+    t_end=T_END,
+    rtol=RTOL,
+    outputs=OUTPUTS,
+    max_step=optional(number("a number of seconds above 0", above=0.0)),
+    solver=SOLVER,
+    samples=SAMPLES,
+    structure=STRUCTURE,
+    progress=PROGRESS,
+    **LIMITS,
+)
 def simulate(
     scene: Model | Assembly,
     *,
@@ -260,7 +286,7 @@ def simulate(
     )
     flat = assembly.flat
     options = RunOptions(
-        t_end=end_of_run(t_end, flat.t_end),
+        t_end=flat.t_end if t_end is None else float(t_end),
         relative_tolerance=rtol,
         outputs=outputs,
         max_steps=max_steps,

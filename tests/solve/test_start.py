@@ -206,7 +206,7 @@ def test_loops_start_from_any_coordinate() -> None:
 
 @pytest.mark.parametrize("t_end", [0.0, -1.0, math.nan, math.inf])
 def test_the_end_is_after_the_start(t_end: float) -> None:
-    with pytest.raises(UsageError, match="not after the start"):
+    with pytest.raises(UsageError, match=r"not after the start|t_end cannot"):
         simulate(SimplePendulum(), t_end=t_end)
 
 

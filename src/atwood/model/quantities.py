@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from atwood.arguments import Kind, Refused, each, optional
 from atwood.errors import UsageError
 
 if TYPE_CHECKING:
     from atwood.model.component import Component
     from atwood.model.laws import Law
 
-__all__ = ["ObservableLaw", "Quantity"]
+__all__ = ["PATH", "PATHS", "ObservableLaw", "Quantity"]
 
 
 class Quantity:
@@ -81,3 +82,13 @@ class ObservableLaw:
             return self._read.__get__(instance, owner)
         options = self._atwood_law.options
         return Quantity(instance, self._atwood_law.name, options.unit, options.doc)
+
+
+def _path(value: Any) -> str:
+    if not isinstance(value, (str, Quantity)) or not str(value).strip():
+        raise Refused
+    return str(value)
+
+
+PATH = Kind("the path of a quantity, such as 'rod.angle'", _path)
+PATHS = optional(each(PATH, "the paths of quantities, such as ['rod.angle']"))

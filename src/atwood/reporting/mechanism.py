@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from atwood.arguments import takes
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.frobenius import integrable_together
 from atwood.model.composite import Model
-from atwood.pipeline import assemble, assemble_flat
+from atwood.pipeline import SCENE, assemble, assemble_flat
 from atwood.reporting.offers import Offer, find_offers
 from atwood.reporting.parts import (
     BodyEntry,
@@ -29,6 +30,7 @@ from atwood.reporting.parts import (
 from atwood.solve.immobile import Immobile, find_immobile
 from atwood.solve.placement import Placement, find_placement
 from atwood.solve.problem import Plan, make_plan
+from atwood.solve.run_arguments import NAME, ORIENTATION
 from atwood.solve.scales import motion_names
 from atwood.solve.start import Start, find_start, own_state, settle
 
@@ -194,6 +196,7 @@ def _plain(value: object) -> object:
     return list(value) if isinstance(value, tuple) else value
 
 
+@takes(scene=SCENE, name=NAME, orientation=ORIENTATION)
 def report(scene: Model | Assembly, name: str | None = None, *, orientation: str = "quaternion") -> MechanismReport:
     """Report what became of a scene: bodies, joints, degrees of freedom, constraints, and why.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import AtwoodError, SolveError, StartError, TopologyError, UsageError
+from atwood.errors import AtwoodError, SolveError, StartError, TopologyError
 from atwood.forms.assembly import Assembly
 from atwood.solve.breaks import find_breaks
 from atwood.solve.charts import CHART, Reassemble, Restated, enter_charts, to_regular
@@ -21,6 +21,7 @@ from atwood.solve.options import RunOptions, sample_times
 from atwood.solve.passage import Passage
 from atwood.solve.problem import Plan, make_plan
 from atwood.solve.record import Recorder, Segment
+from atwood.solve.run_arguments import check_span
 from atwood.solve.scales import scene_length
 from atwood.solve.start import Start, settle
 from atwood.solve.stretch import Outcome, Stretch, run_stretch
@@ -108,10 +109,7 @@ def run(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reass
         If the solver fails; what came before is in its `run` attribute.
     """
     t = start.time
-    if not options.t_end > t or not np.isfinite(options.t_end):
-        raise UsageError(
-            f"the end, t = {options.t_end:g}, is not after the start, t = {t:g}", advice="Give a later t_end."
-        )
+    check_span(t, options.t_end, options.max_step)
     check_solver(options.solver)
     wanted = samples_needed(assembly, t, options.t_end) if options.samples > 1 else 0
     times, shown = sample_times(t, options, wanted)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import UsageError, suggestion
+from atwood.errors import UsageError
 from atwood.forms.source import change_scene
 from atwood.model.composite import Model
 from atwood.model.flatten import flatten
@@ -106,8 +106,6 @@ def make_cases(scene: Model, vary: Mapping[str, Any] | None, start: Mapping[str,
     AtwoodError
         If there is no such parameter, or a value is not admissible.
     """
-    if combine not in COMBINATIONS:
-        raise UsageError(f"there is no way {combine!r} to combine values", advice=suggestion(combine, COMBINATIONS))
     axes = [_axis(scene.copy(), path, values, False) for path, values in (vary or {}).items()]
     axes += [_axis(scene.copy(), path, values, True) for path, values in (start or {}).items()]
     if not axes:

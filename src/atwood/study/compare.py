@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from atwood.errors import AtwoodError, UsageError, suggestion
+from atwood.arguments import each, instance, takes, whole
+from atwood.errors import AtwoodError
 from atwood.forms.dae import LEVELS
 from atwood.model.composite import Model
 from atwood.model.flatten import flatten
-from atwood.pipeline import FORMS, assemble_flat
+from atwood.pipeline import assemble_flat
 from atwood.solve.choice import implicit_solver
-from atwood.solve.options import SOLVERS, end_of_run
+from atwood.solve.options import SOLVERS
+from atwood.solve.run_arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRESS, RTOL, T_END, check_span
 from atwood.study.reference import Assembled, Reference, find_reference, run_form, scaled_difference
 from atwood.study.verdict import judge
 
@@ -145,6 +147,17 @@ class Comparison:
         return import_module("atwood.view.precision").plot_comparison(self, file)
 
 
+@takes(
+    scene=instance("a scene, such as Scene()", Model),
+    t_end=T_END,
+    rtols=each(RTOL, "tolerances between 0 and 1", 1),
+    forms=each(FORM, f"some of {', '.join(map(repr, FORMS))}", 1),
+    levels=each(LEVEL, f"some of {', '.join(map(repr, LEVELS))}", 1),
+    outputs=whole("a whole number of output times, 2 to 1,000,000", 2, 1_000_000),
+    max_seconds=LIMITS["max_seconds"],
+    name=NAME,
+    progress=PROGRESS,
+)
 def compare(
     scene: Model,
     *,
@@ -193,12 +206,12 @@ def compare(
         If a form, a level or a tolerance makes no sense.
     """
     flat = flatten(scene, name)
-    _check(forms, levels, rtols)
     assembled = cache(lambda form, level: assemble_flat(flat, form=form, level=level))
     kinds = list(_kinds(assembled, forms, levels))
     total = len(kinds) * len(rtols) + 2
     watch = progress or (lambda what, done, of: None)
-    end = end_of_run(t_end, flat.t_end)
+    end = flat.t_end if t_end is None else float(t_end)
+    check_span(flat.t_start, end)
     patience = None if max_seconds is None else 10.0 * max_seconds
     reference = find_reference(scene, flat, assembled, end, outputs, patience, lambda what: watch(what, 0, total))
     rows: list[ComparisonRow] = []
@@ -208,14 +221,6 @@ def compare(
             watch(f"{row.label} at rtol {rtol:g}", len(rows) + 2, total)
             rows.append(_measure(assembled, row, solver, reference, max_seconds))
     return Comparison(flat.name, float(reference.time[-1]), reference, tuple(rows))
-
-
-def _check(forms: Sequence[str], levels: Sequence[str], rtols: Sequence[float]) -> None:
-    for word, known in [*((form, FORMS) for form in forms), *((level, LEVELS) for level in levels)]:
-        if word not in known:
-            raise UsageError(f"there is no {word!r} to compare", advice=suggestion(word, known))
-    if not rtols or not all(0.0 < rtol < 1.0 for rtol in rtols):
-        raise UsageError("tolerances must lie between 0 and 1")
 
 
 def _kinds(assembled: Assembled, forms: Sequence[str], levels: Sequence[str]) -> Iterator[tuple[str, str, str]]:

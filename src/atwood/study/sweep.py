@@ -11,14 +11,27 @@ from typing import Any
 
 import numpy as np
 
+from atwood.arguments import MAPPING, instance, one_of, optional, takes, whole
 from atwood.errors import AtwoodError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.model.composite import Model
-from atwood.pipeline import assemble
+from atwood.model.quantities import PATHS
+from atwood.pipeline import SCENE, assemble
 from atwood.solve.choice import check_solver
-from atwood.solve.driver import SolverOptions
-from atwood.solve.options import RunOptions, end_of_run, sample_times
-from atwood.study.cases import Cases, make_cases
+from atwood.solve.options import RunOptions, sample_times
+from atwood.solve.run_arguments import (
+    FORM,
+    LEVEL,
+    LIMITS,
+    NAME,
+    OUTPUTS,
+    PROGRESS,
+    RTOL,
+    SOLVER,
+    T_END,
+    check_span,
+)
+from atwood.study.cases import COMBINATIONS, Cases, make_cases
 from atwood.study.sweep_batch import run_batches, why_not_batched
 from atwood.study.sweep_result import Sweep, SweepStatistics
 from atwood.study.sweep_runs import Order, Records, expand_paths, run_in_processes, run_one_by_one
@@ -30,6 +43,24 @@ _TRIALS = 20
 """If none of so many runs can be assembled, none is tried."""
 
 
+@takes(
+    scene=SCENE,
+    vary=optional(MAPPING),
+    start=optional(MAPPING),
+    combine=one_of(COMBINATIONS),
+    quantities=PATHS,
+    t_end=T_END,
+    outputs=optional(OUTPUTS),
+    form=FORM,
+    level=LEVEL,
+    rtol=RTOL,
+    solver=SOLVER,
+    threads=optional(whole("a whole number of threads, at least 1", 1)),
+    executor=optional(instance("an executor of concurrent.futures", Executor)),
+    progress=PROGRESS,
+    name=NAME,
+    **LIMITS,
+)
 def sweep(
     scene: Model | Assembly,
     vary: Mapping[str, Any] | None = None,
@@ -98,14 +129,13 @@ def sweep(
     """
     began = time.perf_counter()
     check_solver(solver)
-    SolverOptions(relative_tolerance=rtol)  # refuses what makes no sense
     assembly = scene if isinstance(scene, Assembly) else assemble(scene, form=form, level=level, name=name)
     source = assembly.source.scene if assembly.source is not None else None
     if source is None:
         raise UsageError("it was assembled from leaves, so that its scene is not known", where=assembly.flat.name)
     cases = make_cases(source, vary, start, combine)
     first = _first(assembly, cases)
-    end = end_of_run(t_end, assembly.flat.t_end)
+    end = assembly.flat.t_end if t_end is None else float(t_end)
     order = Order(
         first,
         cases,
@@ -147,8 +177,7 @@ def _first(assembly: Assembly, cases: Cases) -> Assembly:
 def _times(assembly: Assembly, end: float, outputs: Any) -> Any:
     """Return the output times."""
     begin = assembly.flat.t_start
-    if not end > begin or not np.isfinite(end):
-        raise UsageError(f"the end, t = {end:g}, is not after the start, t = {begin:g}", advice="Give a later t_end.")
+    check_span(begin, end)
     if outputs is None:
         return np.array([end])
     times, shown = sample_times(begin, RunOptions(end, outputs=outputs, samples=1))
@@ -158,8 +187,6 @@ def _times(assembly: Assembly, end: float, outputs: Any) -> Any:
 def _threads(asked: int | None) -> int:
     if asked is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if asked < 1:
-        raise UsageError(f"there must be at least one thread, not {asked}")
     return asked
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import ResultError, suggestion
+from atwood.errors import ResultError, near_matches, suggestion
 
 __all__ = ["Sweep", "SweepStatistics"]
 
@@ -130,7 +130,9 @@ class Sweep:
         """
         path = str(path)
         if path not in self.quantities:
-            raise ResultError("the sweep has no such quantity", where=path, advice=suggestion(path, self.paths))
+            kept = suggestion(path, near_matches(path, self.paths)) or f"It kept {', '.join(self.paths[:12])}."
+            advice = f"{kept} Whatever else a sweep keeps is said with its argument quantities."
+            raise ResultError("the sweep did not keep such a quantity", where=path, advice=advice)
         return self.quantities[path]
 
     def end(self, path: str) -> FloatArray:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import AtwoodError, ResultError, UsageError, suggestion
+from atwood.errors import AtwoodError, ResultError, UsageError, suggestion_in_parts
 from atwood.forms.assembly import Assembly
 from atwood.model.flatten import flatten
 from atwood.pipeline import simulate
@@ -108,14 +108,11 @@ def expand_paths(assembly: Assembly, quantities: Iterable[str] | None) -> tuple[
     known = assembly.observables
     if quantities is None:
         return tuple(one.name for one in assembly.reduced.names if one.name in known) or tuple(known)
-    if isinstance(quantities, str):
-        quantities = [quantities]
     found: list[str] = []
-    for path in map(str, quantities):
+    for path in quantities:
         below = [one for one in known if one.startswith(f"{path}.")]
         if path not in known and not below:
-            around = [one.rpartition(".")[0] for one in known]
-            raise ResultError("there is no such quantity", where=path, advice=suggestion(path, {*known, *around}))
+            raise ResultError("there is no such quantity", where=path, advice=suggestion_in_parts(path, known))
         found += [path] if path in known else below
     return tuple(dict.fromkeys(found))
 

@@ -1,0 +1,314 @@
+"""What the arguments of public functions may be, checked once, at the door.
+
+A `Kind` says in words what an argument may be, and reads it: it gives the value in its own type, or refuses it.
+`takes` puts the kinds of all arguments before a function, `check_fields` before the fields of a value.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+import operator
+import os
+import reprlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from atwood.errors import AtwoodError, UsageError, suggestion
+
+__all__ = [
+    "ANYTHING",
+    "CALLBACK",
+    "FILE",
+    "FLAG",
+    "MAPPING",
+    "TEXT",
+    "TEXTS",
+    "Kind",
+    "Refused",
+    "check",
+    "check_fields",
+    "each",
+    "either",
+    "instance",
+    "number",
+    "one_of",
+    "optional",
+    "show",
+    "takes",
+    "whole",
+]
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+class Refused(Exception):
+    """A value is not what an argument may be; a text says more of it than its kind does."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What an argument may be.
+
+    Attributes
+    ----------
+    what
+        In words that go on "Give ...".
+    read
+        Returns a value in its own type, or raises any error for one that will not do.
+    """
+
+    what: str
+    read: Callable[[Any], Any]
+
+
+def takes(error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> Callable[[_F], _F]:
+    """Check the arguments of a function before it is called; defaults are taken as they are.
+
+    Parameters
+    ----------
+    error
+        Class of the errors.
+    **kinds
+        What each argument may be, except ``self`` and ``cls``.
+
+    Raises
+    ------
+    TypeError
+        Where the function is declared, if an argument of it has no kind.
+    """
+
+    def decorate(function: _F) -> _F:
+        declared = inspect.signature(function).parameters.values()
+        names = [one.name for one in declared if one.name not in ("self", "cls")]
+        if set(names) != set(kinds):
+            raise TypeError(f"{function.__qualname__} takes {names}, and {list(kinds)} are said of it")
+        positional = tuple(one.name for one in declared if one.kind is one.POSITIONAL_OR_KEYWORD)
+        rest = next((one.name for one in declared if one.kind is one.VAR_POSITIONAL), "")
+        where = function.__qualname__.lstrip("_")
+
+        @functools.wraps(function)
+        def checked(*args: Any, **given: Any) -> Any:
+            if args:
+                read = [
+                    check(kinds[name], value, name, where, error) if name in kinds else value
+                    for name, value in zip(positional, args, strict=False)
+                ]
+                further = args[len(positional) :]  # without a name for them, Python refuses them by itself
+                args = (*read, *(check(kinds[rest], value, rest, where, error) if rest else value for value in further))
+            for name, value in given.items():
+                if name not in kinds:
+                    raise error(f"it takes no {name!r}", where=where, advice=suggestion(name, names))
+                given[name] = check(kinds[name], value, name, where, error)
+            return function(*args, **given)
+
+        return checked  # type: ignore[return-value]
+
+    return decorate
+
+
+def check(kind: Kind, value: Any, name: str, where: str = "", error: type[AtwoodError] = UsageError) -> Any:
+    """Return an argument in its own type, or refuse it.
+
+    Parameters
+    ----------
+    kind
+        What it may be.
+    value
+        What was given.
+    name
+        Name of the argument.
+    where
+        Name of the function, or path of the part.
+    error
+        Class of the error.
+
+    Raises
+    ------
+    AtwoodError
+        If it will not do; the error names the argument and says what would.
+    """
+    try:
+        return kind.read(value)
+    except Exception as problem:  # to look at a value of any class can raise anything
+        more = str(problem) if isinstance(problem, Refused) else ""
+    said = show(value)
+    raise error(f"{name} cannot be {said}", where=where, advice=f"{more} Give {kind.what}.".strip())
+
+
+def check_fields(value: object, error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> None:
+    """Check the fields of a frozen value, from its ``__post_init__``, and give them their own types."""
+    where = type(value).__name__
+    for name, kind in kinds.items():
+        object.__setattr__(value, name, check(kind, getattr(value, name), name, where, error))
+
+
+def show(value: object) -> str:
+    """Return a value as an error shows it: short and on one line, whatever its class does."""
+    try:
+        text = value.__qualname__ if isinstance(value, type) else _SHORT.repr(value)
+    except Exception:  # a class of somebody else
+        text = f"a {type(value).__name__}"
+    return " ".join(text.split())
+
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 60
+
+
+# -- kinds -------------------------------------------------------------------------------------------------------------
+
+
+def number(
+    what: str = "a finite number",
+    *,
+    above: float = -math.inf,
+    below: float = math.inf,
+    least: float = -math.inf,
+    most: float = math.inf,
+) -> Kind:
+    """Return the kind of finite real numbers between bounds, which become floats.
+
+    Parameters
+    ----------
+    what
+        In words.
+    above, below
+        Bounds that it must not reach.
+    least, most
+        Bounds that it may reach.
+    """
+
+    def read(value: Any) -> float:
+        found = value if type(value) is float else _as_float(value)
+        if not (above < found < below and least <= found <= most and math.isfinite(found)):
+            raise Refused
+        return found
+
+    return Kind(what, read)
+
+
+def _as_float(value: Any) -> float:
+    """Return what is one real number as a float; truth values and text are none."""
+    if isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ in ("bool", "bool_"):
+        raise Refused
+    if getattr(value, "ndim", 0):
+        raise Refused
+    return float(value)
+
+
+def whole(what: str, least: int, most: int | None = None) -> Kind:
+    """Return the kind of whole numbers between bounds, which become ints; ``1e6`` is one."""
+
+    def read(value: Any) -> int:
+        found = value if type(value) is int else int(_as_float(value))
+        if found != value or found < least or (most is not None and found > most):
+            raise Refused
+        return found
+
+    return Kind(what, read)
+
+
+def one_of(words: Iterable[str]) -> Kind:
+    """Return the kind of words of a short list; one that is nearly right is told which it could be."""
+    known = tuple(words)
+
+    def read(value: Any) -> str:
+        if not isinstance(value, str):
+            raise Refused
+        if value not in known:
+            close = suggestion(value, known)
+            raise Refused(close if close.startswith("Did you") else "")
+        return value
+
+    return Kind(f"one of {', '.join(map(repr, known))}", read)
+
+
+def instance(what: str, *classes: type) -> Kind:
+    """Return the kind of objects of some classes."""
+
+    def read(value: Any) -> Any:
+        if not isinstance(value, classes):
+            is_class = isinstance(value, type) and issubclass(value, classes)
+            raise Refused(f"Call the class: {value.__name__}()." if is_class else "")
+        return value
+
+    return Kind(what, read)
+
+
+def optional(kind: Kind) -> Kind:
+    """Return the kind that None is of, too."""
+    return Kind(f"{kind.what}, or None", lambda value: None if value is None else kind.read(value))
+
+
+def either(*kinds: Kind) -> Kind:
+    """Return the kind of what is of one of some kinds; the first that will do reads it."""
+
+    def read(value: Any) -> Any:
+        for kind in kinds[:-1]:
+            try:
+                return kind.read(value)
+            except Exception:  # the next may do
+                continue
+        return kinds[-1].read(value)
+
+    return Kind(" or ".join(kind.what for kind in kinds), read)
+
+
+def each(kind: Kind, what: str, least: int = 0) -> Kind:
+    """Return the kind of several values of a kind, which become a tuple; a single text is one of them."""
+
+    def read(value: Any) -> tuple[Any, ...]:
+        if isinstance(value, (bytes, bytearray, Mapping)):
+            raise Refused
+        found = tuple(kind.read(one) for one in ((value,) if isinstance(value, str) else value))
+        if len(found) < least:
+            raise Refused
+        return found
+
+    return Kind(what, read)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise Refused
+    return value
+
+
+def _file(value: Any) -> Path:
+    text = os.fspath(value)
+    if not isinstance(text, str) or not text.strip() or "\0" in text:
+        raise Refused
+    return Path(text)
+
+
+def _callback(value: Any) -> Any:
+    if not callable(value) or isinstance(value, type):
+        raise Refused
+    return value
+
+
+def _flag(value: Any) -> bool:
+    if not isinstance(value, bool) and type(value).__name__ not in ("bool", "bool_"):
+        raise Refused
+    return operator.truth(value)
+
+
+def _mapping(value: Any) -> Mapping[Any, Any]:
+    if not isinstance(value, Mapping):
+        raise Refused
+    return value
+
+
+ANYTHING = Kind("anything", lambda value: value)
+"""For what the function itself looks at."""
+
+TEXT = Kind("text", _text)
+TEXTS = each(TEXT, "a list of texts")
+FILE = Kind("the path of a file, as text or a Path", _file)
+CALLBACK = Kind("a function", _callback)
+FLAG = Kind("True or False", _flag)
+MAPPING = Kind("a dictionary", _mapping)
