@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from atwood.arguments import instance, number, optional, takes
+from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import StartError
 from atwood.expr import Graph
 from atwood.forms.assembly import Assembly
@@ -29,7 +30,7 @@ from atwood.model.local import LocalPart, ParameterTable, localize
 from atwood.model.space import make_space
 from atwood.result.result import Result
 from atwood.solve.options import RunOptions
-from atwood.solve.run import run
+from atwood.solve.run import run, run_out_of_time
 from atwood.solve.run_arguments import (
     FORM,
     LEVEL,
@@ -45,7 +46,7 @@ from atwood.solve.run_arguments import (
     T_END,
 )
 from atwood.solve.sides import actual_sides, sides_differ
-from atwood.solve.start import find_start
+from atwood.solve.start import Start, find_start
 from atwood.topology.bodies import find_bodies
 from atwood.topology.charts import Orientation, check_orientation
 from atwood.topology.graph import build_graph
@@ -249,7 +250,8 @@ def simulate(
     outputs
         Number of output times, evenly spread over the run, or the times themselves, s.
     max_steps, max_seconds
-        Limits; a run that meets one returns what it has, and says so in its status.
+        Limits; a run that meets one returns what it has, and says so in its status. The time counts from this call
+        on; a result may have no samples where it does not last to find the start.
     max_step
         The largest step, s.
     solver
@@ -281,6 +283,7 @@ def simulate(
     SolveError
         If the solver fails.
     """
+    clock = Clock(max_seconds)
     assembly = (
         scene if isinstance(scene, Assembly) else assemble(scene, form=form, level=level, orientation=orientation)
     )
@@ -298,15 +301,25 @@ def simulate(
         structure=structure,
     )
 
+    try:
+        with clock.kept(GRACE):
+            assembly, start = _with_sides(assembly)
+    except TimeIsUp:
+        return Result(run_out_of_time(assembly, None, options))
+    return Result(run(assembly, start, options, assembly.other_mode, clock))
+
+
+def _with_sides(assembly: Assembly) -> tuple[Assembly, Start]:
+    """Return an assembly whose lengths on a line are signed by where things start, and the start."""
     start = find_start(assembly)
-    for _ in range(3):  # on a line, lengths are signed by where things start, which is known only now
+    for _ in range(3):  # which is known only then
         actual = actual_sides(assembly, start.time, start.coordinates, start.speeds, "reduced")
         if not sides_differ(assembly, actual):
-            return Result(run(assembly, start, options, assembly.other_mode))
+            return assembly, start
         assembly = assembly.other_mode(assembly.modes, actual)
         start = find_start(assembly)
     raise StartError(
         "it depends on the signs of lengths where things start, and on where they start, which signs these are",
-        where=flat.name,
+        where=assembly.flat.name,
         advice="Give start positions instead of guesses, so that it is clear what is on which side.",
     )

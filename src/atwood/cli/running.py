@@ -176,7 +176,7 @@ def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
         "coordinates": coordinates,
         "speeds": [one.name for one in assembly.equations.speed_names],
         "multipliers": multiplier_labels(result),
-        "states": result.run.segments[0].plan.program.size,
+        "states": result.first_plan.program.size,
         "solver": data.pop("solver"),
         "immobile": None if result.immobile is None else result.immobile.to_dict(),
         "placement": result.placement.to_dict(),
@@ -197,7 +197,7 @@ def degrees_of_freedom(result: Result) -> int:
     result
         The run.
     """
-    plan = result.run.segments[0].plan
+    plan = result.first_plan
     return len(plan.assembly.equations.speeds) - plan.finding.rank
 
 
@@ -210,7 +210,7 @@ def multiplier_labels(result: Result) -> list[str]:
         The run.
     """
     assembly: Assembly = result.assembly
-    plan = result.run.segments[0].plan
+    plan = result.first_plan
     if assembly.form == "reduced":
         return []
     constraints = assembly.equations.constraints

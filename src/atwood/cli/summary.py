@@ -89,7 +89,7 @@ def _quantities(result: Result, paths: list[str], width: int) -> Table:
 
 def _facts(result: Result) -> Iterator[tuple[str, str]]:
     """Yield how a run went, as labels and sentences."""
-    plan, statistics = result.run.segments[0].plan, result.statistics
+    plan, statistics = result.first_plan, result.statistics
     size = [count_of(degrees_of_freedom(result), "degree") + " of freedom", count_of(plan.program.size, "state")]
     multipliers = len(multiplier_labels(result))
     if multipliers:
@@ -99,7 +99,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         yield "immobile", result.immobile.describe()
     if result.placement.summary:
         yield "assembled", result.placement.summary
-    span = f"t = {result.run.start.time:g} to {result.time[-1]:.6g} s"
+    span = f"t = {result.start.time:g} to {result.time[-1]:.6g} s"
     yield "run", f"{span}, rtol {result.run.options.relative_tolerance:g}, {len(result.time)} outputs"
     if result.status != "finished":
         why = {"stopped": "stopped", "step_limit": "out of steps", "time_limit": "out of time"}

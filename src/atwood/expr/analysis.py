@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
+from atwood.clock import check_time
 from atwood.errors import AtwoodError
 from atwood.expr import algebra
 from atwood.expr.graph import Expression, Graph
@@ -22,6 +23,7 @@ def live(outputs: Iterable[Expression | float]) -> list[Expression]:
     outputs
         Expressions of one graph; numbers among them are passed over.
     """
+    check_time()
     found: dict[int, Expression] = {}
     stack = [output for output in outputs if isinstance(output, Expression)]
     for output in stack:

@@ -11,8 +11,12 @@ from __future__ import annotations
 import numbers
 from typing import Any
 
+from atwood.clock import check_time
 from atwood.errors import AtwoodError
 from atwood.expr import algebra
+
+_LOOK = 256
+"""After so many new nodes the clock is looked at."""
 
 
 class Expression:
@@ -275,6 +279,8 @@ class Graph:
         payload: Any,
         is_parameter: bool = False,
     ) -> Expression:
+        if not len(self.nodes) % _LOOK:
+            check_time()
         known = is_parameter or operation == "constant" or (bool(arguments) and all(a.is_parametric for a in arguments))
         created = Expression(self, operation, arguments, payload, len(self.nodes), known)
         self._table[key] = created

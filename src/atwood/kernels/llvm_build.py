@@ -12,6 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from atwood.clock import within_time
 from atwood.errors import UnsupportedError
 from atwood.expr.operations import ExternalFunction
 from atwood.kernels.cache import Cache, default_cache, make_key
@@ -106,6 +107,17 @@ def build_code(
         Whether to use the cache.  Programs that call functions in Python are never kept: their names do not say
         what they do.
     """
+    return within_time(lambda: _build(parts, options, more, exports, library, cached))
+
+
+def _build(
+    parts: Sequence[Part],
+    options: CodeOptions,
+    more: str,
+    exports: Sequence[str],
+    library: Sequence[str],
+    cached: bool,
+) -> Built:
     names = [*exports, *(name for part in parts for name in (part.name, f"{part.name}_prologue"))]
     has_externals = any(node.operation == "external" for part in parts for node in part.program.nodes)
     store = default_cache() if cached and not has_externals else None

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from atwood.clock import check_time
 from atwood.errors import KernelEvaluationError
 from atwood.expr.analysis import evaluate, live
 from atwood.expr.graph import Expression
@@ -163,6 +164,7 @@ class BoundKernel:
             If the groups have the wrong sizes, or an output has no finite value because an operation was
             applied outside its domain.  A vectorized program gives nan for that sample instead.
         """
+        check_time()
         compiled = self.compiled
         if len(groups) != len(compiled.program.inputs):
             self._check_sizes(groups)

@@ -54,7 +54,7 @@ def describe_run(result: Result) -> dict[str, Any]:
         "level": result.level,
         "status": result.status,
         "message": result.message,
-        "t_start": float(result.run.start.time),
+        "t_start": float(result.start.time),
         "t_end": float(result.time[-1]),
         "happenings": [
             {"time": one.time, "part": one.part, "what": one.message, "mode": one.target} for one in result.happenings

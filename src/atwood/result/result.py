@@ -26,14 +26,19 @@ from atwood.solve.immobile import Immobile, find_immobile
 from atwood.solve.modes import Happening
 from atwood.solve.passage import Passage
 from atwood.solve.placement import Placement, find_placement
+from atwood.solve.problem import Plan
 from atwood.solve.projection import misses_of
 from atwood.solve.reactions import ReactionSolver
 from atwood.solve.record import Segment
 from atwood.solve.run import Run
+from atwood.solve.start import Start
 
 __all__ = ["Result"]
 
 FloatArray = NDArray[np.float64]
+
+
+_LONGER = "Give it more time; or assemble the scene first, and hand the assembly to several runs."
 
 
 def _moves_by_itself(equations: Equations, constraint: Constraint) -> bool:
@@ -64,7 +69,7 @@ class Result:
     @property
     def assembly(self) -> Assembly:
         """The scene as it was assembled at the start."""
-        return self.run.segments[0].assembly
+        return self.run.assembly
 
     @property
     def form(self) -> str:
@@ -74,7 +79,7 @@ class Result:
     @property
     def level(self) -> str:
         """Level of the dae form; empty for the reduced form."""
-        return self.run.segments[0].plan.program.level
+        return self.assembly.level
 
     @property
     def status(self) -> str:
@@ -85,6 +90,33 @@ class Result:
     def message(self) -> str:
         """Why the run ended, in words; empty if it went to its end."""
         return self.run.message
+
+    @property
+    def start(self) -> Start:
+        """The start.
+
+        Raises
+        ------
+        ResultError
+            If there was no time to find it.
+        """
+        if self.run.start is None:
+            raise self._empty()
+        return self.run.start
+
+    @property
+    def _segments(self) -> tuple[Segment, ...]:
+        if not self.run.segments:
+            raise self._empty()
+        return self.run.segments
+
+    @property
+    def first_plan(self) -> Plan:
+        """What the run was prepared with at the start."""
+        return self._segments[0].plan
+
+    def _empty(self) -> ResultError:
+        return ResultError(f"there is nothing in it: {self.message}", where=self.assembly.flat.name, advice=_LONGER)
 
     @property
     def happenings(self) -> tuple[Happening, ...]:
@@ -109,14 +141,14 @@ class Result:
     @cached_property
     def immobile(self) -> Immobile | None:
         """Why nothing can move, and what would have to let go; None if something can, or is driven."""
-        plan, start = self.run.segments[0].plan, self.run.start
+        plan, start = self._segments[0].plan, self.start
         freedom = len(plan.assembly.equations.speeds) - plan.finding.rank
         return find_immobile(self.assembly, freedom, start)
 
     @cached_property
     def placement(self) -> Placement:
         """What the start moved: bodies and guesses, and the joints that were open before."""
-        return find_placement(self.assembly, self.run.start)
+        return find_placement(self.assembly, self.start)
 
     @property
     def statistics(self) -> Statistics:
@@ -132,11 +164,11 @@ class Result:
 
     @cached_property
     def _all_time(self) -> FloatArray:
-        return np.concatenate([segment.time for segment in self.run.segments])
+        return np.concatenate([segment.time for segment in self._segments])
 
     @cached_property
     def _shown(self) -> NDArray[np.bool_]:
-        return np.concatenate([segment.shown for segment in self.run.segments])
+        return np.concatenate([segment.shown for segment in self._segments])
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -206,7 +238,7 @@ class Result:
         missing = tuple(path for path in paths if path not in self._cache)
         if not missing:
             return
-        pieces = [self._evaluate(segment, missing) for segment in self.run.segments]
+        pieces = [self._evaluate(segment, missing) for segment in self._segments]
         for i, path in enumerate(missing):
             self._cache[path] = np.concatenate([piece[i] for piece in pieces])
         observables = self.assembly.observables
@@ -284,7 +316,7 @@ class Result:
     def energy(self) -> EnergyLedger:
         """Kinetic and potential energy, work, and how well they balance."""
         kinetic, potential, power, switched = [], [], [], []
-        for segment in self.run.segments:
+        for segment in self._segments:
             assembly = segment.assembly
             state = (segment.time[None, :], segment.coordinates, segment.speeds)
             idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
@@ -299,9 +331,9 @@ class Result:
                 where=self._without_energy(),
                 advice="A law is evaluated outside its domain there: look at its formula and at the start.",
             )
-        impacts = [segment.impact for segment in self.run.segments]
+        impacts = [segment.impact for segment in self._segments]
         return make_ledger(
-            [segment.time for segment in self.run.segments], kinetic, potential, power, impacts, switched, self._shown
+            [segment.time for segment in self._segments], kinetic, potential, power, impacts, switched, self._shown
         )
 
     def _without_energy(self) -> str:
@@ -351,7 +383,7 @@ class Result:
         solver held before projection.
         """
         found = {"position": 0.0, "velocity": 0.0, "held_position": 0.0, "held_velocity": 0.0}
-        for segment in self.run.segments:
+        for segment in self._segments:
             plan = segment.plan
             if not plan.balance.constraints:
                 continue

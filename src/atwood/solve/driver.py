@@ -226,7 +226,7 @@ class Budget:
     max_steps
         The number of internal steps of the whole session.
     wall_seconds
-        The time spent inside `Session.advance`, summed over the session.
+        The time since the session first went on, whoever spends it.
     poll
         Called with the time reached before each internal step, for progress and cancelling.  When it raises
         `KeyboardInterrupt` the advance ends as interrupted; any other exception passes through.

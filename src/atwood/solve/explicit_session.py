@@ -103,6 +103,7 @@ class ExplicitSession:
         end: float = inf,
     ) -> None:
         self.budget = budget or Budget()
+        self._opened = 0.0  # when it first went on
         self._end = end
         self._leave, self._judged, self._is_left = leave, 0, False
         self._size = problem.size
@@ -184,8 +185,9 @@ class ExplicitSession:
         if not self._here[0] <= t_out < inf:
             raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
         began = time.perf_counter()
+        self._opened = self._opened or began
         try:
-            return self._run(float(t_out), began)
+            return self._run(float(t_out))
         except KeyboardInterrupt:
             self._broken = True
             return self._stopped(Status.INTERRUPTED, "interrupted")
@@ -239,11 +241,12 @@ class ExplicitSession:
             How many times it filled, and why it must end there; None if single advances can go on.
         """
         began = time.perf_counter()
+        self._opened = self._opened or began
         filled = 0
         try:
             while filled < len(times) and self._find_root() is None:
                 is_ahead = times[-1] > self._newest[0]
-                if is_ahead and self._exceeded(began) is not None:
+                if is_ahead and self._exceeded() is not None:
                     break
                 if is_ahead and self._watch is not None and self._watch.is_settling:
                     outcome = self._take(float(times[-1]), 1)
@@ -301,7 +304,7 @@ class ExplicitSession:
             last = self._newest[0] if outcome is not Outcome.NOTICED else self._notices.begin_of_step()
             self._searched = max(self._searched, last)
 
-    def _run(self, t_out: float, began: float) -> Advance:
+    def _run(self, t_out: float) -> Advance:
         if self._broken:
             self.reinitialize(self._here[0], self._here[1])
         while True:
@@ -314,7 +317,7 @@ class ExplicitSession:
                 self._here = self._newest if t_out == self._newest[0] else self._stepper.interpolate(t_out)
                 return Advance(*_copied(self._here), Status.REACHED, self._no_events)
             self._here = self._newest
-            limit = self._exceeded(began)
+            limit = self._exceeded()
             if limit is not None:
                 return limit
             failure = self._step(t_out)
@@ -375,7 +378,7 @@ class ExplicitSession:
             self._is_left = self._leave(*self._newest[:2])
         return self._is_left
 
-    def _exceeded(self, began: float) -> Advance | None:
+    def _exceeded(self) -> Advance | None:
         budget, t = self.budget, self._here[0]
         if self._leave is not None and self._leaves():
             return self._stopped(Status.STIFF, "steps are kept short by stability alone")
@@ -384,7 +387,7 @@ class ExplicitSession:
         steps = self._stepper.counts.steps
         if budget.max_steps is not None and steps >= budget.max_steps:
             return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
-        if budget.wall_seconds is not None and self._seconds + time.perf_counter() - began >= budget.wall_seconds:
+        if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
             return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
         return None
 

@@ -101,6 +101,7 @@ class NativeSession:
         tuning: IdaTuning | None = None,
     ) -> None:
         self.budget = budget or Budget()
+        self._opened = 0.0  # when it first went on
         self._problem = problem
         self._horizon = options.horizon
         self._record = Record()
@@ -177,11 +178,12 @@ class NativeSession:
         if self._stop_time is not None and t_out > self._stop_time:
             raise UsageError(f"cannot advance past t = {self._stop_time:.9g}, where the run must stop")
         began = time.perf_counter()
+        self._opened = self._opened or began
         try:
             if not self._record.calls_python and (self._watch is None or self._finds_events):
-                return self._run(float(t_out), began)
+                return self._run(float(t_out))
             with np.errstate(all="ignore"), InterruptLater(self._record):
-                end = self._run(float(t_out), began)
+                end = self._run(float(t_out))
                 self._record.raise_again()
                 return end
         except KeyboardInterrupt:
@@ -219,7 +221,7 @@ class NativeSession:
         self._behind = False  # whether IDA last handed out a time before the end of its last step
         self._root: Root | None = None
         self._searched = state[0]
-        self._pace.mark = (state[0], 0)
+        self._pace.mark, self._pace.lap = (state[0], 0), (state[0], 0, 0)
         self._stale = False
         self._starts += 1
 
@@ -233,7 +235,7 @@ class NativeSession:
             convergence_failures=counts.solve_failures,
         )
 
-    def _run(self, t_out: float, began: float) -> Advance:
+    def _run(self, t_out: float) -> Advance:
         if self._stale:
             self._restart(self._here)
         by_steps = self.budget.poll is not None or (self._watch is not None and not self._finds_events)
@@ -246,7 +248,7 @@ class NativeSession:
                 return self._arrive(t_out)
             if by_steps:
                 self._here = self._end_of_step()
-            limit = self._exceeded(began)
+            limit = self._exceeded()
             if limit is not None:
                 return limit
             failure = self._step() if by_steps or self._is_first else self._stride(t_out)
@@ -286,16 +288,14 @@ class NativeSession:
     def _steps(self) -> int:
         return self._earlier.steps + self._memory.steps()
 
-    def _exceeded(self, began: float) -> Advance | None:
+    def _exceeded(self) -> Advance | None:
         budget = self.budget
         if budget.poll is not None:
             budget.poll(self._here[0])
         if budget.max_steps is not None and self._steps() >= budget.max_steps:
             return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
-        if budget.wall_seconds is not None:
-            spent = self._seconds + time.perf_counter() - began
-            if spent >= budget.wall_seconds:
-                return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
+        if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
+            return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
         return None
 
     def _step(self) -> Advance | None:
@@ -377,7 +377,14 @@ class NativeSession:
             if self._native is not None:
                 explain(self._problem, self._record, self._ahead())
             return self._stopped(Status.FAILED, "the steps became too small to move the time", self._pace.mark[0])
+        if self._pace.crawls(t, self._memory.steps(), self._repeated, self._horizon):
+            self._stale = True
+            return self._stopped(Status.FAILED, "rounding keeps the steps so short that the run would not end")
         return None
+
+    def _repeated(self) -> int:
+        counts = self._memory.counts()
+        return counts.error_failures + counts.solve_failures
 
     def _ahead(self) -> list[State]:
         """Return states a little ahead on the tangent, where a wall that ended the run may be found."""

@@ -132,6 +132,7 @@ class SundaeSession:
         budget: Budget | None = None,
     ) -> None:
         self.budget = budget or Budget()
+        self._opened = 0.0  # when it first went on
         self._size = problem.size
         self._horizon = options.horizon
         self._record = _Record()
@@ -177,9 +178,10 @@ class SundaeSession:
         if not self._here[0] <= t_out < inf:
             raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
         began = time.perf_counter()
+        self._opened = self._opened or began
         try:
             with without_solver_messages(), np.errstate(all="ignore"):
-                return self._run(float(t_out), began)
+                return self._run(float(t_out))
         except KeyboardInterrupt:
             self._stale = True
             return self._stopped(Status.INTERRUPTED, "interrupted")
@@ -213,7 +215,7 @@ class SundaeSession:
         self._stale = False
         self._starts += 1
 
-    def _run(self, t_out: float, began: float) -> Advance:
+    def _run(self, t_out: float) -> Advance:
         if self._stale:
             self._restart(self._here)
         while True:
@@ -224,7 +226,7 @@ class SundaeSession:
                 self._here = self._interpolate(t_out)
                 return Advance(*_copied(self._here), Status.REACHED, self._no_events)
             self._here = self._newest
-            limit = self._exceeded(began)
+            limit = self._exceeded()
             if limit is not None:
                 return limit
             failure = self._step()
@@ -253,16 +255,14 @@ class SundaeSession:
         self._behind = True
         return t, result.y, result.yp
 
-    def _exceeded(self, began: float) -> Advance | None:
+    def _exceeded(self) -> Advance | None:
         budget, t = self.budget, self._here[0]
         if budget.poll is not None:
             budget.poll(t)
         if budget.max_steps is not None and self._steps >= budget.max_steps:
             return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
-        if budget.wall_seconds is not None:
-            spent = self._seconds + time.perf_counter() - began
-            if spent >= budget.wall_seconds:
-                return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
+        if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
+            return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
         return None
 
     def _step(self) -> Advance | None:

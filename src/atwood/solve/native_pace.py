@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
 
@@ -17,6 +18,10 @@ FIRST_CHUNK, FIRST_COMPILED_CHUNK, LARGEST_CHUNK = 20, 500, 1_000_000
 """How many steps IDA is left alone for: at first, at first with compiled functions, and at most."""
 
 
+_CRAWL, _REPEATED, _ENDLESS = 2000, 0.25, 1e9
+"""Steps do not get on if over so many of them such a share had to be repeated, and it would take so many to the end."""
+
+
 @dataclass
 class Pace:
     """How many steps IDA is left alone for, and whether they still move the time.
@@ -29,11 +34,15 @@ class Pace:
         What IDA was told last.
     mark
         A time, and the number of steps until then, from which it is judged whether the time still moves.
+    lap
+        The same with the number of steps that were repeated until then, from which it is judged whether the run gets
+        on.
     """
 
     chunk: int = FIRST_CHUNK
     allowed: int = 0
     mark: tuple[float, int] = field(default=(-inf, 0))
+    lap: tuple[float, int, int] = field(default=(-inf, 0, 0))
 
     def learn(self, seconds: float, used_up: bool) -> None:
         """Come closer to a chunk that takes a moment."""
@@ -49,3 +58,12 @@ class Pace:
             self.mark = t, steps
             return False
         return steps - count >= STALLED_STEPS
+
+    def crawls(self, t: float, steps: int, repeated: Callable[[], int], horizon: float) -> bool:
+        """Tell whether rounding keeps steps so short that the run would never end: every few are repeated."""
+        since, count, before = self.lap
+        if steps - count < _CRAWL:
+            return False
+        self.lap = t, steps, repeated()
+        is_endless = (t - since) * _ENDLESS < horizon * (steps - count)
+        return is_endless and self.lap[2] - before > _REPEATED * (steps - count)

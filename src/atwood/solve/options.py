@@ -62,6 +62,14 @@ class RunOptions:
     samples: int = 400
     structure: bool = False
 
+    def out_of_time(self, t: float) -> str:
+        """Return what is said of a run that its limit of time ended, at a time of its own."""
+        return f"the limit of {self.max_seconds:g} s was used up (at t = {t:.9g})"
+
+    def out_of_steps(self, t: float) -> str:
+        """Return the same of its limit of steps."""
+        return f"the limit of {self.max_steps} steps was used up (at t = {t:.9g})"
+
 
 def sample_times(t: float, options: RunOptions, at_least: int = 0) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return all sample times with the start, and which of them are outputs.

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.clock import TimeIsUp, more_time
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.solve.passage import Passage
@@ -20,6 +22,13 @@ FloatArray = NDArray[np.float64]
 
 _PENDING = 512
 """So many states of the solver are projected together, at most."""
+
+_LAST = 32
+"""The same where time may be short."""
+
+
+_Waiting: TypeAlias = Sequence[tuple[float, FloatArray, bool]]
+"""States of the solver, and whether they are outputs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,11 +174,16 @@ class Recorder:
 
     def settle(self) -> None:
         """Project all that waits."""
+        self._settle(len(self._samples[1]))
+
+    def _settle(self, count: int) -> None:
+        """Project the first of what waits."""
         pending = self._samples[1]
-        if pending:
-            t = np.array([one[0] for one in pending])
-            y = np.array([one[1] for one in pending])
-            self._finish(t, y, np.array([one[2] for one in pending]))
+        if not pending:
+            return
+        t = np.array([one[0] for one in pending[:count]])
+        y = np.array([one[1] for one in pending[:count]])
+        self._finish(t, y, np.array([one[2] for one in pending[:count]]), pending[count:])
 
     def last(self) -> tuple[float, FloatArray, FloatArray, FloatArray]:
         """Return time, coordinates and speeds of the last sample, and by how much the constraints were missed."""
@@ -178,9 +192,15 @@ class Recorder:
         return float(block.time[-1]), block.q[:, -1], block.u[:, -1], block.held[:, -1]
 
     def close(self) -> float:
-        """Show the last sample, and return its time."""
-        self.settle()
-        self._samples[0][-1].shown[-1] = True
+        """Show the last sample, and return its time; what there is no time left to project is dropped."""
+        with more_time():
+            try:
+                while self._samples[1]:
+                    self._settle(_LAST)
+            except TimeIsUp:
+                self._samples = self._samples[0], []
+        if self._samples[0]:
+            self._samples[0][-1].shown[-1] = True
         return self.end
 
     @property
@@ -196,15 +216,15 @@ class Recorder:
         time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
         return Segment(self.plan, impact, time, q, u, shown, held, tuple(self.passages))
 
-    def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_]) -> None:
+    def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: _Waiting = ()) -> None:
         q, u = (part.copy() for part in self.plan.program.split(y.T))
         q = self.plan.balance.turning.normalized(q)
         if not self.plan.balance.constraints:
-            self._add(_Block(t, q, u, shown, np.zeros((2, len(t)))))
+            self._add(_Block(t, q, u, shown, np.zeros((2, len(t)))), waiting)
             return
         made = project_states(self.plan, t, q, u)
         if not self.plan.is_projected:
-            self._add(_Block(t, q, u, shown, made.held))
+            self._add(_Block(t, q, u, shown, made.held), waiting)
             return
         block = _Block(t, made.coordinates, made.speeds, shown, made.held)
         for i in np.flatnonzero(made.doubtful):
@@ -213,8 +233,8 @@ class Recorder:
             except SolveError:
                 self._add(block.first(int(i)))
                 raise
-        self._add(block)
+        self._add(block, waiting)
 
-    def _add(self, block: _Block) -> None:
+    def _add(self, block: _Block, waiting: _Waiting = ()) -> None:
         blocks = self._samples[0]
-        self._samples = ((*blocks, block) if len(block.time) else blocks, [])
+        self._samples = ((*blocks, block) if len(block.time) else blocks, list(waiting))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError, SolveError, StartError, TopologyError
 from atwood.forms.assembly import Assembly
 from atwood.solve.breaks import find_breaks
@@ -25,8 +26,9 @@ from atwood.solve.run_arguments import check_span
 from atwood.solve.scales import scene_length
 from atwood.solve.start import Start, settle
 from atwood.solve.stretch import Outcome, Stretch, run_stretch
+from atwood.solve.tolerance import allowed
 
-__all__ = ["Run", "run"]
+__all__ = ["Run", "run", "run_out_of_time"]
 
 FloatArray = NDArray[np.float64]
 
@@ -40,8 +42,10 @@ class Run:
 
     Attributes
     ----------
+    assembly
+        The scene as it was assembled at the start.
     segments
-        The stretches between changes of mode.
+        The stretches between changes of mode; none where time was used up before the start was recorded.
     happenings
         Events, in order.
     statistics
@@ -52,7 +56,7 @@ class Run:
     message
         Why it ended, in words.
     start
-        The start.
+        The start; None where time was used up before it was found.
     options
         What was asked for.
     choices
@@ -61,12 +65,13 @@ class Run:
         When which orientation went on in other coordinates, since these came near to where they are singular.
     """
 
+    assembly: Assembly
     segments: tuple[Segment, ...]
     happenings: tuple[Happening, ...]
     statistics: Statistics
     status: str
     message: str
-    start: Start
+    start: Start | None
     options: RunOptions
     choices: tuple[Choice, ...]
     restated: tuple[Restated, ...] = ()
@@ -87,7 +92,9 @@ class Run:
         return describe_choices(self.choices)
 
 
-def run(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reassemble) -> Run:
+def run(
+    assembly: Assembly, start: Start, options: RunOptions, reassemble: Reassemble, clock: Clock | None = None
+) -> Run:
     """Run a scene from its start to its end.
 
     Parameters
@@ -98,6 +105,8 @@ def run(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reass
         How.
     reassemble
         Gives the scene in other modes and charts, with lengths on a line signed as given.
+    clock
+        Its limit of time; one that begins now if not given.
 
     Raises
     ------
@@ -111,10 +120,31 @@ def run(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reass
     t = start.time
     check_span(t, options.t_end, options.max_step)
     check_solver(options.solver)
-    wanted = samples_needed(assembly, t, options.t_end) if options.samples > 1 else 0
-    times, shown = sample_times(t, options, wanted)
-    _check_prescribed(assembly, times)
-    return _Walk(assembly, start, options, reassemble, times, shown).go()
+    options = allowed(options)
+    clock = Clock(options.max_seconds) if clock is None else clock
+    try:
+        with clock.kept(GRACE):
+            wanted = samples_needed(assembly, t, options.t_end) if options.samples > 1 else 0
+            times, shown = sample_times(t, options, wanted)
+            _check_prescribed(assembly, times)
+            walk = _Walk(assembly, start, options, reassemble, times, shown)
+            walk.prepare()
+    except TimeIsUp:
+        return run_out_of_time(assembly, start, options)
+    with clock.kept():
+        return walk.go()
+
+
+def run_out_of_time(assembly: Assembly, start: Start | None, options: RunOptions) -> Run:
+    """Return a run whose time was used up before its start was recorded.
+
+    Parameters
+    ----------
+    assembly, start, options
+        As of `run`; no start where it was not found.
+    """
+    message = f"the limit of {options.max_seconds:g} s was used up before the start was found"
+    return Run(assembly, (), (), Statistics(), "time_limit", message, start, options, ())
 
 
 class _Walk:
@@ -138,14 +168,18 @@ class _Walk:
         self.statistics = Statistics(error_test_failures=0, convergence_failures=0)
         self.t = start.time
         self.assembly, self.q, self.u = settle(assembly, start, reassemble)
+        self.first = self.assembly
         self.restated: list[Restated] = []
         self.impact, self.show = False, bool(shown[0])
         self.plan: Plan | None = None
+        self.choice: Choice
 
     def go(self) -> Run:
         """Go from mode to mode to the end; whatever stops it on the way takes along what came before."""
         try:
             return self._go()
+        except TimeIsUp:  # while the scene was prepared in another mode
+            return self._run_so_far("time_limit", self.options.out_of_time(self.t))
         except AtwoodError as error:
             if self.segments and not hasattr(error, "run"):
                 error.run = self._run_so_far("failed", error.message)  # type: ignore[attr-defined]
@@ -178,13 +212,8 @@ class _Walk:
     def _stretch(self) -> tuple[Recorder, Outcome]:
         """Run one stretch in the present mode."""
         t, q, u, options = self.t, self.q, self.u, self.options
-        if self.plan is None:
-            self.plan = self._plan()
-            if not self.segments and not options.structure:
-                freedom = len(self.plan.assembly.equations.speeds) - self.plan.finding.rank
-                refuse_immobile(self.assembly, freedom, self.start)
-            self.probe = EventProbe(self.plan, t, q, u, options.relative_tolerance)
-            self.choice = choose(self.plan, options, t, q, u)
+        self.prepare()
+        assert self.plan is not None
         limit = float(np.min(self.breaks[self.breaks[:, 0] > t, 0], initial=options.t_end))
         ahead = _until(self.times, self.shown, t, limit)
         stretch = Stretch(self.plan, self.probe, options, self.choice, *ahead, self.show, self.statistics)
@@ -192,6 +221,8 @@ class _Walk:
         outcome = run_stretch(stretch, recorder, t, q, u)
         if recorder.is_empty and outcome.error is not None:  # not even the start could be projected
             raise outcome.error
+        if recorder.is_empty:  # nor was there time to
+            return recorder, outcome
         self.segments.append(recorder.segment(self.impact))
         self.statistics = self.statistics + outcome.statistics
         self.restated += outcome.restated
@@ -200,6 +231,18 @@ class _Walk:
                 self.choices.append(choice)
         self.choice = outcome.choices[-1]
         return recorder, outcome
+
+    def prepare(self) -> None:
+        """Make all that is needed in the present mode, if it is not there."""
+        if self.plan is not None:
+            return
+        t, q, u, options = self.t, self.q, self.u, self.options
+        plan = self._plan()
+        if not self.segments and not options.structure:
+            refuse_immobile(self.assembly, len(plan.assembly.equations.speeds) - plan.finding.rank, self.start)
+        self.probe = EventProbe(plan, t, q, u, options.relative_tolerance)
+        self.choice = choose(plan, options, t, q, u)
+        self.plan = plan
 
     def _plan(self) -> Plan:
         """Return the plan of a mode from the present state; if a law has no value there, it is named."""
@@ -259,7 +302,7 @@ class _Walk:
         return made
 
     def _run_so_far(self, status: str, message: str) -> Run:
-        parts = (tuple(self.segments), tuple(self.happenings), self.statistics, status, message)
+        parts = (self.first, tuple(self.segments), tuple(self.happenings), self.statistics, status, message)
         return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.restated))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import SolveError
 from atwood.solve.charts import CHART, Restated, longest_step, restated
 from atwood.solve.choice import Choice, stiffness_of, turned_stiff
@@ -22,6 +23,7 @@ from atwood.solve.passage import Passage, events_on
 from atwood.solve.problem import Plan, pack_state
 from atwood.solve.projection import project_safely
 from atwood.solve.record import Recorder
+from atwood.solve.tolerance import too_tight
 
 __all__ = ["Outcome", "Stretch", "run_stretch"]
 
@@ -110,8 +112,9 @@ def run_stretch(stretch: Stretch, recorder: Recorder, t: float, q: FloatArray, u
     """
     plan = stretch.plan
     n = plan.program.coordinates
-    y, yp = (np.zeros(0), np.zeros(0)) if n == 0 else pack_state(plan, t, q, u)
-    recorder.take(t, y, stretch.first_shown)
+    with more_time():  # so that there is its start, whatever comes
+        y, yp = (np.zeros(0), np.zeros(0)) if n == 0 else pack_state(plan, t, q, u)
+        recorder.take(t, y, stretch.first_shown)
     already = stretch.probe.broken_at_start(t)
     if already is not None:
         return Outcome(t, "event", "", Statistics(), (stretch.choice,), already)
@@ -123,15 +126,20 @@ def run_stretch(stretch: Stretch, recorder: Recorder, t: float, q: FloatArray, u
 def _follow(stretch: Stretch, recorder: Recorder, t: float) -> Outcome:
     """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen."""
     nothing, last, options = np.zeros(0), t, stretch.options
-    for moment, show in zip(stretch.times, stretch.shown, strict=True):
-        happening = stretch.probe.between(last, float(moment))
-        if happening is not None:
-            recorder.take(happening.time, nothing, True)
-            return Outcome(happening.time, "event", "", Statistics(), (stretch.choice,), happening)
-        last = float(moment)
-        recorder.take(last, nothing, bool(show))
-        if options.progress is not None:
-            options.progress(last)
+    try:
+        for moment, show in zip(stretch.times, stretch.shown, strict=True):
+            check_time()
+            happening = stretch.probe.between(last, float(moment))
+            if happening is not None:
+                recorder.take(happening.time, nothing, True)
+                return Outcome(happening.time, "event", "", Statistics(), (stretch.choice,), happening)
+            last = float(moment)
+            recorder.take(last, nothing, bool(show))
+            if options.progress is not None:
+                options.progress(last)
+    except TimeIsUp:
+        last = recorder.close()
+        return Outcome(last, "time_limit", options.out_of_time(last), Statistics(), (stretch.choice,))
     return Outcome(last, "finished", "", Statistics(), (stretch.choice,))
 
 
@@ -144,11 +152,12 @@ class _Runner:
         self.before = Statistics(error_test_failures=0, convergence_failures=0)
         self.session: Session | None = None
         self.guard: Guard | None = None
+        self.order: Order | None = None
         self.restated: list[Restated] = []
 
     def run(self, t: float, y: FloatArray, yp: FloatArray) -> Outcome:
         """Go from sample to sample; change the solver where the scene turns out stiff."""
-        done = 0
+        self.began, done = t, 0
         try:
             session = self._open(t, y, yp)
             while True:
@@ -164,8 +173,14 @@ class _Runner:
         except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
             t = self.recorder.close()
             return self._ended(t, "interrupted", f"interrupted (at t = {t:.9g})")
+        except TimeIsUp:
+            return self._out_of_time()
         except SolveError as error:  # from a state that cannot be projected
             return replace(self._ended(self.recorder.end, "failed", error.message), error=error)
+
+    def _out_of_time(self) -> Outcome:
+        t = max(self.recorder.close(), self.began)
+        return self._ended(t, "time_limit", self.stretch.options.out_of_time(t))
 
     def _ended(self, t: float, status: str, message: str) -> Outcome:
         return Outcome(t, status, message, self._cost(), tuple(self.choices), restated=tuple(self.restated))
@@ -189,7 +204,12 @@ class _Runner:
             return replace(self._ended(advance.t, "event", ""), happening=happening)
         if advance.t > self.recorder.end:
             self.recorder.take(advance.t, advance.y, True)
-        ended = self._ended(advance.t, advance.status.value, advance.message)
+        if advance.status is Status.TIME_LIMIT:
+            return self._out_of_time()
+        message = advance.message
+        if advance.status is Status.STEP_LIMIT:
+            message = self.stretch.options.out_of_steps(advance.t)
+        ended = self._ended(advance.t, advance.status.value, message)
         return ended if advance.status is not Status.FAILED else replace(ended, error=self._explain(advance))
 
     def _restates(self, session: Session, advance: Advance) -> bool:
@@ -222,7 +242,8 @@ class _Runner:
         states = states_ahead(advance.t, now, rates, options.t_end - self.stretch.choice.time)
         found = find_missing(assembly, *states)
         if found is None:
-            return None if self.guard is None else self.guard.explain(advance.message)
+            stuck = None if self.guard is None else self.guard.explain(advance.message)
+            return stuck or (None if self.order is None else too_tight(self.order, self.choices[-1].solver, advance))
         return SolveError(
             f"{found.describe()}, so that the run cannot go on: {advance.message}",
             where=found.part,
@@ -240,12 +261,13 @@ class _Runner:
             stretch.end,
             Budget(
                 max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
-                wall_seconds=None if options.max_seconds is None else max(0.0, options.max_seconds - spent.seconds),
+                wall_seconds=None if options.max_seconds is None else max(0.0, time_left()),
                 poll=stretch.plan.poll(choice.solver),
             ),
         )
         if choice.solver.startswith("ida"):
             here = Advance(t, y, yp, Status.REACHED)
+            self.order = order
             self.guard = guard_of(stretch.plan, options.relative_tolerance, stretch.end, here)
             self.session = open_implicit_session(order, choice.solver, t, y, yp)
         else:

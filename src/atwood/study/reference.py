@@ -101,13 +101,13 @@ def find_reference(
     tight, note = _tight_solutions(flat, assembled, t_end, outputs, max_seconds, watch)
     (best, said), (second, other) = tight
     paths = compared_paths(best)
-    scales = {path: best.run.start.length if best.unit(path) == "m" else 1.0 for path in paths}
+    scales = {path: best.start.length if best.unit(path) == "m" else 1.0 for path in paths}
     quantities = best.table(paths)
     error = scaled_difference(quantities, second.table(paths), scales)
     given = _closed_form(scene, best)
     if given:
         known = {path: values for path, values in given.items() if path in best and best.unit(path) in _COMPARED}
-        known_scales = {path: best.run.start.length if best.unit(path) == "m" else 1.0 for path in known}
+        known_scales = {path: best.start.length if best.unit(path) == "m" else 1.0 for path in known}
         miss = scaled_difference(known, best.table(known), known_scales)
         if known and miss < max(_HOLDS, 100.0 * error):
             text = f"closed form of the scene; {said} agrees with it to {miss:.1e}"
