@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "name", ["kernels", "ida", "loops", "work_precision", "startup", "sweep", "taylor", "charts", "space"]
 )

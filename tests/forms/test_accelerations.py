@@ -199,6 +199,7 @@ def operations(scene: Model, method: str | None = None) -> int:
     return sum(made_for(scene, method).program.operations.values())
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize("name", MADE)
 def test_values_are_those_of_the_balance_of_forces(name: str) -> None:
     prepared = prepare(MADE[name](), "reduced")
@@ -229,6 +230,7 @@ def test_constraints_that_are_left_have_no_such_program() -> None:
         assert acceleration_program(assemble(scene)) is None
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("make", "method", "each"),
     [

@@ -10,6 +10,7 @@ from ..helpers.runs import EVERY_FORM, FORMS, dense, difference_quotient, moved,
 EVERY_SCENE_AND_FORM = [(name, form, level) for name in SCENES for form, level in EVERY_FORM]
 
 
+@pytest.mark.sample(32)
 @pytest.mark.parametrize(("name", "form", "level"), EVERY_SCENE_AND_FORM)
 def test_jacobian_is_the_derivative_of_the_residual(name: str, form: str, level: str) -> None:
     prepared = prepare(SCENES[name](), form, level)
@@ -28,6 +29,7 @@ def test_jacobian_is_the_derivative_of_the_residual(name: str, form: str, level:
         assert np.max(np.abs(found - expected)) < 1e-9 * np.max(np.abs(expected))
 
 
+@pytest.mark.sample(32)
 @pytest.mark.parametrize(("name", "form", "level"), EVERY_SCENE_AND_FORM)
 def test_residual_vanishes_at_consistent_states(name: str, form: str, level: str) -> None:
     # states packed from the balance of forces, which the residual is not made of
@@ -40,6 +42,7 @@ def test_residual_vanishes_at_consistent_states(name: str, form: str, level: str
         assert np.max(np.abs(residual([prepared.time], y, yp)[0])) < 1e-11 * size
 
 
+@pytest.mark.sample(24)
 @pytest.mark.parametrize(("name", "form", "level"), EVERY_SCENE_AND_FORM)
 def test_algebraic_unknowns_are_those_without_a_derivative(name: str, form: str, level: str) -> None:
     prepared = prepare(SCENES[name](), form, level)
@@ -62,6 +65,7 @@ def test_algebraic_unknowns_are_those_without_a_derivative(name: str, form: str,
         assert np.linalg.matrix_rank(whole / np.max(np.abs(whole), axis=1)[:, None]) == program.size
 
 
+@pytest.mark.sample(18)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", SCENES)
 def test_levels_of_constraints_are_derivatives_of_each_other(name: str, form: str) -> None:

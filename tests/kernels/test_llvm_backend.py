@@ -324,6 +324,7 @@ def test_many_threads_call_one_kernel_at_once():
         sys.setswitchinterval(interval)
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", SCENES)
 def test_every_scene_agrees_with_the_python_back_end(name, form):

@@ -135,6 +135,7 @@ def four_bar(space: str, geared: str) -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("geared", [f"hinge{number}" for number in range(4)])
 def test_a_gear_on_any_hinge_of_a_loop(geared: str) -> None:
     """Whichever hinge closes the loop: the same motion in a plane and in space, in both forms."""

@@ -33,6 +33,7 @@ def energies(prepared: Prepared, t: float, q: FloatArray, u: FloatArray) -> tupl
     return kinetic, potential
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize(("name", "form"), EVERY_SCENE_AND_FORM)
 def test_rows_are_lagranges_equations(name: str, form: str) -> None:
     # d/dt dT/du - dT/dq + dV/dq, time derivatives along (u, a); Goldstein, equation 1.57
@@ -65,6 +66,7 @@ def test_rows_are_lagranges_equations(name: str, form: str) -> None:
         assert np.max(np.abs(now.mass @ a + now.bias - expected)) < 2e-7 * max(1.0, np.max(np.abs(expected)))
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize(("name", "form"), EVERY_SCENE_AND_FORM)
 def test_mass_matrix_is_symmetric_and_carries_the_kinetic_energy(name: str, form: str) -> None:
     prepared = prepare(SCENES[name](), form)
@@ -77,6 +79,7 @@ def test_mass_matrix_is_symmetric_and_carries_the_kinetic_energy(name: str, form
         assert kinetic == pytest.approx(0.5 * u @ now.mass @ u, rel=1e-12)
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize(("name", "form"), EVERY_SCENE_AND_FORM)
 def test_power_balance_at_any_state(name: str, form: str) -> None:
     # the energy changes by the work of drives alone, at admissible states whatever they are
@@ -119,6 +122,7 @@ def _drive_force(prepared: Prepared, q: FloatArray, u: FloatArray, path: str) ->
     return float(values[index, 0])
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("name", SCENES)
 def test_reduced_and_maximal_accelerations_are_the_same_motion(name: str) -> None:
     prepared = prepare(SCENES[name](), "reduced")

@@ -303,6 +303,7 @@ def _throw(scene: Scene, body: str, joined_by: str) -> None:
         scene.guess.update({f"{body}.phi": 0.0})
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("joined_by", ["free", "ball", "hinge"])
 @pytest.mark.parametrize("count", [2, 3, 5])
 def test_welded_shapes_cost_and_move_as_one_body(count: int, joined_by: str) -> None:

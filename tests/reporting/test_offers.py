@@ -264,6 +264,7 @@ def _with_force(direction: tuple[float, float, float], value: Any) -> Scene:
     return scene
 
 
+@pytest.mark.sample(14)
 @pytest.mark.parametrize("name", STAYS)
 def test_what_stays_is_found(name: str) -> None:
     make, expected = STAYS[name]
@@ -321,6 +322,7 @@ def _pushed_wheel(spin: float, push: float) -> Scene:
     return scene
 
 
+@pytest.mark.sample(14)
 @pytest.mark.parametrize("name", LEAVES)
 def test_what_leaves_is_not_offered(name: str) -> None:
     assert offers(LEAVES[name]()) == ()
@@ -361,6 +363,7 @@ def test_the_library_s_own_scenes_cost_there_what_they_cost(name: str, planar: s
         assert count <= found.states[form]
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", [*SAME, "spinning wheel", "body on a ball", "two springs", "two hinges", "fall"])
 def test_the_motion_is_the_same(name: str) -> None:
     scene = STAYS[name][0]()

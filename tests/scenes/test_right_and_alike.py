@@ -16,13 +16,15 @@ from ..helpers.runs import FORMS
 TIGHT = 1e-12
 
 SPANS = {
-    "chain": (0.4, "its bobs are thrown about, so that errors grow"),
+    "chain": (0.3, "its bobs are thrown about, so that errors grow"),
     "double-pendulum-3d": (0.7, "errors grow"),
     "flyball-governor": (0.05, "its dampers are stiff: hundreds of arcs in 0.1 s"),
     "four-bar-row": (0.6, "it comes to a singular position at 0.71 s; passages have tests of their own"),
-    "gyroscope": (0.3, "its rotor spins at 100 rad/s, 5 turns in this time"),
+    "gyroscope": (0.2, "its rotor spins at 100 rad/s, 3 turns in this time"),
     "lagrange-top": (0.7, "it spins at 50 rad/s"),
+    "rolling-ball": (0.5, "its spin keeps what errors IDA makes"),
     "rolling-disc": (0.6, "it wobbles, which doubles errors in each second"),
+    "slider-crank": (0.5, "errors grow"),
     "spatial-slider-crank": (0.4, "errors grow"),
     "stewart-platform": (0.2, "a large program; an arc takes 0.2 s to find"),
 }

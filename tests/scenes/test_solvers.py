@@ -10,6 +10,7 @@ from atwood_library.scenes import SCENES
 from ..helpers.runs import EVERYDAY
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", EVERYDAY)
 def test_both_drivers_agree(name: str, form: str) -> None:

@@ -61,6 +61,7 @@ def equal_slider_crank(longer: float = 0.0) -> SliderCrank:
 # -- rows of four-bars -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(4)
 @needs_sundials
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-11])
@@ -79,6 +80,7 @@ def test_a_row_meets_the_published_values_at_every_tolerance(form: str, rtol: fl
     assert np.max(list(result.constraint_max.values())[:2]) < 1e-10
 
 
+@pytest.mark.sample(2)
 @needs_sundials
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("windows", "space", "rtol"), [(1, "plane", 1e-11), (1, "space", 1e-9), (10, "plane", 1e-10)])
@@ -92,6 +94,7 @@ def test_rows_of_other_lengths_and_in_space(form: str, windows: int, space: str,
     assert np.max(np.abs(passed - [0.5 * np.pi, 1.5 * np.pi])) < 1e5 * rtol
 
 
+@pytest.mark.sample(2)
 @needs_sundials
 @pytest.mark.parametrize("windows", [1, 2])
 @pytest.mark.parametrize("rtol", [1e-5, 1e-6, 1e-8])
@@ -146,6 +149,7 @@ def test_a_piston_passes_the_shaft_of_its_crank(form: str, rtol: float) -> None:
     assert np.max(np.abs(energy - energy[0])) < 3e3 * rtol
 
 
+@pytest.mark.sample(2)
 @needs_sundials
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("longer", [1e-3, -1e-7, 4e-9])
@@ -187,6 +191,7 @@ def parallelogram_speed(start: float, turn: float) -> float:
     return math.sqrt(2.0 * 1.3 * 9.81 * (math.sin(turn) - math.sin(start)) / 1.2)
 
 
+@pytest.mark.sample(6)
 @needs_sundials
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("angle", [1e-2, 1e-3, 1e-5, -1e-4])
@@ -199,6 +204,7 @@ def test_a_start_near_the_place(form: str, angle: float, rtol: float) -> None:
     assert np.max(np.abs(energy - energy[0])) < 1e3 * rtol
 
 
+@pytest.mark.sample(4)
 @needs_sundials
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("short", "rtol"), [(0.1, 1e-5), (0.01, 1e-5), (1e-2, 1e-9), (1e-4, 1e-9)])
@@ -225,13 +231,20 @@ def test_what_nearly_stops_at_the_place_is_not_told_as_if_it_were_known(form: st
 
 
 @needs_sundials
-def test_a_solver_that_fails_there_says_where_it_is() -> None:
+def test_what_comes_to_rest_there_is_never_told_without_saying_where_it_is() -> None:
+    # The mechanism just reaches the singular position. Whether the solver fails there or gets past is decided by
+    # rounding, and so differs between machines; either way the place is named.
     scene = parallel_four_bar(2, angle=-1.0, rate=parallelogram_speed(-1.0, 0.0))
-    with pytest.raises(SolveError, match="comes to a singular position") as caught:
-        simulate(scene, form="dae", rtol=1e-10, t_end=0.8)
-    assert caught.value.where.startswith(("low", "high"))
-    assert "coincidence" in str(caught.value)
-    assert caught.value.run.segments
+    told: list[str] = []
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        try:
+            simulate(scene, form="dae", rtol=1e-10, t_end=0.8)
+        except SolveError as error:
+            told = [str(error)] if error.run.segments else []
+    told += [str(one.message) for one in warned]
+    assert "singular position, where low" in told[0] or "singular position, where high" in told[0]
+    assert "coincidence" in told[0]
 
 
 # -- what is recorded --------------------------------------------------------------------------------------------------
