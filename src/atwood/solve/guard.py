@@ -41,6 +41,9 @@ _CLOSE = 0.05
 _QUITE_CLOSE = 0.02
 """The same where a motion is followed past a position that it does not pass through."""
 
+_NEAR = 0.6
+"""The same where a solver cannot start behind a position at a tight tolerance: rounding is larger there."""
+
 _FALLEN = 1e-2
 """The same where the motion may be at a singular position already, and stay there."""
 
@@ -123,8 +126,9 @@ class Guard:
         self._measures = Nearness(plan)
         self.restart(advance)
 
-    def restart(self, advance: Advance) -> None:
-        """Begin again from a state."""
+    def restart(self, advance: Advance, is_behind: bool = False) -> None:
+        """Begin again from a state, perhaps behind a singular position."""
+        self._is_behind = is_behind
         self._looks, self._away = [], []
         self._judged = -np.inf
         self.trouble = None
@@ -192,7 +196,10 @@ class Guard:
         return None
 
     def _from_start(self, near: float) -> Passage | None:
-        """Return the way on from a start that is near a singular position, or has one just ahead, at a time."""
+        """Return the way on from a start that is near a singular position, or has one just ahead, at a time.
+
+        Behind a passage rounding can be too large for a solver at first; there the motion goes away from the place.
+        """
         first = self._looks[0]
         stride = self._stride(Advance(first.t, first.y, first.yp, Status.REACHED))
         begin = self._state(first)
@@ -209,7 +216,8 @@ class Guard:
             found = crossing(self._measures, arc)
             if found is not None:
                 return self._passage(arc, *found)
-            if longest is None and away[0] < _QUITE_CLOSE * away[-1] and np.all(np.diff(away[1:]) > 0.0):
+            leaves = away[0] < (_NEAR * self._largest if self._is_behind else _QUITE_CLOSE * away[-1])
+            if longest is None and leaves and np.all(np.diff(away[1:]) > 0.0):
                 longest = Path((arc,))
         return None if longest is None else Passage(longest.start, 0, (), (), longest)
 

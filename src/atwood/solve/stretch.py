@@ -368,7 +368,7 @@ class _Runner:
             y, yp = pack_state(plan, path.end, q, u)
             session.reinitialize(path.end, y, yp)
             assert self.guard is not None
-            self.guard.restart(Advance(path.end, y, yp, Status.REACHED))
+            self.guard.restart(Advance(path.end, y, yp, Status.REACHED), is_behind=True)
         return done, None
 
     def _chose_anew(self, session: Session, advance: Advance) -> bool:
