@@ -14,6 +14,7 @@ from typing import Any
 
 from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
+from atwood.consistency.check import check_parts
 from atwood.errors import StartError
 from atwood.expr import Graph
 from atwood.forms.assembly import Assembly
@@ -184,6 +185,7 @@ def read_mechanism(
     graph = Graph()
     time = graph.symbol("t")
     space = make_space(flat.space, flat.line_axis)
+    check_parts(flat.parts, space)
     table = ParameterTable(graph, space=space.name)
     locals_: Mapping[str, LocalPart] = localize(flat, space, time, table, modes, None)
     network = build_graph(flat, locals_)

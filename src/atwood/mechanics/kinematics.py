@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from atwood.expr import Expression, Graph, Scalar, jvp, substitute
+from atwood.errors import UnsupportedError
+from atwood.expr import Expression, Graph, Scalar, affine_coefficients, jvp, live, substitute
 from atwood.mechanics.orientation import NodeTurn, rotate
 from atwood.model.local import LocalPart
 from atwood.model.rotation import Axes
@@ -232,7 +233,7 @@ def _across_joint(
     for symbol in joint.moves:
         if symbol in joint.turns:
             angle_b = angles[b] + shape_of[b].turns[joint.b]
-            known[symbol] = graph.convert(angle_b - angle_a)
+            known[symbol] = graph.convert(_turned_by(joint, symbol, angle_b - angle_a))
         else:
             known[symbol] = next(values)
     placement = joint.local.placement
@@ -244,6 +245,29 @@ def _across_joint(
     if attachment.backwards:
         return tuple(graph.convert(p - d) for p, d in zip(start, step, strict=True))
     return tuple(graph.convert(p + d) for p, d in zip(start, step, strict=True))
+
+
+def _turned_by(joint: Joint, symbol: Expression, angle: Scalar) -> Scalar:
+    """Return the joint coordinate for which a joint in a plane turns b against a by an angle.
+
+    Raises
+    ------
+    UnsupportedError
+        If the angle is no multiple of the coordinate, but for a constant.
+    """
+    rotation = joint.local.placement.rotation
+    if rotation is symbol:
+        return angle
+    parameters = [node for node in live([rotation]) if node.is_parametric]
+    found = affine_coefficients(rotation, [symbol], parameters)
+    if found is None:
+        raise UnsupportedError(
+            "in a plane, a coordinate that both moves and turns b has to turn it evenly: by a constant times its value",
+            where=joint.label,
+            advice="Take the angle itself as the coordinate, and let the displacement follow from it.",
+        )
+    (slope,), rest = found
+    return (angle - rest) / slope
 
 
 def differentiate(

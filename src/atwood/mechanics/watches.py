@@ -64,8 +64,9 @@ def list_watches(
             value = mechanism.table.graph.convert(getattr(bound, law.name)())
             if value.is_constant or value in mechanism.table.values:
                 continue
-            target = local.part.values.get(law.options.target, law.options.target)
-            options = law.options
+            options, target = law.options, law.options.target
+            if target not in (*component.modes, "stop"):  # then it is the choice that says which
+                target = local.part.values.get(target, target)
             found.append(
                 Watch(path, law.name, value, options.direction, target, options.message, options.unit, options.impact)
             )

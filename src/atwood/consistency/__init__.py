@@ -1,0 +1,1 @@
+"""The laws of a component against each other, on numbers: what contradicts itself is refused before it moves."""

@@ -1,0 +1,117 @@
+"""Components are checked once, when a scene with one of them is first assembled in a process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from functools import partial
+from itertools import islice
+from weakref import WeakKeyDictionary
+
+from atwood.consistency.joints import Unknown, wrong_joint, wrong_rates
+from atwood.consistency.names import wrong_names
+from atwood.consistency.trials import Trial, make_trial
+from atwood.errors import DeclarationError
+from atwood.model.component import Component
+from atwood.model.flatten import Part
+from atwood.model.laws import Law
+from atwood.model.space import Space
+
+__all__ = ["check_parts", "contradictions"]
+
+TRIALS, ATTEMPTS = 2, 6
+"""At how many random states laws are compared, and at how many that is tried, since laws may have no value at some."""
+
+_sound: WeakKeyDictionary[type[Component], set[Hashable]] = WeakKeyDictionary()
+"""For each class, in which spaces and with which choices no contradiction was found."""
+
+
+def check_parts(parts: Mapping[str, Part], space: Space) -> None:
+    """Refuse parts whose laws contradict each other.
+
+    Joints are held against the constraints that they solve, observables against joint coordinates of their name and
+    against their rates, names against names, at random states, in all modes.
+
+    Parameters
+    ----------
+    parts
+        The leaves of a scene.
+    space
+        What it lives in.
+
+    Raises
+    ------
+    DeclarationError
+        With the path of the part, and the file and line of the law.
+    """
+    for part in parts.values():
+        cls = type(part.component)
+        known = _sound.setdefault(cls, set())
+        key = _shape_of(part, space)
+        if key not in known:
+            for error in contradictions(part, space):
+                raise error
+            known.add(key)
+
+
+def _shape_of(part: Part, space: Space) -> Hashable:
+    """Return what decides which terms there are in a part's laws: choices and counts, and which numbers are zero."""
+    line = () if space.line is None else tuple(space.line)
+    shape: list[Hashable] = [space.name, line]
+    for name, value in part.values.items():
+        if line and isinstance(value, tuple) and part.component.parameter_specs()[name].direction:
+            shape.append(value)  # what points along the line, and what does not
+        elif isinstance(value, tuple):
+            shape.append(tuple(one == 0.0 for one in value))
+        else:
+            shape.append(value == 0.0 if isinstance(value, float) else value)
+    return tuple(shape)
+
+
+def contradictions(part: Part, space: Space) -> Iterator[DeclarationError]:
+    """Yield what is contradictory in the laws of a part.
+
+    Parameters
+    ----------
+    part
+        The part.
+    space
+        What it lives in.
+    """
+    names = list(wrong_names(part.component, part.path))
+    yield from names
+    if names:
+        return  # what follows goes by names
+    component = part.component
+    joints = [law for law in component.laws("joint") if law.holds_in(space.name)]
+    for law in joints:
+        for mode in law.options.modes or component.modes or ("",):
+            if not law.options.rigid:
+                yield from _at_some(part, space, partial(wrong_joint, law=law, mode=mode))
+    joint = _that_tells_all(component, joints, space)
+    held = any(law.holds_in(space.name) for law in component.laws("constraint"))
+    if joint is not None or not held:
+        yield from _at_some(part, space, partial(wrong_rates, joint=joint))
+
+
+def _that_tells_all(component: Component, joints: list[Law], space: Space) -> Law | None:
+    """Return the joint that solves every constraint, so that what moves along it may move so."""
+    held = {law.name for law in component.laws("constraint") if law.holds_in(space.name)}
+    return joints[0] if len(joints) == 1 and held <= set(joints[0].options.solves) else None
+
+
+def _at_some(
+    part: Part, space: Space, look: Callable[[Trial], Iterable[DeclarationError]]
+) -> Iterator[DeclarationError]:
+    """Yield what is found at the first state where something is, of some at which laws have values."""
+
+    def found() -> Iterator[list[DeclarationError]]:
+        for seed in range(ATTEMPTS):
+            try:
+                yield list(look(make_trial(part, space, seed)))
+            except Unknown:
+                continue
+
+    for errors in islice(found(), TRIALS):
+        if errors:
+            yield from errors
+            return

@@ -1,0 +1,337 @@
+"""A component in a random state: numbers for everything that its laws may read.
+
+Connectors move as rigid frames with constant velocities; a joint places one of its two connectors from the other.
+Parameters have the values that they were given, so that bounds and what `check_values` asks for hold.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from atwood.model.component import Binding, Component, bind
+from atwood.model.connectors import Frame, JointCoordinate, Motion
+from atwood.model.contributions import Placement
+from atwood.model.flatten import Part
+from atwood.model.laws import Law
+from atwood.model.rotation import FREE, IDENTITY, Axes, Rotation, as_rotation, transposed
+from atwood.model.space import FIXED_AXES, Space, planar_axes
+from atwood.model.vector import ZERO, Vector, dot, norm
+
+__all__ = ["STEP", "Pose", "Trial", "make_trial", "rate_of", "rotation_between"]
+
+STEP = 1e-3
+"""Step of the differences in time, s: velocities are some lengths of the component, or radians, a second."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a connector is and how it is turned: in a plane by an angle, rad; in space its axes in world axes."""
+
+    position: Vector
+    angle: float
+    axes: Axes
+
+
+WORLD_POSE = Pose(ZERO, 0.0, IDENTITY)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A component in a random state.
+
+    Attributes
+    ----------
+    part
+        The component with its values.
+    space
+        What it lives in.
+    length
+        Its size, m: of the parameters that are lengths, or one metre.
+    values
+        Parameters by name.
+    inputs, grips
+        Value and rate of each input, and of each joint coordinate that it takes hold of.
+    poses
+        Where its connectors are at time zero.
+    going, turning
+        Their velocities and angular velocities, in world axes.
+    coordinates
+        Value and rate of each joint coordinate, by name.
+    frames
+        Connectors that have an orientation here.
+    sides
+        On a line, the signs of lengths, by the names of connectors.
+    """
+
+    part: Part
+    space: Space
+    length: float
+    values: Mapping[str, Any]
+    inputs: Mapping[str, tuple[float, float]]
+    grips: Mapping[str, tuple[float, float]]
+    poses: Mapping[str, Pose]
+    going: Mapping[str, Vector]
+    turning: Mapping[str, Vector]
+    coordinates: Mapping[str, tuple[float, float]]
+    frames: frozenset[str]
+    sides: Mapping[tuple[str, str], float]
+
+    @property
+    def component(self) -> Component:
+        """The component."""
+        return self.part.component
+
+    def is_frame(self, name: str) -> bool:
+        """Return whether a connector has an orientation here."""
+        return name in self.frames
+
+    def at(self, t: float) -> dict[str, Pose]:
+        """Return where connectors are at a time, each moving by itself."""
+        found = {}
+        for name, pose in self.poses.items():
+            spin = self.turning[name]
+            angle, axes = pose.angle - spin.y * t, pose.axes
+            if self.space.name == "space":
+                speed = norm(spin)
+                axes = _compose(_turn(spin / speed, speed * t), axes) if speed else axes
+            elif self.space.name == "plane":
+                axes = planar_axes(angle)
+            found[name] = Pose(pose.position + self.going[name] * t, angle, axes)
+        return found
+
+    def bound(self, t: float, poses: Mapping[str, Pose], motions: Mapping[str, Motion] | None = None) -> Any:
+        """Return the component with numbers in place of its fields.
+
+        Parameters
+        ----------
+        t
+            Time, s.
+        poses
+            Where its connectors are.
+        motions
+            What they know besides; positions and orientations alone if it is not given.
+        """
+        if motions is None:
+            motions = {name: self.motion(name, pose) for name, pose in poses.items()}
+        held = {name: Motion(value=value + rate * t, rate=rate) for name, (value, rate) in self.grips.items()}
+        binding = Binding(
+            values={**self.values, **{name: value + rate * t for name, (value, rate) in self.inputs.items()}},
+            motions={**motions, **held},
+            time=t,
+            space=self.space.name,
+            line=self.space.line,
+            sides=self.sides,
+        )
+        return bind(self.component, binding)
+
+    def motion(self, name: str, pose: Pose, velocity: Vector | None = None, spin: Vector | None = None) -> Motion:
+        """Return what a connector knows."""
+        if not self.is_frame(name):
+            still = ZERO if velocity is not None else None
+            return Motion(pose.position, velocity, axes=FIXED_AXES, angle=0.0, angular_velocity=still)
+        angle = pose.angle if self.space.name == "plane" else None
+        return Motion(pose.position, velocity, axes=pose.axes, angle=angle, angular_velocity=spin)
+
+    def placement(self, law: Law, t: float, poses: Mapping[str, Pose], values: Mapping[str, float]) -> Placement | None:
+        """Return where a joint puts b, seen from a; None if its method gives something else."""
+        arguments = [values[name] for name in law.options.coordinates]
+        made = getattr(self.bound(t, poses), law.name)(*arguments)
+        return made if isinstance(made, Placement) else None
+
+    def coordinates_at(self, t: float) -> dict[str, float]:
+        """Return the joint coordinates at a time."""
+        return {name: value + rate * t for name, (value, rate) in self.coordinates.items()}
+
+    def joined(
+        self, law: Law, t: float, values: Mapping[str, float] | None = None, poses: Mapping[str, Pose] | None = None
+    ) -> dict[str, Pose]:
+        """Return where connectors are with one of them placed by a joint: b from a, or a from b where b is the world.
+
+        Parameters
+        ----------
+        law
+            The joint.
+        t
+            Time, s.
+        values
+            Its coordinates; those of the trial at that time if not given.
+        poses
+            Where connectors are without it; those of the trial at that time if not given.
+        """
+        found = dict(poses or self.at(t))
+        a, b = law.options.a, law.options.b
+        placement = self.placement(law, t, found, values or self.coordinates_at(t))
+        if placement is None:
+            raise TypeError("a joint returns a Placement")
+        backwards = b == "world"
+        fixed, moved = (b, a) if backwards else (a, b)
+        base = WORLD_POSE if fixed == "world" else found[fixed]
+        loose = found[moved]
+        angle, axes = loose.angle, loose.axes
+        if placement.rotation is not None and placement.rotation is not FREE and self.space.has_rotation:
+            if self.space.name == "plane":
+                turn: Any = placement.rotation
+                angle = base.angle - turn if backwards else base.angle + turn
+                axes = planar_axes(angle)
+            else:
+                rotation = _rotation(as_rotation(placement.rotation))
+                axes = _compose(base.axes, transposed(rotation) if backwards else rotation)
+        shift = placement.displacement
+        of_a = Pose(base.position, angle, axes) if backwards else base
+        if placement.axes == "a" and self.space.has_rotation:
+            shift = _from_axes(of_a.axes, shift)
+        along = self.space.vector(self.space.components(shift))
+        place = base.position - along if backwards else base.position + along
+        found[moved] = Pose(place, angle, axes)
+        return found
+
+    def moving(self, poses_at: Callable[[float], Mapping[str, Pose]]) -> dict[str, Motion]:
+        """Return what connectors know at time zero, with velocities by differences of where they are."""
+        around = {k: poses_at(k * STEP) for k in (-2, -1, 0, 1, 2)}
+        found = {}
+        for name, pose in around[0].items():
+            velocity = rate_of([around[k][name].position for k in (-2, -1, 1, 2)])
+            if self.space.name == "space":
+                rates = [rate_of([around[k][name].axes[i] for k in (-2, -1, 1, 2)]) for i in range(3)]
+                spin = _spin(pose.axes, rates)
+            else:
+                spin = Vector(0.0, -rate_of([around[k][name].angle for k in (-2, -1, 1, 2)]), 0.0)
+            found[name] = self.motion(name, pose, velocity, spin)
+        return found
+
+
+def _from_axes(axes: Axes, vector: Vector) -> Vector:
+    """Return a vector that is given along some axes; as `model.rotation.from_axes`, on numbers alone."""
+    found: Vector = axes[0] * vector.x + axes[1] * vector.y + axes[2] * vector.z
+    return found
+
+
+def _turn(axis: Vector, angle: float) -> Axes:
+    """Return the axes of a turned frame: Rodrigues' formula, as `Turn.axes`, on numbers alone."""
+    c, s = math.cos(angle), math.sin(angle)
+    x, y, z = axis
+    k = 1.0 - c
+    return (
+        Vector(c + k * x * x, k * x * y + s * z, k * x * z - s * y),
+        Vector(k * x * y - s * z, c + k * y * y, k * y * z + s * x),
+        Vector(k * x * z + s * y, k * y * z - s * x, c + k * z * z),
+    )
+
+
+def _rotation(rotation: Rotation) -> Axes:
+    found = IDENTITY
+    for one in rotation.turns:
+        found = _compose(found, _turn(one.axis, one.angle))
+    return found
+
+
+def _compose(outer: Axes, inner: Axes) -> Axes:
+    return _from_axes(outer, inner[0]), _from_axes(outer, inner[1]), _from_axes(outer, inner[2])
+
+
+def rate_of(around: list[Any]) -> Any:
+    """Return a derivative in time from values at -2, -1, 1 and 2 steps, to fourth order."""
+    before2, before, after, after2 = around
+    return ((after - before) * 8.0 - (after2 - before2)) * (1.0 / (12.0 * STEP))
+
+
+def _spin(axes: Axes, rates: list[Vector]) -> Vector:
+    """Return the angular velocity from axes and their rates: half the sum of ``e_i x e_i'``."""
+    total = ZERO
+    for axis, rate in zip(axes, rates, strict=True):
+        total = total + Vector(
+            axis.y * rate.z - axis.z * rate.y, axis.z * rate.x - axis.x * rate.z, axis.x * rate.y - axis.y * rate.x
+        )
+    return total * 0.5
+
+
+def rotation_between(before: Pose, after: Pose, space: Space) -> list[float]:
+    """Return the small rotation from one pose to another: about the plane's normal, or in world axes."""
+    if space.name == "plane":
+        return [after.angle - before.angle]
+    pairs = zip(before.axes, after.axes, strict=True)
+    return list(_spin(before.axes, [new - old for old, new in pairs]))
+
+
+def make_trial(part: Part, space: Space, seed: int) -> Trial:
+    """Return a component in a random state, the same for the same seed.
+
+    Parameters
+    ----------
+    part
+        The component with its values.
+    space
+        What it lives in.
+    seed
+        Of the random numbers.
+    """
+    draw = random.Random(seed)
+
+    def number() -> float:
+        return draw.choice((-1.0, 1.0)) * draw.uniform(0.2, 1.0)
+
+    component, values = part.component, {}
+    sizes = []
+    for name, spec in component.parameter_specs().items():
+        value = part.values[name]
+        if isinstance(value, tuple):
+            value = Vector(*value) if len(value) == 3 else value
+        values[name] = value
+        if isinstance(value, float) and value and spec.unit.exponents == (0, 1, 0, 0):
+            sizes.append(abs(value))
+    length = math.exp(sum(map(math.log, sizes)) / len(sizes)) if sizes else 1.0
+    connectors = component.connectors()
+    free = [name for name, one in connectors.items() if not isinstance(one, JointCoordinate)]
+    poses, going, turning = {}, {}, {}
+    for order, name in enumerate(free):
+        place = [(3.0 * order + number()) * length] + [number() * length for _ in space.basis[1:]]
+        axes, angle, spin = FIXED_AXES, 0.0, ZERO
+        if space.name == "plane":
+            angle, spin = number(), Vector(0.0, number(), 0.0)
+            axes = planar_axes(angle)
+        elif space.name == "space":
+            raw = Vector(number(), number(), number())
+            axes = _turn(raw / norm(raw), 2.0 * number())
+            spin = Vector(number(), number(), number())
+        poses[name] = Pose(space.vector(tuple(place)), angle, axes)
+        going[name] = space.vector(tuple(number() * length for _ in space.basis))
+        turning[name] = spin
+    coordinates: dict[str, tuple[float, float]] = {}
+    units = {law.name: law.options.unit for law in component.laws("observable")}
+    for law in component.laws("joint"):
+        for name in law.options.coordinates:
+            size = length if units.get(name) == "m" else 1.0
+            coordinates.setdefault(name, (number() * size, number() * size))
+    inputs = {}
+    for name, signal in component.signal_specs().items():
+        size = length if signal.unit.exponents == (0, 1, 0, 0) else 1.0
+        inputs[name] = (abs(number()) * size, number() * size)
+    grips = {name: (number(), number()) for name in connectors if name not in free and not _is_offered(component, name)}
+    frames = frozenset(name for name, one in connectors.items() if isinstance(one, Frame) and space.has_rotation)
+    sides = {(a, b): 1.0 if i < j else -1.0 for i, a in enumerate(free) for j, b in enumerate(free)}
+    return Trial(part, space, length, values, inputs, grips, poses, going, turning, coordinates, frames, sides)
+
+
+def _is_offered(component: Component, name: str) -> bool:
+    specs = component.connector_specs().values()
+    return any(spec.of and name in spec.names(component) for spec in specs)
+
+
+def nudged(pose: Pose, column: int, by: float, space: Space) -> Pose:
+    """Return a pose moved a little along one of its ways to move: first the directions of the space, then the turns."""
+    directions = len(space.basis)
+    if column < directions:
+        return replace(pose, position=pose.position + space.basis[column] * by)
+    if space.name == "plane":
+        return Pose(pose.position, pose.angle + by, planar_axes(pose.angle + by))
+    axes = _compose(_turn(IDENTITY[column - directions], by), pose.axes)
+    return Pose(pose.position, pose.angle, axes)
+
+
+def in_components(vector: Vector, space: Space) -> list[float]:
+    """Return the free components of a vector as numbers."""
+    return [float(dot(vector, direction)) for direction in space.basis]
