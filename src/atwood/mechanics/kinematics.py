@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, affine_coefficients, jvp, live, substitute
@@ -255,7 +256,7 @@ def _turned_by(joint: Joint, symbol: Expression, angle: Scalar) -> Scalar:
     UnsupportedError
         If the angle is no multiple of the coordinate, but for a constant.
     """
-    rotation = joint.local.placement.rotation
+    rotation: Any = joint.local.placement.rotation
     if rotation is symbol:
         return angle
     parameters = [node for node in live([rotation]) if node.is_parametric]
