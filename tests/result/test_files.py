@@ -76,8 +76,10 @@ def test_csv_is_plain(result: Result, tmp_path: Path) -> None:
     with file.open(encoding="utf-8", newline="") as stream:
         rows = list(csv.reader(stream))
     assert rows[0] == ["time [s]", "rod[0].angle [rad]", "rod[0].tension [N]"]
-    assert len(rows) == 22
-    assert float(rows[-1][1]) == result["rod[0].angle"][-1]
+    assert len(rows) == 23
+    assert rows[-1][0].startswith("# rows: 21")
+    assert np.array_equal(np.loadtxt(file, delimiter=",", skiprows=1)[:, 1], result["rod[0].angle"])
+    assert float(rows[-2][1]) == result["rod[0].angle"][-1]
 
 
 @pytest.mark.parametrize("name", ["run", "run.txt", "run.mat"])

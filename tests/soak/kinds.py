@@ -9,7 +9,9 @@ from collections.abc import Callable
 
 from .trial import Discarded, Finding, Trial
 
-KINDS: dict[str, str] = {}
+KINDS = {
+    "files": "files",
+}
 """Name of a kind and its module, whose `check(seed)` makes a trial."""
 
 

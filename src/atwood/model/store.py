@@ -8,6 +8,7 @@ so read only files that you would also run.
 from __future__ import annotations
 
 import functools
+import hashlib
 import importlib
 import json
 import sys
@@ -15,7 +16,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from atwood.arguments import FILE, MAPPING, instance, takes
 from atwood.errors import AtwoodError, UsageError, suggestion
+from atwood.files import check_readable, write_atomically
 from atwood.model.component import Component
 from atwood.model.composite import Model
 from atwood.model.deferred import OPERATIONS, Deferred
@@ -32,6 +35,7 @@ VERSION = 1
 _CHANGES = ("settings", "replaced", "added", "connections", "starts")
 
 
+@takes(scene=instance("a Scene or a Model", Model))
 def to_data(scene: Model) -> dict[str, Any]:
     """Return a scene as plain data: dictionaries, lists, text and numbers.
 
@@ -47,11 +51,15 @@ def to_data(scene: Model) -> dict[str, Any]:
     ParameterError
         If a function of time cannot be written.
     """
-    if not isinstance(scene, Model):
-        raise UsageError(f"{scene!r} is no scene", advice="Pass a Scene or a Model.")
     return {"format": FORMAT, "version": VERSION, "scene": _write(scene, "")}
 
 
+def _checksum(data: Mapping[str, Any]) -> str:
+    text = json.dumps(data.get("scene"), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@takes(data=MAPPING)
 def from_data(data: Mapping[str, Any]) -> Model:
     """Return the scene that plain data stand for; every value is checked as when it is given by hand.
 
@@ -67,7 +75,7 @@ def from_data(data: Mapping[str, Any]) -> Model:
     ParameterError
         If a value is not admissible.
     """
-    if _mapping(data, "").get("format") != FORMAT:
+    if data.get("format") != FORMAT:
         raise UsageError("these data are no scene of Atwood", advice="A scene is written with save_scene or to_data.")
     version = data.get("version")
     if version != VERSION or isinstance(version, bool):
@@ -75,12 +83,22 @@ def from_data(data: Mapping[str, Any]) -> Model:
             f"the scene is written in version {version!r} of the format and this Atwood reads version {VERSION}",
             advice="Read it with the Atwood that wrote it, or a newer one.",
         )
-    scene = _read(data.get("scene"), "scene")
+    if "checksum" in data and data["checksum"] != _checksum(data):
+        raise UsageError(
+            "the scene is not what was saved: its checksum is that of other contents",
+            where="checksum",
+            advice="Save it again; if it was changed by hand, take the entry 'checksum' away.",
+        )
+    try:
+        scene = _read(data.get("scene"), "scene")
+    except RecursionError:
+        raise UsageError("the data are nested too deeply for a scene", where="scene", advice="Save it again.") from None
     if not isinstance(scene, Model):
         raise UsageError(f"a {type(scene).__name__} is no scene", where="scene", advice="Only models are scenes.")
     return scene
 
 
+@takes(scene=instance("a Scene or a Model", Model), path=FILE)
 def save_scene(scene: Model, path: str | Path) -> None:
     """Write a scene to a file, as JSON.
 
@@ -91,10 +109,12 @@ def save_scene(scene: Model, path: str | Path) -> None:
     path
         The file; it is written only when the whole scene can be.
     """
-    text = json.dumps(to_data(scene), indent=2, allow_nan=False)
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    data = to_data(scene)
+    text = json.dumps({**data, "checksum": _checksum(data)}, indent=2, allow_nan=False)
+    write_atomically(Path(path), lambda part: part.write_text(text + "\n", encoding="utf-8"))
 
 
+@takes(path=FILE)
 def load_scene(path: str | Path) -> Model:
     """Read a scene from a file that `save_scene` wrote.
 
@@ -108,13 +128,18 @@ def load_scene(path: str | Path) -> Model:
     UsageError
         If the file cannot be read, or holds no scene.
     """
+    check_readable(Path(path))
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise UsageError(f"the file cannot be read ({error.strerror})", where=str(path)) from None
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise UsageError(f"the file is no JSON ({error})", where=str(path)) from None
-    return from_data(data)
+    try:
+        return from_data(data)
+    except AtwoodError as error:
+        where = f"{path}: {error.where}" if error.where else str(path)
+        raise type(error)(error.message, where=where, advice=error.advice) from error
 
 
 # -- writing -----------------------------------------------------------------------------------------------------

@@ -2,11 +2,17 @@
 
 A file appears under its name only once it is complete. NetCDF and NPZ keep numbers exactly, with units, meanings and
 everything that is known about the run; CSV keeps numbers, paths and units, so that any program can read it.
+
+Each holds a checksum of its contents, so that a file that was cut off or damaged is refused and never gives other
+values. In a CSV it stands in a last line that begins with ``#``, and the headings are in quotes, which says that there
+is such a line. Files of older versions have none.
 """
 
 from __future__ import annotations
 
 import csv
+import hashlib
+import io
 import json
 import os
 import re
@@ -18,7 +24,10 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arguments import FILE, instance, takes
 from atwood.errors import ResultError, UsageError, suggestion_in_parts
+from atwood.files import check_directory, check_readable, write_atomically
+from atwood.model.quantities import PATHS
 from atwood.result.about import describe_run
 from atwood.result.result import Result
 
@@ -104,6 +113,7 @@ class SavedResult:
         return path
 
 
+@takes(result=instance("a Result, as simulate returns it", Result), file=FILE, paths=PATHS)
 def save_result(result: Result, file: str | os.PathLike[str], paths: Iterable[str] | None = None) -> Path:
     """Save the trajectories of a run.
 
@@ -139,6 +149,7 @@ def save_result(result: Result, file: str | os.PathLike[str], paths: Iterable[st
     return target
 
 
+@takes(file=FILE)
 def load_result(file: str | os.PathLike[str]) -> SavedResult:
     """Read trajectories that were saved.
 
@@ -154,13 +165,16 @@ def load_result(file: str | os.PathLike[str]) -> SavedResult:
     """
     source = Path(file)
     _, read = _format_of(source)
-    if not source.is_file():
-        raise UsageError("there is no such file", where=str(source))
+    check_readable(source)
     try:
         return read(source)
-    except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, StopIteration) as error:
+    except UsageError:
+        raise
+    except Exception as error:  # of a damaged file, its readers raise whatever comes
         raise UsageError(
-            f"this is no result that Atwood saved ({type(error).__name__}: {error})", where=str(source)
+            f"this is no result that Atwood saved, or it is damaged ({type(error).__name__}: {error})",
+            where=str(source),
+            advice="Save the run again.",
         ) from error
 
 
@@ -176,38 +190,28 @@ def check_target(file: str | os.PathLike[str]) -> None:
     check_directory(Path(file))
 
 
-def check_directory(target: Path) -> None:
-    """Refuse a file in a directory that does not exist."""
-    if not target.parent.is_dir():
-        raise UsageError("there is no such directory", where=str(target.parent), advice="Make it first.")
-    if target.is_dir():
-        raise UsageError("this is a directory", where=str(target), advice="Give the name of a file.")
+# -- checksums ---------------------------------------------------------------------------------------------------------
 
 
-def write_atomically(target: Path, write: Callable[[Path], object]) -> None:
-    """Write a file next to its place and move it there once it is complete.
+def _checksum(saved: SavedResult) -> str:
+    """Return the SHA-256 of all that a file holds, whatever its format makes of it."""
+    about = {
+        "paths": list(saved.quantities),
+        "units": dict(saved.units),
+        "meanings": {path: text for path, text in saved.meanings.items() if text},
+        "metadata": json.loads(_metadata_text(saved.metadata)),
+    }
+    found = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    for values in (saved.time, *saved.quantities.values()):
+        found.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return found.hexdigest()
 
-    Parameters
-    ----------
-    target
-        The file.
-    write
-        Writes to the path it is given.
 
-    Raises
-    ------
-    UsageError
-        If it cannot be written; nothing is left behind then.
-    """
-    check_directory(target)
-    part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
-    try:
-        write(part)
-        os.replace(part, target)
-    except OSError as error:
-        raise UsageError(f"it cannot be written ({error.strerror or error})", where=str(target)) from error
-    finally:
-        part.unlink(missing_ok=True)
+def _verified(saved: SavedResult, checksum: str | None) -> SavedResult:
+    """Return what was read, if it is what was saved; files of older versions do not say."""
+    if checksum is not None and checksum != _checksum(saved):
+        raise ValueError("its checksum is that of other contents")
+    return saved
 
 
 # -- NetCDF ------------------------------------------------------------------------------------------------------------
@@ -220,6 +224,7 @@ def _write_netcdf(saved: SavedResult, file: Path) -> None:
     with netcdf_file(str(file), "w", version=2) as data:
         data.title = b"Atwood result"
         data.atwood = _metadata_text(saved.metadata).encode()
+        data.checksum = _checksum(saved).encode()
         data.createDimension("time", len(saved.time))
         _netcdf_variable(data, "time", saved.time, path="time", unit="s", meaning="Time.")
         taken = {"time"}
@@ -254,6 +259,7 @@ def _read_netcdf(file: Path) -> SavedResult:
     data: Any
     with netcdf_file(str(file), "r", mmap=False) as data:
         metadata = json.loads(data.atwood.decode())
+        checksum = data.checksum.decode() if hasattr(data, "checksum") else None
         quantities, units, meanings = {}, {}, {}
         for variable in data.variables.values():
             path = variable.path.decode()
@@ -261,7 +267,7 @@ def _read_netcdf(file: Path) -> SavedResult:
             units[path] = variable.units.decode()
             meanings[path] = getattr(variable, "long_name", b"").decode()
     time = quantities.pop("time")
-    return SavedResult(time, quantities, _without_time(units), _without_time(meanings), metadata)
+    return _verified(SavedResult(time, quantities, _without_time(units), _without_time(meanings), metadata), checksum)
 
 
 def _without_time(table: dict[str, str]) -> dict[str, str]:
@@ -274,7 +280,12 @@ _ABOUT = "atwood"
 
 
 def _write_npz(saved: SavedResult, file: Path) -> None:
-    about = {"metadata": saved.metadata, "units": saved.units, "meanings": saved.meanings}
+    about = {
+        "metadata": saved.metadata,
+        "units": saved.units,
+        "meanings": saved.meanings,
+        "checksum": _checksum(saved),
+    }
     arrays: dict[str, Any] = {"time": saved.time, **saved.quantities, _ABOUT: np.array(_metadata_text(about))}
     with file.open("wb") as stream:
         _savez(stream, arrays)
@@ -288,7 +299,8 @@ def _read_npz(file: Path) -> SavedResult:
     with np.load(file, allow_pickle=False) as data:
         about = json.loads(str(data[_ABOUT]))
         quantities = {name: data[name] for name in data.files if name not in ("time", _ABOUT)}
-        return SavedResult(data["time"], quantities, about["units"], about["meanings"], about["metadata"])
+        saved = SavedResult(data["time"], quantities, about["units"], about["meanings"], about["metadata"])
+        return _verified(saved, about.get("checksum"))
 
 
 # -- CSV ---------------------------------------------------------------------------------------------------------------
@@ -296,19 +308,32 @@ def _read_npz(file: Path) -> SavedResult:
 _HEADING = re.compile(r"(.+) \[(.*)\]$")
 
 
+_LAST_LINE = "# rows: {rows}, sha256: {checksum}\n"
+
+
 def _write_csv(saved: SavedResult, file: Path) -> None:
     columns = [saved.time.tolist(), *(values.tolist() for values in saved.quantities.values())]
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(["time [s]", *(f"{path} [{saved.units[path]}]" for path in saved.quantities)])
-        writer.writerows([repr(value) for value in row] for row in zip(*columns, strict=True))
+    text = io.StringIO()
+    headings = ["time [s]", *(f"{path} [{saved.units[path]}]" for path in saved.quantities)]
+    csv.writer(text, lineterminator="\n", quoting=csv.QUOTE_ALL).writerow(headings)
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerows([repr(value) for value in row] for row in zip(*columns, strict=True))
+    content = text.getvalue().encode()
+    checksum = hashlib.sha256(content).hexdigest()
+    file.write_bytes(content + _LAST_LINE.format(rows=len(saved.time), checksum=checksum).encode())
 
 
 def _read_csv(file: Path) -> SavedResult:
-    with file.open(newline="", encoding="utf-8") as stream:
-        reader = csv.reader(stream)
-        headings = next(reader)
-        rows = [[float(value) for value in row] for row in reader]
+    content = file.read_bytes().replace(b"\r\n", b"\n")
+    if content.startswith(b'"'):
+        cut = content.rstrip(b"\n").rfind(b"\n") + 1
+        content, last = content[:cut], content[cut:].decode()
+        expected = _LAST_LINE.format(rows=content.count(b"\n") - 1, checksum=hashlib.sha256(content).hexdigest())
+        if last.strip() != expected.strip():
+            raise ValueError("it is cut off, or its checksum is that of other contents")
+    reader = csv.reader(io.StringIO(content.decode(), newline=""))
+    headings = next(reader)
+    rows = [[float(value) for value in row] for row in reader]
     units: dict[str, str] = {}
     for heading in headings:
         match = _HEADING.match(heading)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from atwood.errors import UsageError
-from atwood.result.files import check_directory, write_atomically
+from atwood.files import check_directory, write_atomically
 from atwood.study.sweep_result import Sweep
 
 __all__ = ["check_sweep_target", "save_sweep"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import UsageError
-from atwood.result.files import check_directory, write_atomically
+from atwood.files import check_directory, write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

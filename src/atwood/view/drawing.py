@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import UsageError
-from atwood.result.files import write_atomically
+from atwood.files import write_atomically
 from atwood.result.result import Result
 from atwood.view.camera import View, as_camera, check_view
 from atwood.view.canvas import ANIMATED, COLOURS, INK, check_picture, new_figure, save_figure

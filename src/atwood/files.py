@@ -1,0 +1,90 @@
+"""Files: where one may be written, and how it appears whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from atwood.errors import UsageError
+
+__all__ = ["check_directory", "check_readable", "write_atomically"]
+
+
+def check_directory(target: Path) -> None:
+    """Refuse a file in a directory that does not exist.
+
+    Parameters
+    ----------
+    target
+        The file that is to be written.
+
+    Raises
+    ------
+    UsageError
+        If its directory is missing or closed, or it is a directory itself.
+    """
+    try:
+        if not target.parent.is_dir():
+            raise UsageError("there is no such directory", where=str(target.parent), advice="Make it first.")
+        if target.is_dir():
+            raise UsageError("this is a directory", where=str(target), advice="Give the name of a file.")
+    except (OSError, ValueError) as error:  # too long a name, a directory that is closed
+        raise UsageError(f"it cannot be written ({_reason(error)})", where=str(target), advice=_ANOTHER) from None
+
+
+def check_readable(source: Path) -> None:
+    """Refuse a file that does not exist.
+
+    Parameters
+    ----------
+    source
+        The file that is to be read.
+
+    Raises
+    ------
+    UsageError
+        If there is none, or it is a directory.
+    """
+    try:
+        if source.is_dir():
+            raise UsageError("this is a directory", where=str(source), advice="Give the name of a file.")
+        if not source.is_file():
+            raise UsageError("there is no such file", where=str(source), advice="Look at its name and directory.")
+    except (OSError, ValueError) as error:
+        raise UsageError(f"it cannot be read ({_reason(error)})", where=str(source), advice=_ANOTHER) from None
+
+
+def write_atomically(target: Path, write: Callable[[Path], object]) -> None:
+    """Write a file next to its place and move it there once it is complete.
+
+    Whoever is stopped in between leaves what was there before.
+
+    Parameters
+    ----------
+    target
+        The file.
+    write
+        Writes to the path it is given.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be written; nothing is left behind then.
+    """
+    check_directory(target)
+    part = target.with_name(f".{target.stem[:100]}.{os.getpid()}.part{target.suffix}")
+    try:
+        write(part)
+        os.replace(part, target)
+    except OSError as error:
+        raise UsageError(f"it cannot be written ({_reason(error)})", where=str(target), advice=_ANOTHER) from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+_ANOTHER = "Give another name or directory."
+
+
+def _reason(error: Exception) -> str:
+    return str(getattr(error, "strerror", None) or error)
