@@ -17,6 +17,7 @@ from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.consistency.check import check_parts
 from atwood.errors import StartError
 from atwood.expr import Graph
+from atwood.expr.relations import TimeRelations
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.forms.source import Source
@@ -145,7 +146,7 @@ def _with_start(assembly: Assembly) -> Assembly:
     start = find_start(assembly)
     reduced, maximal = assembly.regular, assembly.maximal
     q, _ = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
-    time = {assembly.mechanism.time: start.time}
+    time = {assembly.mechanism.time: start.time, **assembly.known_relations}
     places = {
         "reduced": {**time, **dict(zip(reduced.coordinates, start.coordinates.tolist(), strict=True))},
         "dae": {**time, **dict(zip(maximal.coordinates, (float(x) for x in q), strict=True))},
@@ -184,17 +185,20 @@ def read_mechanism(
     """
     graph = Graph()
     time = graph.symbol("t")
+    graph.relations = TimeRelations(time)
     space = make_space(flat.space, flat.line_axis)
     check_parts(flat.parts, space)
     table = ParameterTable(graph, space=space.name)
-    locals_: Mapping[str, LocalPart] = localize(flat, space, time, table, modes, None)
+    with graph.relations.reading():
+        locals_: Mapping[str, LocalPart] = localize(flat, space, time, table, modes, None)
     network = build_graph(flat, locals_)
     bodies = find_bodies(network, locals_)
     sides: Mapping[tuple[str, str, str], float] | None = None
     if space.name == "line":
         offsets = {body.index: body_offsets(body, space)[0] for body in bodies.bodies}
         sides = known_sides or find_sides(flat, network, bodies, locals_, offsets, table.values, space)
-        locals_ = localize(flat, space, time, table, modes, sides)
+        with graph.relations.reading():
+            locals_ = localize(flat, space, time, table, modes, sides)
         network = build_graph(flat, locals_)
         bodies = find_bodies(network, locals_)
     gravity = make_gravity(table, flat.gravity)

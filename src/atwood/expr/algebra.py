@@ -362,6 +362,10 @@ def unary(operation: str, a: Expression) -> Expression:
         inner = a.arguments[0]
         if _is_condition(inner):
             return inner
+    if operation in ("sign", "absolute"):
+        side = _time_relation("sign", a)
+        if side is not None:
+            return side if operation == "sign" else multiply(side, a)
     return graph.node(operation, (a,))
 
 
@@ -380,9 +384,27 @@ def binary(operation: str, a: Expression, b: Expression) -> Expression:
         return special(a, b)
     if a.operation == "constant" and b.operation == "constant":
         return a.graph.constant(BINARY[operation](a.payload, b.payload))
-    if operation in ("minimum", "maximum") and a is b:
-        return a
+    if operation in ("minimum", "maximum"):
+        if a is b:
+            return a
+        first = _time_relation("less", a, b) if operation == "minimum" else _time_relation("less", b, a)
+        if first is not None:
+            return select(first, a, b)
+    if operation == "atan2":
+        is_left, is_below = _time_relation("less", b, a.graph.zero), _time_relation("less", a, a.graph.zero)
+        if is_left is not None and is_below is not None:  # it jumps where it comes round
+            half = select(is_below, a.graph.constant(-math.pi), a.graph.constant(math.pi))
+            around = add(a.graph.node("atan2", (negate(a), negate(b))), half)
+            return select(is_left, around, a.graph.node("atan2", (a, b)))
     return a.graph.node(operation, (a, b))
+
+
+def _time_relation(kind: str, a: Expression, b: Expression | None = None) -> Expression | None:
+    """Return what stands for a relation of functions of time alone; None for any other, and where none are sought."""
+    relations = a.graph.relations
+    if relations is None or not relations.are_timed(a, b):
+        return None
+    return relations.take(kind, a if b is None else subtract(a, b))
 
 
 def less(a: Expression, b: Expression) -> Expression:
@@ -398,7 +420,8 @@ def less_equal(a: Expression, b: Expression) -> Expression:
 def _plain_binary(operation: str, a: Expression, b: Expression) -> Expression:
     if a.operation == "constant" and b.operation == "constant":
         return a.graph.constant(BINARY[operation](a.payload, b.payload))
-    return a.graph.node(operation, (a, b))
+    relation = _time_relation(operation, a, b)
+    return a.graph.node(operation, (a, b)) if relation is None else relation
 
 
 def logical(operation: str, a: Expression, b: Expression) -> Expression:
@@ -422,6 +445,9 @@ def select(condition: Expression, a: Expression, b: Expression) -> Expression:
         return a
     if condition.operation == "logical_not":
         return select(condition.arguments[0], b, a)
+    if not _is_condition(condition):
+        relation = _time_relation("nonzero", condition)
+        condition = condition if relation is None else relation
     return condition.graph.node("select", (condition, a, b))
 
 
@@ -462,6 +488,7 @@ _BINARY_BUILDERS: dict[str, Callable[[Expression, Expression], Expression]] = {
     "div": divide,
     "pow": power,
     "less": less,
+    "less_equal": less_equal,
     "logical_and": lambda a, b: logical("logical_and", a, b),
     "logical_or": lambda a, b: logical("logical_or", a, b),
 }

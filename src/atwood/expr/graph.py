@@ -9,11 +9,14 @@ topologically and nothing ever needs recursion.
 from __future__ import annotations
 
 import numbers
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from atwood.clock import check_time
 from atwood.errors import AtwoodError
 from atwood.expr import algebra
+
+if TYPE_CHECKING:
+    from atwood.expr.relations import TimeRelations
 
 _LOOK = 256
 """After so many new nodes the clock is looked at."""
@@ -212,11 +215,17 @@ class Graph:
     >>> x = graph.symbol("x")
     >>> 2 * x + 0 is x * 2
     True
+
+    Attributes
+    ----------
+    relations
+        Takes up relations of functions of time alone while laws are read; None where there is no time.
     """
 
-    __slots__ = ("_table", "nodes", "one", "zero")
+    __slots__ = ("_table", "nodes", "one", "relations", "zero")
 
     def __init__(self) -> None:
+        self.relations: TimeRelations | None = None
         self.nodes: list[Expression] = []
         self._table: dict[tuple[Any, ...], Expression] = {}
         self.zero = self.constant(0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, Literal
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from atwood.errors import ParameterError, UsageError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.collect import collect
+from atwood.expr.relations import Relation, values_just_after
 from atwood.forms.dae import dae_form, keep_constraints
 from atwood.forms.program import (
     BalanceProgram,
@@ -69,6 +70,8 @@ class Assembly:
         What all assemblies of this structure share: equations, programs and their code.
     orientation
         In which coordinates the reduced form has orientations in space.
+    given_relations
+        See `relation_values`; None for those that hold just after the scene's start.
     """
 
     flat: FlatScene
@@ -80,6 +83,7 @@ class Assembly:
     why_new: str = ""
     shared: Shared = field(default_factory=Shared, repr=False)
     orientation: Orientation = field(default_factory=Orientation)
+    given_relations: tuple[float, ...] | None = None
     _kernels: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     # -- equations ------------------------------------------------------------------------------------------------
@@ -115,7 +119,8 @@ class Assembly:
     def _equations(self, form: FormName, orientation: Orientation) -> Equations:
         mechanism = self.mechanism
         forest = grow_forest(form, mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space, orientation)
-        return build_equations(mechanism, forest)
+        with mechanism.relations.reading():
+            return build_equations(mechanism, forest)
 
     @property
     def rows(self) -> tuple[Expression, ...]:
@@ -132,14 +137,38 @@ class Assembly:
     # -- parameters -----------------------------------------------------------------------------------------------
 
     @cached_property
+    def relations(self) -> tuple[Relation, ...]:
+        """The relations of functions of time alone, whose values are the last parameters."""
+        _ = self.equations  # in which the last of them are met: those of inputs that are linked to outputs
+        if self.mechanism.links:
+            _ = self.regular, self.maximal
+        return tuple(self.mechanism.relations.found)
+
+    @cached_property
+    def relation_values(self) -> tuple[float, ...]:
+        """The values of the relations in this piece of a run: until the next time event."""
+        if self.given_relations is not None:
+            return self.given_relations
+        return values_just_after(self.relations, self.mechanism.table.values, self.flat.t_start)
+
+    @property
+    def known_relations(self) -> dict[Expression, float]:
+        """The values of the relations by symbol."""
+        return dict(zip((one.symbol for one in self.relations), self.relation_values, strict=True))
+
+    def with_relations(self, values: Iterable[float]) -> Assembly:
+        """Return the same in another piece of a run, with the same programs."""
+        return replace(self, given_relations=tuple(map(float, values)), _kernels={})
+
+    @cached_property
     def parameters(self) -> tuple[Expression, ...]:
-        """The symbols of the parameters."""
-        return tuple(self.mechanism.table.values)
+        """The symbols of the parameters, of relations of functions of time last."""
+        return (*self.mechanism.table.values, *(one.symbol for one in self.relations))
 
     @cached_property
     def parameter_values(self) -> FloatArray:
         """The values of the parameters."""
-        return np.array(list(self.mechanism.table.values.values()), dtype=float)
+        return np.array([*self.mechanism.table.values.values(), *self.relation_values], dtype=float)
 
     def with_values(
         self,
@@ -218,7 +247,8 @@ class Assembly:
         mechanism, reason = self._moved(flat)
         if mechanism is None:
             return None, reason
-        return replace(self, flat=flat, mechanism=mechanism, source=source, why_new="", _kernels={}), ""
+        fresh: dict[str, Any] = {"source": source, "why_new": "", "given_relations": None, "_kernels": {}}
+        return replace(self, flat=flat, mechanism=mechanism, **fresh), ""
 
     def other_mode(
         self,

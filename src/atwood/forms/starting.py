@@ -23,7 +23,8 @@ def starting(assembly: Assembly) -> Assembly:
     if assembly.mechanism.places is None:
         return assembly
     shared, known = assembly.shared.get("starting", lambda: (Shared(), assembly.parameters))
-    values = {symbol: assembly.mechanism.table.values[symbol] for symbol in known}
+    every = assembly.mechanism.table.values
+    values = {symbol: every[symbol] for symbol in known if symbol in every}
     table = replace(assembly.mechanism.table, values=values)
     mechanism = replace(assembly.mechanism, table=table, places=None)
     return replace(assembly, mechanism=mechanism, source=None, why_new="", shared=shared, _kernels={})

@@ -108,6 +108,11 @@ def resolve_signals(mechanism: Mechanism, site: Site, kinematics: Kinematics) ->
     DeclarationError
         If inputs feed each other in a circle, or an output needs what is known only after the forces are.
     """
+    with mechanism.relations.reading():
+        return _resolved(mechanism, site, kinematics)
+
+
+def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[Expression, Expression]:
     raw: dict[Expression, Expression] = {}
     for (path, name), (source, observable) in mechanism.links.items():
         if name not in mechanism.locals_[path].signal_symbols:

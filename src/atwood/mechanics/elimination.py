@@ -121,7 +121,7 @@ def drop_closed(mechanism: Mechanism, q: Sequence[Expression], values: Values) -
         if depends_on(value, q):
             kept.append((path, constraint, value))
             continue
-        if depends_on(value, [mechanism.time]):
+        if depends_on(value, mechanism.relations.roots):
             prescribed.append(((path, constraint.law.name, constraint.index), value))
             continue
         decide(mechanism, partial(_check_closed, f"{path}.{constraint.law.name}", value))

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Scalar, evaluate
+from atwood.expr.relations import TimeRelations
 from atwood.mechanics.orientation import NodeTurn, body_offsets, plain, rotate
 from atwood.model.local import LocalPart, ParameterTable
 from atwood.model.rotation import as_rotation, compose
@@ -62,6 +63,13 @@ class Mechanism:
     sides: Mapping[tuple[str, str, str], float] | None = None
     decisions: list[tuple[Callable[[Mechanism], object], object]] = field(default_factory=list)
     places: Mapping[str, Mapping[Expression, float]] | None = None
+
+    @property
+    def relations(self) -> TimeRelations:
+        """The relations of functions of time alone in its laws."""
+        found = self.table.graph.relations
+        assert found is not None
+        return found
 
 
 def decide(mechanism: Mechanism, how: Callable[[Mechanism], T]) -> T:

@@ -73,7 +73,10 @@ class Form:
 
 def switches(expressions: Sequence[Expression]) -> bool:
     """Return whether expressions have kinks or jumps, or come from a function that nobody can look into."""
-    return any(node.operation in _SWITCHING and not node.is_parametric for node in live(expressions))
+    nodes = live(expressions)
+    known = nodes[0].graph.relations if nodes else None
+    relations = () if known is None else known.symbols
+    return any((node.operation in _SWITCHING or node in relations) and not node.is_parametric for node in nodes)
 
 
 def pfaffian_forms(state: Movement | Equations, rates: Sequence[tuple[str, LocalConstraint, Expression]]) -> list[Form]:

@@ -44,7 +44,8 @@ _LONGER = "Give it more time; or assemble the scene first, and hand the assembly
 def _moves_by_itself(equations: Equations, constraint: Constraint) -> bool:
     """Return whether a constraint can put power into a scene: it moves with time."""
     if constraint.value is not None:
-        return depends_on(constraint.value, [equations.time])
+        relations = equations.graph.relations
+        return depends_on(constraint.value, [equations.time] if relations is None else relations.roots)
     return not substitute([constraint.rate], dict.fromkeys(equations.speeds, 0.0))[0].is_zero
 
 

@@ -71,7 +71,7 @@ def find_gaps(assembly: Assembly, equations: Equations, t: float, q: FloatArray,
     length
         Extent of the scene, m.
     """
-    table = assembly.mechanism.table.values
+    table = {**assembly.mechanism.table.values, **assembly.known_relations}
     place = {**table, equations.time: t, **dict(zip(equations.coordinates, np.asarray(q).tolist(), strict=True))}
     signals = resolve_signals(assembly.mechanism, equations.site, equations.kinematics)
     rows: dict[str, list[LocalConstraint]] = {}

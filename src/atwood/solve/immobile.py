@@ -80,7 +80,7 @@ def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | 
     values = [one.value if one.value is not None else one.rate for one in equations.constraints]
     if freedom > 0 or not equations.speeds:
         return None
-    if equations.prescribed or any(depends_on(value, [equations.time]) for value in values):
+    if equations.prescribed or any(depends_on(value, assembly.mechanism.relations.roots) for value in values):
         return None  # driven
     if len(equations.speeds) > LARGEST_FULL:
         return Immobile(None, 0)

@@ -11,6 +11,7 @@ import numpy as np
 from atwood.expr import Expression, live
 from atwood.expr.analysis import dependents
 from atwood.forms.assembly import Assembly
+from atwood.solve.breaks import Schedule, find_schedule
 from atwood.solve.driver import FloatArray
 
 __all__ = ["samples_needed"]
@@ -31,7 +32,7 @@ _MIDDLE = np.array([-5.0, 49.0, -245.0, 1225.0, 1225.0, -245.0, 49.0, -5.0]) / 2
 """Weights of the polynomial through eight neighbours, half-way between the middle two."""
 
 
-def samples_needed(assembly: Assembly, start: float, end: float) -> int:
+def samples_needed(assembly: Assembly, start: float, end: float, schedule: Schedule | None = None) -> int:
     """Return how many samples show all functions of time in a scene; 0 if it has none.
 
     Parameters
@@ -40,7 +41,10 @@ def samples_needed(assembly: Assembly, start: float, end: float) -> int:
         The scene.
     start, end
         The run, s.
+    schedule
+        The time events of the run; found if not given.
     """
+    schedule = schedule or find_schedule(assembly, start, end)
     program = assembly.known_program("functions of time", "functions of time", lambda: _functions(assembly))
     if not program.results:
         return 0
@@ -48,7 +52,7 @@ def samples_needed(assembly: Assembly, start: float, end: float) -> int:
     idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
     grid = np.linspace(start, end, _GRID + 1)
     with np.errstate(all="ignore"):
-        values = assembly.kernel(program, vectorized=True)(grid[None, :], *idle)[0]
+        values = schedule.rows(assembly, grid).kernel(program, vectorized=True)(grid[None, :], *idle)[0]
     rows = (np.broadcast_to(row, grid.shape) for row in values)
     return max(_GRID // _stride(row) for row in rows)
 
@@ -59,7 +63,7 @@ def _functions(assembly: Assembly) -> list[Expression]:
     moving = {*equations.coordinates, *equations.speeds, *equations.accelerations, *equations.multipliers}
     values = [*equations.rows, *equations.constraint_rows, *(one.second for one in equations.constraints)]
     nodes = live(values)
-    with_time = dependents(nodes, [equations.time])
+    with_time = dependents(nodes, assembly.mechanism.relations.roots)
     with_motion = dependents(nodes, moving)
     found: dict[Expression, None] = {}
     for node in nodes:

@@ -77,7 +77,7 @@ class LooseScene:
             f"{assembly.flat.name} symmetry", inputs, assembly.parameters, (*balance.program.outputs, *groups)
         )
         moving = {*equations.coordinates, *equations.speeds, *equations.accelerations}
-        self.loosened: Loosened = loosen(program, equations.time, moving)
+        self.loosened: Loosened = loosen(program, assembly.mechanism.relations, moving)
         self._exact, self._kernel = (compile_program(one) for one in (program, self.loosened.program))
         self._probe = compile_program(self.loosened.probe)
         self.bound = self._exact.bind(assembly.parameter_values)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.expr import Expression, Graph, InputGroup, OutputGroup, Program, algebra
+from atwood.expr.relations import TimeRelations
 
 __all__ = ["Loosened", "loosen"]
 
@@ -93,21 +94,21 @@ def _alike(keys: FloatArray, draw: Callable[[], float]) -> FloatArray:
     return found
 
 
-def loosen(program: Program, time: Expression, moving: Collection[Expression]) -> Loosened:
+def loosen(program: Program, relations: TimeRelations, moving: Collection[Expression]) -> Loosened:
     """Return a program in which what the clock and switches decide are parameters.
 
     Parameters
     ----------
     program
         The program.
-    time
-        The symbol of time.
+    relations
+        Time, and the relations of functions of time.
     moving
         The symbols of the state, and of what follows from it.
     """
-    maker = _Maker(program.graph)
+    maker = _Maker(program.graph, relations)
     nodes = program.nodes
-    by_clock, by_motion = _followers(nodes, (time,)), _followers(nodes, moving)
+    by_clock, by_motion = _followers(nodes, relations.roots), _followers(nodes, moving)
 
     def taken(node: Expression) -> Expression:
         if node.index in by_motion or node.index not in by_clock:
@@ -142,8 +143,9 @@ def _followers(nodes: Sequence[Expression], roots: Collection[Expression]) -> se
 class _Maker:
     """Puts symbols in the place of what is decided, and notes what decides it."""
 
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, graph: Graph, relations: TimeRelations) -> None:
         self.graph = graph
+        self._relations = {one.symbol: one.kind for one in relations.found}
         self.made: dict[int, Expression] = {}
         self._clock: dict[Expression, Expression] = {}
         self._sides: list[tuple[Expression, Expression]] = []
@@ -179,6 +181,9 @@ class _Maker:
             return algebra.less(self.graph.zero, side)
         return algebra.select(algebra.less(self.graph.zero, side), arguments[0], arguments[1])
 
+    def _is_condition(self, node: Expression) -> bool:
+        return node.operation in _CONDITIONS or self._relations.get(node, "sign") != "sign"
+
     def finish(self, program: Program, outputs: tuple[OutputGroup, ...]) -> Loosened:
         """Return the programs."""
         symbols = (*self._clock.values(), *(one for _, one in self._sides), *(one for _, one, _ in self._functions))
@@ -191,6 +196,6 @@ class _Maker:
         return Loosened(
             Program(f"{program.name}, loosened", inputs, (*program.parameters, *symbols), outputs),
             Program(f"{program.name}, probed", inputs, program.parameters, keys),
-            np.array([one.operation in _CONDITIONS for one in self._clock], dtype=bool),
+            np.array([self._is_condition(one) for one in self._clock], dtype=bool),
             np.array([is_odd for _, _, is_odd in self._functions], dtype=bool),
         )

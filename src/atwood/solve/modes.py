@@ -30,7 +30,7 @@ from atwood.solve.turning import resting_place, turning_of
 if TYPE_CHECKING:
     from atwood.kernels.llvm_events import EventCode, EventData
 
-__all__ = ["EventProbe", "Happening", "enter_mode", "find_watches"]
+__all__ = ["EventProbe", "Happening", "enter_mode", "find_watches", "generalized_speeds", "plastic_impact"]
 
 FloatArray = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ class Happening:
     message
         What has happened, in words.
     target
-        The mode it led to, or ``"stop"``.
+        The mode it led to, or ``"stop"``; empty where no mode changed.
     impact
         Whether velocities jumped.
     """
@@ -250,7 +250,7 @@ def enter_mode(
     if happening.impact:
         met, _ = balance.project(t, big_q, big_u, sizes)
         _check_in_place(happening, balance.turning.difference(t, big_q, met) / sizes)
-        big_u = _plastic_impact(after, balance, happening, t, met, big_u)
+        big_u = plastic_impact(after, balance, happening, t, met, big_u)
         big_q = met
     if after.form == "dae":
         return after, big_q, big_u
@@ -274,7 +274,7 @@ def _check_in_place(happening: Happening, moved: FloatArray) -> None:
         )
 
 
-def _plastic_impact(
+def plastic_impact(
     after: Assembly, balance: Balance, happening: Happening, t: float, q: FloatArray, u: FloatArray
 ) -> FloatArray:
     """Return the velocities after an impact: the nearest admissible ones in the metric of the masses.
@@ -350,10 +350,26 @@ def _to_reduced(
         if float(np.max(np.abs(step), initial=0.0)) < 1e-14 * max(1.0, float(np.max(np.abs(q), initial=0.0))):
             break
     _check_in_place(happening, miss)
-    _, drift, entries = kernel([t], q, still)
-    matrix[rows, columns] = entries
-    u = least_norm(matrix / scales[:, None], (maximal[1] - np.asarray(drift)) / scales)
-    return q, u
+    return q, generalized_speeds(after, t, q, maximal[1], scales)
+
+
+def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return the generalized speeds, with quaternions, that give the same speeds in maximal coordinates.
+
+    Parameters
+    ----------
+    after
+        The scene.
+    t, q
+        Time and generalized coordinates.
+    speeds, sizes
+        Speeds in maximal coordinates, and the size of a displacement along each.
+    """
+    program, rows, columns = after.shared.get("change of mode", lambda: _maximal_places(after))
+    still = np.zeros(len(after.regular.speeds))
+    matrix = np.zeros((len(sizes), len(still)))
+    _, drift, matrix[rows, columns] = after.kernel(program)([t], q, still)
+    return least_norm(matrix / sizes[:, None], (speeds - np.asarray(drift)) / sizes)
 
 
 def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[int, ...]]:

@@ -53,18 +53,10 @@ class Order:
         return SolverOptions(
             relative_tolerance=options.relative_tolerance,
             absolute_tolerances=self.plan.tolerances(options.relative_tolerance),
-            max_step=self._max_step(t),
+            max_step=options.max_step,
             max_order=options.max_order,
             horizon=options.t_end - t if options.t_end > t else 1.0,
         )
-
-    def _max_step(self, t: float) -> float | None:
-        """Return the largest step: up to a switch by the clock, so short that nothing is passed over unseen."""
-        options = self.options
-        if self.end >= options.t_end:
-            return options.max_step
-        share = 0.25 * (self.end - t)
-        return share if options.max_step is None else min(share, options.max_step)
 
 
 def open_implicit_session(order: Order, solver: str, t: float, y: FloatArray, yp: FloatArray) -> Session:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -90,6 +90,11 @@ class Plan:
     def is_projected(self) -> bool:
         """Whether outputs are projected onto the constraints; plain index 1 shows its drift instead."""
         return self.balance.constraints > 0 and self.program.level != "index1"
+
+    def in_piece(self, assembly: Assembly) -> Plan:
+        """Return the plan of the same scene with other relations of functions of time, after a time event."""
+        balance = balance_of(assembly, assembly.form)
+        return replace(self, assembly=assembly, balance=balance, _kernels=None, _seen=None, _loops=None)
 
     def kernels(self) -> tuple[BoundKernel, BoundKernel]:
         """Return residual and Jacobian at present."""

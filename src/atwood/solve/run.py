@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError, SolveError, StartError, TopologyError
 from atwood.forms.assembly import Assembly
-from atwood.solve.breaks import find_breaks
+from atwood.forms.shared import Shared
+from atwood.solve.breaks import Schedule, find_schedule
 from atwood.solve.charts import CHART, Reassemble, Restated, enter_charts, to_regular
 from atwood.solve.choice import Choice, check_solver, choose, describe_choices
 from atwood.solve.driver import Statistics
@@ -26,7 +28,9 @@ from atwood.solve.run_arguments import check_span
 from atwood.solve.scales import scene_length
 from atwood.solve.start import Start, settle
 from atwood.solve.stretch import Outcome, Stretch, run_stretch
+from atwood.solve.time_events import pass_time_event
 from atwood.solve.tolerance import allowed
+from atwood.topology.charts import Orientation
 
 __all__ = ["Run", "run", "run_out_of_time"]
 
@@ -124,9 +128,10 @@ def run(
     clock = Clock(options.max_seconds) if clock is None else clock
     try:
         with clock.kept(GRACE):
-            wanted = samples_needed(assembly, t, options.t_end) if options.samples > 1 else 0
+            schedule = find_schedule(assembly, t, options.t_end)
+            wanted = samples_needed(assembly, t, options.t_end, schedule) if options.samples > 1 else 0
             times, shown = sample_times(t, options, wanted)
-            _check_prescribed(assembly, times)
+            _check_prescribed(schedule.at_samples(times).rows(assembly, times), times)
             walk = _Walk(assembly, start, options, reassemble, times, shown)
             walk.prepare()
     except TimeIsUp:
@@ -159,19 +164,22 @@ class _Walk:
         times: FloatArray,
         shown: NDArray[np.bool_],
     ) -> None:
-        self.start, self.options, self.reassemble = start, options, reassemble
+        self.start, self.options, self._other = start, options, reassemble
         self.times, self.shown = times, shown
-        self.breaks = find_breaks(assembly, start.time, options.t_end)
+        self._schedules: dict[int, tuple[Shared, Schedule]] = {}
+        self._plans: dict[tuple[float, ...], Plan] = {}
+        self._piece_start = start.time
         self.segments: list[Segment] = []
         self.happenings: list[Happening] = []
         self.choices: list[Choice] = []
         self.statistics = Statistics(error_test_failures=0, convergence_failures=0)
         self.t = start.time
         self.assembly, self.q, self.u = settle(assembly, start, reassemble)
-        self.first = self.assembly
+        self.assembly = self.first = self._in_piece(self.assembly)
         self.restated: list[Restated] = []
         self.impact, self.show = False, bool(shown[0])
         self.plan: Plan | None = None
+        self.probe: EventProbe | None = None
         self.choice: Choice
 
     def go(self) -> Run:
@@ -194,7 +202,8 @@ class _Walk:
             chatter = chatter + 1 if outcome.t - before < 1e-9 * (self.options.t_end - self.start.time) else 0
             if outcome.happening is None:
                 if outcome.status == "finished" and outcome.t < self.options.t_end:
-                    self._pass_switch(recorder)
+                    _, self.q, self.u, _ = recorder.last()
+                    self.impact, chatter = False, 0
                     continue
                 return self._made(outcome.status, outcome.message, outcome)
             is_chart = outcome.happening.target == CHART
@@ -210,12 +219,20 @@ class _Walk:
                 return self._made("finished", "", outcome)
 
     def _stretch(self) -> tuple[Recorder, Outcome]:
-        """Run one stretch in the present mode."""
-        t, q, u, options = self.t, self.q, self.u, self.options
+        """Run one stretch in the present mode, until the next time event at most."""
+        options, schedule = self.options, self._schedule(self.assembly)
+        self.t = schedule.reached(self.t)
+        if schedule.piece(self.t) != schedule.piece(self._piece_start):
+            self._pass_time_event()
+        t, q, u = self.t, self.q, self.u
         self.prepare()
         assert self.plan is not None
-        limit = float(np.min(self.breaks[self.breaks[:, 0] > t, 0], initial=options.t_end))
-        ahead = _until(self.times, self.shown, t, limit)
+        assert self.probe is not None
+        limit = schedule.next(t, options.t_end)
+        times, shown = _until(self.times, self.shown, t, limit)
+        if limit < options.t_end:  # the state just after it is shown
+            shown = np.append(shown[:-1], False)
+        ahead = times, shown
         stretch = Stretch(self.plan, self.probe, options, self.choice, *ahead, self.show, self.statistics)
         recorder = Recorder(self.plan)
         outcome = run_stretch(stretch, recorder, t, q, u)
@@ -233,15 +250,18 @@ class _Walk:
         return recorder, outcome
 
     def prepare(self) -> None:
-        """Make all that is needed in the present mode, if it is not there."""
-        if self.plan is not None:
-            return
+        """Make all that is needed in the present mode, and between two time events, if it is not there."""
         t, q, u, options = self.t, self.q, self.u, self.options
-        plan = self._plan()
-        if not self.segments and not options.structure:
-            refuse_immobile(self.assembly, len(plan.assembly.equations.speeds) - plan.finding.rank, self.start)
-        self.probe = EventProbe(plan, t, q, u, options.relative_tolerance)
-        self.choice = choose(plan, options, t, q, u)
+        plan = self.plan
+        if plan is None:
+            plan = self._plan()
+            if not self.segments and not options.structure:
+                refuse_immobile(self.assembly, len(plan.assembly.equations.speeds) - plan.finding.rank, self.start)
+            self._plans, self.probe = {}, None
+            self.choice = choose(plan, options, t, q, u)
+        self._plans.setdefault(self.assembly.relation_values, plan)
+        if self.probe is None:
+            self.probe = EventProbe(plan, t, q, u, options.relative_tolerance)
         self.plan = plan
 
     def _plan(self) -> Plan:
@@ -260,31 +280,57 @@ class _Walk:
                 "them; or look at the formula of the law.",
             ) from error
 
-    def _pass_switch(self, recorder: Recorder) -> None:
-        """Go on behind a law that switches by the clock."""
-        _, self.q, self.u, _ = recorder.last()
-        self.impact = False
-        self._go_behind()
+    def _schedule(self, assembly: Assembly) -> Schedule:
+        """Return the time events of a scene in one mode."""
+        key = id(assembly.shared)
+        if key not in self._schedules:
+            schedule = find_schedule(assembly, self.start.time, self.options.t_end).at_samples(self.times)
+            self._schedules[key] = assembly.shared, schedule  # kept, so that its identity stays its own
+        return self._schedules[key][1]
 
-    def _go_behind(self) -> None:
-        behind = float(self.breaks[self.breaks[:, 0] == self.t, 1][0])
-        self.show = bool(np.any(self.shown[(self.times > self.t) & (self.times <= behind)]))
-        self.t = behind
+    def _in_piece(self, assembly: Assembly) -> Assembly:
+        """Return a scene with the relations of functions of time that hold in the present piece of the run."""
+        schedule = self._schedule(assembly)
+        return schedule.applied(assembly, schedule.piece(self._piece_start))
+
+    def _reassemble(
+        self,
+        modes: Mapping[str, str],
+        sides: Mapping[tuple[str, str, str], float],
+        orientation: Orientation,
+    ) -> Assembly:
+        return self._in_piece(self._other(modes, sides, orientation))
+
+    def _pass_time_event(self) -> None:
+        """Go on with the relations of functions of time that hold after a time event."""
+        self._piece_start, before = self.t, self.assembly
+        self.assembly = self._in_piece(before)
+        length = self.start.length
+        self.q, self.u, impact = pass_time_event(before, self.assembly, self.t, self.q, self.u, length)
+        self.show = bool(np.any(self.shown[self.times == self.t]))
+        if impact is not None:  # both states are shown, as at any event
+            self.happenings.append(impact)
+            self.impact = self.show = True
+            self.segments[-1].shown[-1] = True
+        if self.plan is not None:
+            self.probe = None
+            known = self._plans.get(self.assembly.relation_values)
+            self.plan = self.plan.in_piece(self.assembly) if known is None else known
+            self.assembly = self.plan.assembly
+            self.plan.review_dependent(self.t, self.q)
 
     def _change_chart(self, happening: Happening, recorder: Recorder) -> None:
         """Go on in other coordinates of an orientation."""
         _, q, self.u, _ = recorder.last()
-        self.assembly, self.q = enter_charts(self.assembly, to_regular(self.assembly, q), self.reassemble)
+        self.assembly, self.q = enter_charts(self.assembly, to_regular(self.assembly, q), self._reassemble)
         self.plan, self.impact, self.show = None, False, False
         self.restated.append(Restated(self.t, happening.part))
-        if np.any(self.breaks[:, 0] == self.t):  # at the same time as a law that switches by the clock
-            self._go_behind()
 
     def _enter(self, happening: Happening, recorder: Recorder) -> None:
         """Enter the mode that an event leads to."""
         _, q, u, _ = recorder.last()
         self.assembly, self.q, self.u = enter_mode(
-            (self.t, q, u), self.assembly, happening, self.reassemble, self.start.length
+            (self.t, q, u), self.assembly, happening, self._reassemble, self.start.length
         )
         self.plan, self.impact, self.show = None, happening.impact, True
 

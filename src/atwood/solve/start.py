@@ -150,7 +150,7 @@ def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
     before, after = starting.regular, assembly.regular
     q = dict(zip(before.coordinates, start.coordinates.tolist(), strict=True))
     u = dict(zip(before.speeds, start.speeds.tolist(), strict=True))
-    place = {**assembly.mechanism.table.values, before.time: start.time, **q}
+    place = {**assembly.mechanism.table.values, **assembly.known_relations, before.time: start.time, **q}
     sizes = np.maximum(coordinate_scales(before, start.length), np.abs(start.coordinates))
     for one in after.integrals:
         (missed,) = evaluate([one.value], place)

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from atwood.errors import AtwoodError
 from atwood.expr import depends_on
 from atwood.forms.accelerations import acceleration_program
-from atwood.solve.breaks import switches_by_clock
 from atwood.solve.choice import choose
 from atwood.solve.columns import masses_at
 from atwood.solve.driver import SolverOptions
@@ -54,7 +53,7 @@ def why_not_batched(order: Order) -> str:
         return "nothing is free to move" if is_free else "constraints are left among its coordinates"
     if find_watches(assembly):
         return "events are watched"
-    if switches_by_clock(assembly) or equations.prescribed:
+    if assembly.relations or equations.prescribed:
         return "something in it follows the clock"
     if assembly.mechanism.space.name == "line":
         return "on a line, each start says on which side of each other the parts are"

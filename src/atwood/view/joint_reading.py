@@ -110,7 +110,7 @@ def _meeting(
 def _shift(
     mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], one: Expression, value: float
 ) -> FloatArray:
-    known = {**dict.fromkeys(joint.coordinates, 0.0), one: value, mechanism.time: 0.0}
+    known = {**dict.fromkeys((*joint.coordinates, *mechanism.relations.roots), 0.0), one: value}
     for axes in joint.axes:  # whichever way they are turned, the step along a coordinate is the same
         known.update((c, float(i == k)) for i, axis in enumerate(axes) for k, c in enumerate(axis))
     return numbers(mechanism, shift, known)

@@ -1,0 +1,203 @@
+"""Relations of functions of time alone, which keep their values between two time events.
+
+A law that reads ``select(t < 1, a, b)`` is smooth before and after its switch, and a solver that works across it errs
+by what it missed. So such a relation is taken out of the equations while they are read and a symbol stands for it,
+which programs have among their parameters: a run stops where the relation changes, and goes on with another value.
+That is what Modelica calls a time event (Modelica Language Specification, section 8.5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+
+from atwood.expr.analysis import evaluate, live
+from atwood.expr.derivatives import jvp
+from atwood.expr.graph import Expression, Graph
+from atwood.expr.intervals import bounds
+
+__all__ = ["Relation", "TimeRelations", "relation_value", "values_just_after", "written_out"]
+
+_KNOWN, _TIMED, _MOVING = 0, 1, 2
+
+_ORDERS = 6
+"""So many derivatives say on which side of zero a function is just after it was there."""
+
+
+class Relation(NamedTuple):
+    """A relation of functions of time alone.
+
+    Attributes
+    ----------
+    symbol
+        What stands for it in the equations.
+    kind
+        ``"less"``, ``"less_equal"`` or ``"nonzero"``, true (1) or not (0), or ``"sign"`` (-1, 0 or 1).
+    difference
+        What is compared with zero; it may read relations that were found before.
+    """
+
+    symbol: Expression
+    kind: str
+    difference: Expression
+
+
+class TimeRelations:
+    """The relations of functions of time alone that the laws of one graph have.
+
+    Parameters
+    ----------
+    time
+        The symbol of time.
+
+    Attributes
+    ----------
+    found
+        The relations, each after those that it reads.
+    """
+
+    def __init__(self, time: Expression) -> None:
+        self.time = time
+        self.found: list[Relation] = []
+        self._symbols: dict[tuple[str, Expression], Expression] = {}
+        self._kinds: dict[int, int] = {time.index: _TIMED}
+        self._is_reading = False
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Take up relations while laws that make motions are read; what is only shown is evaluated as it stands."""
+        before, self._is_reading = self._is_reading, True
+        try:
+            yield
+        finally:
+            self._is_reading = before
+
+    @property
+    def symbols(self) -> tuple[Expression, ...]:
+        """What stands for the relations."""
+        return tuple(one.symbol for one in self.found)
+
+    @property
+    def roots(self) -> tuple[Expression, ...]:
+        """All that makes an expression change with time: time itself, and what stands for relations."""
+        return (self.time, *self.symbols)
+
+    def are_timed(self, *expressions: Expression | None) -> bool:
+        """Return whether expressions depend on time, on nothing that moves, and are being read."""
+        return self._is_reading and max(self._kind(one) for one in expressions if one is not None) == _TIMED
+
+    def take(self, kind: str, difference: Expression) -> Expression:
+        """Return what stands for a relation, the same for the same one; a constant if it is always the same."""
+        if difference.is_constant:
+            return difference.graph.constant(relation_value(kind, difference.value))
+        if kind == "nonzero" and difference in self._symbols.values():
+            return difference
+        key = (kind, difference)
+        if key not in self._symbols:
+            symbol = difference.graph.symbol(f"relation {len(self.found)}")
+            self._symbols[key] = symbol
+            self._kinds[symbol.index] = _TIMED
+            self.found.append(Relation(symbol, kind, difference))
+        return self._symbols[key]
+
+    def _kind(self, expression: Expression) -> int:
+        """Return whether an expression depends on parameters alone, on time besides, or on what moves."""
+        kinds, stack = self._kinds, [expression]
+        while stack:
+            node = stack[-1]
+            waiting = [one for one in node.arguments if one.index not in kinds]
+            if node.index not in kinds and not waiting:
+                own = _MOVING if node.is_symbol and not node.is_parametric else _KNOWN
+                kinds[node.index] = max((kinds[one.index] for one in node.arguments), default=own)
+            if not waiting:
+                stack.pop()
+            stack += waiting
+        return kinds[expression.index]
+
+
+def relation_value(kind: str, difference: float) -> float:
+    """Return the value of a relation: 0 or 1, or a sign."""
+    return _VALUES[kind](difference)
+
+
+_VALUES: Mapping[str, Callable[[float], float]] = {
+    "less": lambda d: float(d < 0.0),
+    "less_equal": lambda d: float(d <= 0.0),
+    "nonzero": lambda d: float(d != 0.0),
+    "sign": lambda d: float(np.sign(d)),
+}
+
+
+def values_just_after(relations: Sequence[Relation], known: Mapping[Expression, float], t: float) -> tuple[float, ...]:
+    """Return the values of relations just after a time, also where some of them change at that very time.
+
+    Parameters
+    ----------
+    relations
+        The relations, each after those that it reads.
+    known
+        Values of the parameters.
+    t
+        The time, s.
+    """
+    if not relations:
+        return ()
+    relations_of = relations[0].symbol.graph.relations
+    assert relations_of is not None
+    values: dict[Expression, float] = {**known, relations_of.time: t}
+    for one in relations:
+        values[one.symbol] = relation_value(one.kind, _side_after(one.difference, values, relations_of.time))
+    return tuple(values[one.symbol] for one in relations)
+
+
+def _side_after(difference: Expression, values: Mapping[Expression, float], time: Expression) -> float:
+    """Return a number with the sign that a function of time has just after a time; 0 where it stays zero."""
+    points = {symbol: (np.array([value]), np.array([value])) for symbol, value in values.items()}
+    derivative = difference
+    for _ in range(_ORDERS):
+        ((low, high),) = bounds([derivative], points)
+        if low[0] > 0.0 or high[0] < 0.0:
+            return float(low[0]) if low[0] > 0.0 else float(high[0])
+        (derivative,) = jvp([derivative], {time: 1.0})
+        if derivative.is_zero:
+            break
+    return evaluate([difference], values)[0] if derivative is not difference and not derivative.is_zero else 0.0
+
+
+def written_out(expressions: Sequence[Expression]) -> list[Expression]:
+    """Return expressions with relations of functions of time as they were written, to be read by people.
+
+    Parameters
+    ----------
+    expressions
+        Of one graph.
+    """
+    graph = expressions[0].graph if expressions else Graph()
+    if graph.relations is None or not graph.relations.found:
+        return list(expressions)
+    made: dict[int, Expression] = {}
+    for one in graph.relations.found:
+        (difference,) = _with(graph, [one.difference], made)
+        made[one.symbol.index] = _RAW[one.kind](graph, difference)
+    return _with(graph, expressions, made)
+
+
+def _with(graph: Graph, expressions: Sequence[Expression], made: Mapping[int, Expression]) -> list[Expression]:
+    """Put expressions in the place of symbols, and leave all else as it stands."""
+    found = dict(made)
+    for node in live(expressions):
+        arguments = tuple(found.get(one.index, one) for one in node.arguments)
+        if arguments != node.arguments:
+            found[node.index] = graph.node(node.operation, arguments, node.payload)
+    return [found.get(one.index, one) for one in expressions]
+
+
+_RAW: Mapping[str, Callable[[Graph, Expression], Expression]] = {
+    "less": lambda graph, d: graph.node("less", (d, graph.zero)),
+    "less_equal": lambda graph, d: graph.node("less_equal", (d, graph.zero)),
+    "nonzero": lambda graph, d: d,
+    "sign": lambda graph, d: graph.node("sign", (d,)),
+}
