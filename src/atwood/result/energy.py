@@ -46,6 +46,7 @@ def make_ledger(
     power: Sequence[FloatArray | None],
     impacts: Sequence[bool],
     switched: Sequence[FloatArray | None],
+    time_events: Sequence[bool],
     shown: NDArray[np.bool_],
 ) -> EnergyLedger:
     """Return the ledger of a run from samples of each of its segments.
@@ -61,14 +62,19 @@ def make_ledger(
     switched
         Samples of the potential energy that is there in some modes only, which counts as work when such a mode is
         entered or left; None where there is none. If other energy jumps at a change of mode, that is drift.
+    time_events
+        For each segment, whether it began at a time event. Energy that jumps there is work: of an input that a
+        potential reads, or of drives whose speed jumps.
     shown
         Which of all samples are outputs.
     """
     work, carried = [], 0.0
     for i, (t, p) in enumerate(zip(times, power, strict=True)):
-        if impacts[i]:
+        if time_events[i]:
+            carried += float(kinetic[i][0] + potential[i][0] - kinetic[i - 1][-1] - potential[i - 1][-1])
+        elif impacts[i]:
             carried += min(0.0, float(kinetic[i][0] - kinetic[i - 1][-1]))
-        if i:
+        if i and not time_events[i]:
             after, before = switched[i], switched[i - 1]
             carried += (0.0 if after is None else float(after[0])) - (0.0 if before is None else float(before[-1]))
         work.append(carried + (np.zeros(len(t)) if p is None else _integral(t, p)))

@@ -332,10 +332,10 @@ class Result:
                 where=self._without_energy(),
                 advice="A law is evaluated outside its domain there: look at its formula and at the start.",
             )
+        times = [segment.time for segment in self._segments]
         impacts = [segment.impact for segment in self._segments]
-        return make_ledger(
-            [segment.time for segment in self._segments], kinetic, potential, power, impacts, switched, self._shown
-        )
+        events = [segment.after_time_event for segment in self._segments]
+        return make_ledger(times, kinetic, potential, power, impacts, switched, events, self._shown)
 
     def _without_energy(self) -> str:
         """Return the part whose energy has no value."""

@@ -33,11 +33,11 @@ _ROUNDING = 16.0
 _MOST = 100_000
 """So many events of one relation are looked for; a run through more would hardly end."""
 
-_LOOKED = 4_000_000
-"""So many intervals are looked at for one relation."""
+_OPEN = 3
+"""So many intervals for each event can still be open."""
 
 _GRID = 20_000
-"""What cannot be bounded is looked at so many times a run: functions in Python, and what is zero but for rounding."""
+"""Functions in Python, which have no bounds, are looked at so many times a run."""
 
 _SHORTEST = 1e-30
 """Relative to the run: what is shorter is a moment, also near t = 0."""
@@ -216,18 +216,12 @@ class _Search:
         low, high = self._pieces.edges[:-1], self._pieces.edges[1:]
         boxes = _Boxes(low, high, np.arange(len(low)))
         if any(node.operation == "external" for node in nodes):
-            self._warn("a function in Python cannot be looked into")
+            self._warn()
             found = self._on_grid(boxes)
         else:
             found = self._isolated(boxes)
         changes = self._is_positive(found.low, found.owner) != self._is_positive(found.high, found.owner)
         found = found.chosen(changes)
-        if len(found.low) > _MOST:
-            raise SolveError(
-                f"it switches {len(found.low)} times by the clock in this run, and the run would stop at each",
-                where=self._where(),
-                advice="Describe what it does on the average, or make the run shorter.",
-            )
         return self._refined(found)
 
     def _isolated(self, boxes: _Boxes) -> _Boxes:
@@ -235,13 +229,13 @@ class _Search:
         (slope,) = jvp([self._difference], {self._time: 1.0})
         found: list[_Boxes] = []
         doubtful: list[_Boxes] = []
-        looked = 0
         while len(boxes.low):
-            looked += len(boxes.low)
-            if looked > _LOOKED:
-                self._warn("it is as good as zero again and again")
-                found.append(self._on_grid(boxes))
-                break
+            if len(boxes.low) > _OPEN * _MOST or sum(len(one.low) for one in found) > _MOST:
+                raise SolveError(
+                    f"by the clock it switches more than {_MOST} times in this run, or is as good as zero all along",
+                    where=self._where(),
+                    advice="Describe what it does on the average, or make the run shorter.",
+                )
             low, high = self._bounds(self._difference, boxes)
             boxes, low, high = boxes.chosen(kept := (low <= 0.0) & (high >= 0.0)), low[kept], high[kept]
             least, most = self._bounds(slope, boxes)
@@ -284,11 +278,11 @@ class _Search:
             low, high = np.where(open_ & same, middle, low), np.where(open_ & ~same, middle, high)
         return np.sort(np.where(self.function(low, owner) == 0.0, low, high))
 
-    def _warn(self, why: str) -> None:
+    def _warn(self) -> None:
         span = self._pieces.edges[-1] - self._pieces.edges[0]
         warnings.warn(
-            f"{self._where()}: it is looked at {_GRID} times for when it switches by the clock, since {why}; what "
-            f"lasts less than {span / _GRID:.3g} s could be missed",
+            f"{self._where()}: when it switches by the clock depends on a function in Python, which is looked at "
+            f"{_GRID} times; what lasts less than {span / _GRID:.3g} s could be missed",
             stacklevel=2,
         )
 

@@ -52,6 +52,8 @@ class Segment:
         By how much the solver's own states missed the constraints on position and velocity, shape (2, samples).
     passages
         Singular positions that it passed through.
+    after_time_event
+        Whether it began at a time event, at which energy that comes or goes is work of inputs and drives.
     """
 
     plan: Plan
@@ -62,6 +64,7 @@ class Segment:
     shown: NDArray[np.bool_]
     held: FloatArray
     passages: tuple[Passage, ...] = ()
+    after_time_event: bool = False
 
     @property
     def assembly(self) -> Assembly:
@@ -208,13 +211,13 @@ class Recorder:
         """Whether nothing has been recorded, and nothing waits."""
         return not any(self._samples)
 
-    def segment(self, impact: bool) -> Segment:
+    def segment(self, impact: bool, after_time_event: bool = False) -> Segment:
         """Return what was recorded."""
         self.settle()
         blocks = self._samples[0]
         q, u, held = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u", "held"))
         time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
-        return Segment(self.plan, impact, time, q, u, shown, held, tuple(self.passages))
+        return Segment(self.plan, impact, time, q, u, shown, held, tuple(self.passages), after_time_event)
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: _Waiting = ()) -> None:
         q, u = (part.copy() for part in self.plan.program.split(y.T))

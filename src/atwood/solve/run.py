@@ -222,7 +222,8 @@ class _Walk:
         """Run one stretch in the present mode, until the next time event at most."""
         options, schedule = self.options, self._schedule(self.assembly)
         self.t = schedule.reached(self.t)
-        if schedule.piece(self.t) != schedule.piece(self._piece_start):
+        after_time_event = schedule.piece(self.t) != schedule.piece(self._piece_start)
+        if after_time_event:
             self._pass_time_event()
         t, q, u = self.t, self.q, self.u
         self.prepare()
@@ -240,7 +241,7 @@ class _Walk:
             raise outcome.error
         if recorder.is_empty:  # nor was there time to
             return recorder, outcome
-        self.segments.append(recorder.segment(self.impact))
+        self.segments.append(recorder.segment(self.impact, after_time_event))
         self.statistics = self.statistics + outcome.statistics
         self.restated += outcome.restated
         for choice in outcome.choices:

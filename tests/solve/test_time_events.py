@@ -1,0 +1,221 @@
+"""Time events: relations of functions of time change exactly when they do, in every solver and form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from atwood import (
+    Component,
+    Load,
+    Point,
+    Scene,
+    Vector,
+    connector,
+    force,
+    maximum,
+    parameter,
+    select,
+    sign,
+    simulate,
+    sin,
+    sweep,
+)
+from atwood.errors import SolveError
+from atwood.pipeline import assemble
+from atwood.solve.breaks import find_schedule
+from atwood_library import Drive, Force, Ground, PointMass, Rod
+
+SOLVERS = [
+    *(("reduced", solver) for solver in ("ida", "ida-sundae", "explicit", "taylor")),
+    *(("dae", solver) for solver in ("ida", "ida-sundae")),
+]
+"""Every form with every solver that takes it."""
+
+Function = Callable[[Any], Any]
+
+
+def pushed(force: Function, t_end: float = 1.0, t_start: float = 0.0) -> Scene:
+    """A free mass of 1 kg at rest, pushed along x."""
+    scene = Scene(gravity=0.0, t_end=t_end, t_start=t_start)
+    bob, push = scene.add("bob", PointMass()), scene.add("push", Force(value=force))
+    scene.connect(push.point, bob.point)
+    for quantity in ("position", "velocity"):
+        scene.start.update({f"bob.{quantity}.x": 0.0, f"bob.{quantity}.z": 0.0})
+    return scene
+
+
+def driven(motion: Function, angle: float = 0.0) -> Scene:
+    """A pendulum whose pivot moves along x as prescribed."""
+    scene = Scene(t_end=1.0)
+    ground, drive = scene.add("ground", Ground()), scene.add("drive", Drive(motion=motion))
+    rod, bob = scene.add("rod", Rod()), scene.add("bob", PointMass())
+    scene.connect(ground.frame, drive.a)
+    scene.connect(drive.b, rod.a)
+    scene.connect(rod.b, bob.point)
+    scene.start.update({"rod.angle": angle, "rod.angular_velocity": 0.0})
+    return scene
+
+
+def times_of(function: Function, end: float = 1.0, start: float = 0.0) -> list[float]:
+    """The time events of a force."""
+    return find_schedule(assemble(pushed(function, end, start)), start, end).times.tolist()
+
+
+def square_wave(t: np.ndarray, period: float) -> np.ndarray:
+    """The place of a mass that is pushed to and fro with 1 N for half a period each."""
+    half = 0.5 * period
+    done = np.floor(t / period + 1e-9)
+    past = t - done * period
+    back = half * half - 0.5 * (period - past) ** 2
+    return done * half * half + np.where(past < half, 0.5 * past * past, back)
+
+
+FORCES: dict[str, tuple[Function, Callable[[np.ndarray], np.ndarray]]] = {
+    "one moment at the start": (lambda t: select(t <= 0, 1e9, 0.0), lambda t: 0.0 * t),
+    "square wave": (lambda t: select(sin(100.0 * math.pi * t) > 0, 1.0, -1.0), lambda t: square_wave(t, 0.02)),
+    "sign": (lambda t: sign(sin(100.0 * math.pi * t)), lambda t: square_wave(t, 0.02)),
+    "short pulse": (
+        lambda t: select((t > 0.3) & (t < 0.3 + 1e-7), 1e7, 0.0),
+        lambda t: np.maximum(t - 0.3 - 5e-8, 0.0),
+    ),
+    "two at nearly one time": (
+        lambda t: select((t > 0.3) & (t < 0.3 + 1e-12), 1.0, 0.0) + select(t < 0.1 * 3.0, 1.0, 0.0),
+        lambda t: np.where(t < 0.3, 0.5 * t * t, 0.045 + 0.3 * (t - 0.3)),
+    ),
+    "kink": (
+        lambda t: maximum(t - 1.0 / 3.0, 0.0),
+        lambda t: np.maximum(t - 1.0 / 3.0, 0.0) ** 3 / 6.0,
+    ),
+    "nested": (
+        lambda t: select(select(t < 0.5, t, 1.0 - t) < 0.25, 2.0, 0.0),
+        lambda t: np.where(
+            t < 0.25, t * t, np.where(t < 0.75, 0.0625 + 0.5 * (t - 0.25), 0.3125 + 0.5 * (t - 0.75) + (t - 0.75) ** 2)
+        ),
+    ),
+    "at the very end": (lambda t: select(t < 1.0, 1.0, 1e9), lambda t: 0.5 * t * t),
+}
+
+
+@pytest.mark.parametrize(("form", "solver"), SOLVERS)
+@pytest.mark.parametrize("name", FORCES)
+def test_a_switch_is_exact_in_every_solver(name: str, form: str, solver: str) -> None:
+    force, exact = FORCES[name]
+    result = simulate(pushed(force), form=form, solver=solver, rtol=1e-8)
+    assert len(result.time) == 201
+    bound = 2e-7 if solver.startswith("ida") else 1e-9  # what a run without a switch errs
+    np.testing.assert_allclose(result.array("bob.position.x"), exact(result.time), rtol=0.0, atol=bound)
+    assert result.energy.max_drift < 1e-6
+
+
+@pytest.mark.parametrize(("form", "solver"), SOLVERS)
+def test_what_is_asked_for_at_a_switch_is_what_comes_after_it(form: str, solver: str) -> None:
+    result = simulate(pushed(lambda t: select(t < 0.5, 1.0, -1.0)), form=form, solver=solver, outputs=[0, 0.5, 1.0])
+    assert result.time.tolist() == [0.0, 0.5, 1.0]
+    assert result.array("push.force").tolist() == [1.0, -1.0, -1.0]
+    np.testing.assert_allclose(result.array("bob.acceleration.x"), [1.0, -1.0, -1.0], rtol=1e-9)
+
+
+def test_a_sweep_has_at_a_switch_what_a_run_has() -> None:
+    scene = pushed(lambda t: select(t < 0.5, 1.0, -1.0))
+    alone = simulate(scene, outputs=[0.0, 0.3, 0.5, 1.0])
+    many = sweep(
+        scene, {"bob.mass": [1.0, 2.0]}, quantities=["bob.velocity.x", "push.force"], outputs=[0.0, 0.3, 0.5, 1.0]
+    )
+    for path in ("bob.velocity.x", "push.force"):
+        np.testing.assert_allclose(many[path][0], alone.array(path), rtol=1e-9, atol=1e-12)
+    assert np.all(np.isfinite(many["push.force"]))
+
+
+SCHEDULES: dict[str, tuple[Function, float, list[float]]] = {
+    "affine": (lambda t: select(t < 0.1, 1.0, 0.0), 1.0, [0.1]),
+    "pulse in a long run": (lambda t: select(abs(t - 5e4) < 1e-6, 1.0, 0.0), 1e5, [5e4 - 1e-6, 5e4, 5e4 + 1e-6]),
+    "touches": (lambda t: select(sin(t) > 1.0, 1.0, 0.0), 10.0, []),
+    "touches from below": (lambda t: select((t - 0.5) ** 2 > 0.0, 1.0, 0.0), 1.0, []),
+    "triple root": (lambda t: select((t - 0.3) ** 3 > 0.0, 1.0, 0.0), 1.0, [0.3]),
+    "never": (lambda t: select(t < 5.0, 1.0, 0.0), 1.0, []),
+    "at the start and the end": (lambda t: select((t <= 0) | (t >= 1), 1.0, 0.0), 1.0, []),
+    "a narrow bell": (
+        lambda t: select(1.0 / (1.0 + ((t - 0.7) * 1e9) ** 2) > 0.5, 1.0, 0.0),
+        1.0,
+        [0.7 - 1e-9, 0.7 + 1e-9],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SCHEDULES)
+def test_time_events_are_found_from_the_expression(name: str) -> None:
+    function, end, expected = SCHEDULES[name]
+    np.testing.assert_allclose(times_of(function, end), expected, rtol=1e-14)
+
+
+def test_many_events_are_all_found() -> None:
+    found = times_of(lambda t: select(sin(2000.0 * math.pi * t) > 0.0, 1.0, 0.0), 10.0)
+    np.testing.assert_allclose(found, np.arange(1, 20_000) * 5e-4, rtol=1e-13)
+
+
+def test_parameters_may_say_when_something_switches() -> None:
+    class Burst(Component):
+        last: float = parameter(0.5, unit="s", doc="Its end.")
+        at: Point = connector(Point, "Where it pushes.")
+
+        @force
+        def push(self) -> Iterable[Load]:
+            """Yield the push."""
+            yield Load(self.at, Vector(select(self.time < self.last, 1.0, 0.0), 0.0, 0.0))
+
+    scene = Scene(gravity=0.0, t_end=1.0)
+    bob, burst = scene.add("bob", PointMass()), scene.add("burst", Burst())
+    scene.connect(burst.at, bob.point)
+    scene.start.update({f"bob.{q}.{a}": 0.0 for q in ("position", "velocity") for a in "xz"})
+    assembly = assemble(scene)
+    for last in (0.5, 0.25):
+        changed = assembly.with_values({"burst.last": last})
+        assert not changed.why_new
+        result = simulate(changed)
+        np.testing.assert_allclose(result.array("bob.velocity.x")[-1], last, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("form", "solver"), SOLVERS)
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_a_jump_in_a_prescribed_speed_is_an_impact(form: str, solver: str, angle: float) -> None:
+    result = simulate(driven(lambda t: select(t < 0.5, t, 0.5), angle), form=form, solver=solver, rtol=1e-10)
+    before, after = (i for i, t in enumerate(result.time) if t == 0.5)
+    along = np.array([math.cos(a := result.array("rod.angle")[after]), math.sin(a)])
+    speeds = np.array([[result.array(f"bob.velocity.{axis}")[i] for axis in "xz"] for i in (before, after)])
+    # The rod pushes along itself only: across it, the bob keeps its speed, along it, it has that of the pivot.
+    np.testing.assert_allclose(speeds[1] @ along, speeds[0] @ along, rtol=1e-9)
+    np.testing.assert_allclose(speeds[1] @ np.array([along[1], -along[0]]), 0.0, atol=1e-9)
+    assert [one.part for one in result.happenings] == ["drive"]
+    assert result.happenings[0].impact
+    assert result.energy.max_drift < 1e-7
+
+
+@pytest.mark.parametrize(("form", "solver"), SOLVERS)
+def test_a_jump_in_a_prescribed_position_is_refused_by_name(form: str, solver: str) -> None:
+    with pytest.raises(SolveError, match=r"t = 0\.5 .*jumps by 1 m") as caught:
+        simulate(driven(lambda t: select(t < 0.5, 0.0, 1.0)), form=form, solver=solver)
+    assert caught.value.where.startswith("drive.")
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_jump_in_a_prescribed_acceleration_is_no_event_of_its_own(form: str) -> None:
+    result = simulate(driven(lambda t: select(t < 0.5, 0.0, (t - 0.5) ** 2)), form=form, rtol=1e-9)
+    assert not result.happenings
+    assert result.energy.max_drift < 1e-7
+
+
+def test_switching_without_end_is_refused_by_name() -> None:
+    with pytest.raises(SolveError, match="by the clock it switches more than") as caught:
+        simulate(pushed(lambda t: select(sin(1e7 * t) > 0.0, 1.0, 0.0)))
+    assert caught.value.where == "push.value"
+
+
+def test_scenes_without_switches_have_no_schedule() -> None:
+    assembly = assemble(driven(lambda t: 0.1 * sin(t)))
+    assert not assembly.relations
+    assert not len(find_schedule(assembly, 0.0, 1.0).times)
