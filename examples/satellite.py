@@ -19,7 +19,7 @@ def satellite(pitch: float) -> atwood.Scene:
     """Return a satellite that is turned by a pitch angle, rad, and turns with its orbit, in the plane of the orbit."""
     scene = atwood.Scene(space="plane", gravity=0.0)
     earth, craft = scene.add("earth", Ground()), scene.add("craft", RigidBody(mass=500.0, moments=MOMENTS))
-    pull = CentralGravity(gravitational_parameter=MU, mass=500.0, attracts="body", moments=MOMENTS)
+    pull = CentralGravity(gravitational_parameter=MU, attracts="body")
     scene.add("pull", pull)
     scene.connect(earth.frame, scene.pull.source)
     scene.connect(scene.pull.frame, craft.frame)

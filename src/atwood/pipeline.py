@@ -14,7 +14,7 @@ from typing import Any
 
 from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
-from atwood.consistency.check import check_parts
+from atwood.consistency.check import check_laws, check_names
 from atwood.errors import StartError
 from atwood.expr import Graph
 from atwood.expr.relations import TimeRelations
@@ -23,6 +23,7 @@ from atwood.forms.places import to_maximal
 from atwood.forms.source import Source
 from atwood.forms.starting import with_places
 from atwood.mechanics.build import Mechanism, check_closures, make_gravity
+from atwood.mechanics.carried import inertia_asked_for
 from atwood.mechanics.constraints import holds_velocities
 from atwood.mechanics.inertia import check_tensors
 from atwood.mechanics.orientation import body_offsets
@@ -187,10 +188,11 @@ def read_mechanism(
     time = graph.symbol("t")
     graph.relations = TimeRelations(time)
     space = make_space(flat.space, flat.line_axis)
-    check_parts(flat.parts, space)
+    check_names(flat.parts)
     table = ParameterTable(graph, space=space.name)
     with graph.relations.reading():
         locals_: Mapping[str, LocalPart] = localize(flat, space, time, table, modes, None)
+    check_laws(flat.parts, space)
     network = build_graph(flat, locals_)
     bodies = find_bodies(network, locals_)
     sides: Mapping[tuple[str, str, str], float] | None = None
@@ -203,6 +205,12 @@ def read_mechanism(
         bodies = find_bodies(network, locals_)
     gravity = make_gravity(table, flat.gravity)
     told = None if known_sides else sides
+    if any(local.asks for local in locals_.values()):
+        carried = inertia_asked_for(network, bodies, locals_, space)
+        with graph.relations.reading():
+            locals_ = localize(flat, space, time, table, modes, sides, carried)
+        network = build_graph(flat, locals_)
+        bodies = find_bodies(network, locals_)
     mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links, told)
     check_closures(mechanism)
     check_tensors(mechanism.locals_, table.values)

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import atwood_library as lib
-from atwood import Result, Scene, simulate
+from atwood import Result, Scene, TopologyError, assemble, simulate
 
 from ..helpers.runs import FORMS
 
@@ -27,7 +27,7 @@ def orbit(e: float, space: str = "space") -> Scene:
     """Return a planet at its perihelion, in the x-y plane in space and in the x-z plane in a plane."""
     scene = Scene(space=space, gravity=0.0)
     sun, planet = scene.add("sun", lib.Ground()), scene.add("planet", lib.PointMass(mass=2.5))
-    pull = scene.add("pull", lib.CentralGravity(gravitational_parameter=1.0, mass=2.5))
+    pull = scene.add("pull", lib.CentralGravity(gravitational_parameter=1.0))
     scene.connect(sun.frame, pull.source)
     scene.connect(pull.point, planet.point)
     up = "y" if space == "space" else "z"
@@ -56,7 +56,7 @@ def test_two_bodies_go_round_their_centre_of_mass() -> None:
     heavy, light = 3.0, 1.0
     scene = Scene(space="space", gravity=0.0)
     one, other = scene.add("one", lib.PointMass(mass=heavy)), scene.add("other", lib.PointMass(mass=light))
-    pull = scene.add("pull", lib.CentralGravity(gravitational_parameter=heavy / (heavy + light), mass=light))
+    pull = scene.add("pull", lib.CentralGravity(gravitational_parameter=heavy / (heavy + light)))
     scene.connect(one.point, pull.source)
     scene.connect(pull.point, other.point)
     e = 0.3
@@ -91,9 +91,7 @@ def satellite(space: str, attracts: str = "body", **start: float) -> Scene:
     scene = Scene(space=space, gravity=0.0)
     earth = scene.add("earth", lib.Ground())
     craft = scene.add("craft", lib.RigidBody(mass=MASS, moments=across))
-    pull = scene.add(
-        "pull", lib.CentralGravity(gravitational_parameter=MU, mass=MASS, attracts=attracts, moments=across)
-    )
+    pull = scene.add("pull", lib.CentralGravity(gravitational_parameter=MU, attracts=attracts))
     scene.connect(earth.frame, pull.source)
     scene.connect(pull.frame if attracts == "body" else pull.point, craft.frame)
     way = "y" if space == "space" else "z"
@@ -143,17 +141,7 @@ def test_a_large_body_keeps_energy_and_angular_momentum(form: str) -> None:
     moments, products, center = (0.03, 0.05, 0.04), (0.004, -0.003, 0.002), (0.02, -0.05, 0.1)
     earth = scene.add("earth", lib.Ground())
     craft = scene.add("craft", lib.RigidBody(mass=MASS, moments=moments, products=products, center=center))
-    pull = scene.add(
-        "pull",
-        lib.CentralGravity(
-            gravitational_parameter=MU,
-            mass=MASS,
-            attracts="body",
-            moments=moments,
-            products=products,
-            center=center,
-        ),
-    )
+    pull = scene.add("pull", lib.CentralGravity(gravitational_parameter=MU, attracts="body"))
     scene.connect(earth.frame, pull.source)
     scene.connect(pull.frame, craft.frame)
     scene.start.update({"craft.position.x": 1.0, "craft.velocity.y": 1.1, "craft.spin.x": 0.5, "craft.spin.y": -0.8})
@@ -204,7 +192,7 @@ def test_a_satellite_is_small_beside_its_orbit() -> None:
     scene = Scene(space="plane", gravity=0.0)
     earth = scene.add("earth", lib.Ground())
     craft = scene.add("craft", lib.RigidBody(mass=4.0, moments=(0.01, 0.03, 0.035)))
-    pull = scene.add("pull", lib.CentralGravity(mass=4.0, attracts="body", moments=(0.01, 0.03, 0.035)))
+    pull = scene.add("pull", lib.CentralGravity(attracts="body"))
     scene.connect(earth.frame, pull.source)
     scene.connect(pull.frame, craft.frame)
     rate = math.sqrt(mu / radius**3)
@@ -214,3 +202,101 @@ def test_a_satellite_is_small_beside_its_orbit() -> None:
     pitch = result["craft.angle"] - np.unwrap(np.arctan2(result["craft.position.z"], result["craft.position.x"]))
     wanted = 0.01 * np.cos(rate * math.sqrt(3.0 * (0.035 - 0.01) / 0.03) * result.time)
     assert np.allclose(pitch, wanted, atol=2e-6)
+
+
+# -- what is attracted belongs to the body ----------------------------------------------------------------------------
+
+
+def falling(space: str, form: str, *, attracts: str) -> Result:
+    """Let a body fall that is made of two welded ones, of 5 kg in all, one of them off the frame."""
+    scene = Scene(space=space, gravity=0.0)
+    earth = scene.add("earth", lib.Ground())
+    craft = scene.add("craft", lib.RigidBody(mass=3.0, moments=(0.3, 0.5, 0.4), center=(0.1, 0.0, 0.05)))
+    weld = scene.add("weld", lib.Weld(displacement=(0.4, 0.0, 0.2), angle=0.6))
+    box = scene.add("box", lib.RigidBody(mass=2.0, moments=(0.1, 0.2, 0.15), center=(0.0, 0.0, -0.1)))
+    pull = scene.add("pull", lib.CentralGravity(gravitational_parameter=MU, attracts=attracts))
+    scene.connect(earth.frame, pull.source)
+    scene.connect(pull.frame if attracts == "body" else pull.point, craft.frame)
+    scene.connect(craft.frame, weld.a)
+    scene.connect(weld.b, box.frame)
+    scene.start.update({"craft.position.x": 4.0, "craft.position.z": 1.0})
+    scene.start.update({"craft.angle" if space == "plane" else "craft.theta": 0.3})
+    return simulate(scene, form=form, t_end=1.0, rtol=1e-11, outputs=5)
+
+
+def as_one(result: Result) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Return mass, centre of mass and tensor of the two bodies, in the axes of the first, by hand."""
+    turn = 0.6  # counter-clockwise, that is about -y
+    c, s = math.cos(turn), math.sin(turn)
+    axes = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
+    centers = [np.array([0.1, 0.0, 0.05]), np.array([0.4, 0.0, 0.2]) + axes @ np.array([0.0, 0.0, -0.1])]
+    tensors = [np.diag([0.3, 0.5, 0.4]), axes @ np.diag([0.1, 0.2, 0.15]) @ axes.T]
+    masses = [3.0, 2.0]
+    center = (3.0 * centers[0] + 2.0 * centers[1]) / 5.0
+    total = np.zeros((3, 3))
+    for m, at, tensor in zip(masses, centers, tensors, strict=True):
+        r = at - center
+        total += tensor + m * (r @ r * np.eye(3) - np.outer(r, r))
+    return 5.0, center, total
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("space", ["plane", "space"])
+def test_mass_and_inertia_are_those_of_all_that_is_welded_together(space: str, form: str) -> None:
+    result = falling(space, form, attracts="body")
+    mass, center, tensor = as_one(result)
+    axes = {
+        "plane": lambda i: np.array(
+            [
+                [math.cos(result["craft.angle"][i]), 0.0, -math.sin(result["craft.angle"][i])],
+                [0.0, 1.0, 0.0],
+                [math.sin(result["craft.angle"][i]), 0.0, math.cos(result["craft.angle"][i])],
+            ]
+        ),
+        "space": lambda i: np.array([[result[f"craft.{n}_axis.{k}"][i] for n in "xyz"] for k in "xyz"]),
+    }[space](0)
+    place = np.array([4.0, 0.0, 1.0]) + axes @ (center - np.array([0.1, 0.0, 0.05]))
+    r = float(np.linalg.norm(place))
+    e = place / r
+    turned = axes @ tensor @ axes.T
+    wanted = -MU * mass / r - 0.5 * MU / r**3 * (np.trace(tensor) - 3.0 * e @ turned @ e)
+    assert result["pull.potential_energy"][0] == pytest.approx(wanted, rel=1e-12)
+    assert result["pull.distance_apart"][0] == pytest.approx(r, rel=1e-12)
+    assert result.energy.max_drift < 2e-7
+
+
+@pytest.mark.parametrize("space", ["line", "plane", "space"])
+def test_a_body_falls_as_it_should_whatever_its_mass(space: str) -> None:
+    for mass in (0.2, 1.0, 5.0):
+        scene = Scene(space=space, gravity=0.0)
+        earth, bob = scene.add("earth", lib.Ground()), scene.add("bob", lib.PointMass(mass=mass))
+        pull = scene.add("pull", lib.CentralGravity(gravitational_parameter=2.0))
+        scene.connect(earth.frame, pull.source)
+        scene.connect(pull.point, bob.point)
+        scene.start["bob.position.x"] = 2.0
+        result = simulate(scene, t_end=0.1, outputs=2)
+        assert result["bob.acceleration.x"][0] == pytest.approx(-0.5, rel=1e-9)
+
+
+def test_other_values_of_the_mass_are_followed() -> None:
+    scene = orbit(0.5)
+    made = assemble(scene).with_values({"planet.mass": 10.0})
+    result = simulate(made, t_end=1.0, outputs=3)
+    assert np.allclose(result["planet.position.x"], kepler(0.5, result.time)[:, 0], atol=1e-7)
+
+
+def test_what_has_no_mass_of_its_own_is_refused() -> None:
+    scene = orbit(0.5)
+    ground = scene.add("rock", lib.Ground(position=(3.0, 0.0, 0.0)))
+    pull = scene.add("other", lib.CentralGravity())
+    scene.connect(scene.sun.frame, pull.source)
+    scene.connect(pull.point, ground.frame)
+    with pytest.raises(TopologyError, match=r"other\.point: .* fixed to the world"):
+        assemble(scene)
+    scene = orbit(0.5, "plane")
+    rod = scene.add("rod", lib.Rod(length=1.0, mass=0.5))
+    far = scene.add("far", lib.PointMass())
+    scene.connect(scene.planet.point, rod.a)
+    scene.connect(rod.b, far.point)
+    with pytest.raises(TopologyError, match=r"pull\.point: .* that of rod is spread between points"):
+        assemble(scene)

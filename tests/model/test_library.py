@@ -13,6 +13,7 @@ import sympy
 
 import atwood as aw
 import atwood_library
+from atwood.consistency.trials import Body
 from atwood.expr import Graph, evaluate
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, Motion
@@ -167,6 +168,11 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
             angular_acceleration=aw.Vector(0.0, -numbers.draw(f"{name}.e") if turns else 0.0, 0.0),
             value=numbers.draw(f"{name}.value"),
             rate=numbers.draw(f"{name}.rate"),
+            body=Body(
+                numbers.draw(f"{name}.mass"),
+                aw.Vector(*(numbers.draw(f"{name}.c{axis}") for axis in "xyz")),
+                tuple(aw.Vector(*(numbers.draw(f"{name}.J{i}{j}") for j in "xyz")) for i in "xyz"),
+            ),
         )
     names = list(component.connectors())
     return Binding(

@@ -8,7 +8,6 @@ from atwood import (
     Point,
     Scalar,
     Vector,
-    as_vector,
     connector,
     dot,
     norm,
@@ -25,31 +24,18 @@ class CentralGravity(Component):
     Potential energy ``-mu m / r`` (Goldstein, section 3.7). Both ends feel the force, so that the source may itself be
     a body that moves.
 
-    With ``attracts="body"`` it acts at `frame` on an extended body of the given inertia, to second order in its size
-    over the distance: ``-mu m/r - mu (tr J - 3 J_r)/(2 r^3)`` with the moment of inertia J_r about the line from the
-    source to the centre of mass (MacCullagh's formula; Goldstein, section 5.8). Its torque is the gravity gradient
-    ``3 mu/r^3 (e x J e)``, and its force is the derivative of the same energy, so that energy and angular momentum
-    are kept. `mass`, `center`, `moments` and `products` are those of the body that hangs there.
+    What is attracted has the mass of the body that `point` or `frame` is on, with all parts that are rigidly joined
+    there. With ``attracts="body"`` that is an extended body, to second order in its size over the distance:
+    ``-mu m/r - mu (tr J - 3 J_r)/(2 r^3)`` with its moment of inertia J_r about the line from the source to its centre
+    of mass (MacCullagh's formula; Goldstein, section 5.8). Its torque is the gravity gradient ``3 mu/r^3 (e x J e)``,
+    and its force is the derivative of the same energy, so that energy and angular momentum are kept. With
+    ``attracts="point"`` all of the mass is taken to be at `point`.
     """
 
     gravitational_parameter: float = parameter(
         3.986004418e14, unit="m^3/s^2", minimum=0.0, doc="G M of the source; by default that of the Earth."
     )
-    mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass that is attracted.")
     attracts: str = parameter("point", choices=("point", "body"), doc="Whether a point mass or an extended body.")
-    center: tuple[float, float, float] = parameter(
-        (0.0, 0.0, 0.0), unit="m", size=3, doc="Of a body: centre of mass in the axes of its frame."
-    )
-    moments: tuple[float, float, float] = parameter(
-        (0.0, 0.0, 0.0),
-        unit="kg*m^2",
-        size=3,
-        minimum=0.0,
-        doc="Of a body: moments of inertia Jxx, Jyy, Jzz about the centre of mass, in the axes of its frame.",
-    )
-    products: tuple[float, float, float] = parameter(
-        (0.0, 0.0, 0.0), unit="kg*m^2", size=3, doc="Of a body: entries Jxy, Jxz, Jyz of the inertia tensor."
-    )
     source: Point = connector(Point, "The centre of the source.")
     point: Point = connector(Point, "The point mass that is attracted.", when={"attracts": ("point",)})
     frame: Frame = connector(Frame, "The frame of the body that is attracted.", when={"attracts": ("body",)})
@@ -58,7 +44,7 @@ class CentralGravity(Component):
         """Return the way from the source to the centre of mass, in world axes."""
         if self.attracts == "point":
             return self.point.position - self.source.position
-        arm = self.frame.to_world(as_vector(self.center))
+        arm = self.frame.to_world(self.frame.center_of_mass)
         separation: Vector = self.frame.position + arm - self.source.position
         return separation
 
@@ -68,14 +54,13 @@ class CentralGravity(Component):
         r = self.separation()
         square = dot(r, r)
         inverse = 1.0 / sqrt(square)
-        energy = -(self.gravitational_parameter * self.mass * inverse)
         if self.attracts == "point":
-            return energy
-        j, p = as_vector(self.moments), as_vector(self.products)
+            return -(self.gravitational_parameter * self.point.mass * inverse)
+        energy = -(self.gravitational_parameter * self.frame.mass * inverse)
+        x, y, z = self.frame.inertia
         s = self.frame.to_frame(r)
-        along = j.x * s.x * s.x + j.y * s.y * s.y + j.z * s.z * s.z
-        along = along + 2.0 * (p.x * s.x * s.y + p.y * s.x * s.z + p.z * s.y * s.z)
-        spread = (j.x + j.y + j.z) - 3.0 * along / square
+        along = dot(s, Vector(dot(x, s), dot(y, s), dot(z, s)))
+        spread = (x.x + y.y + z.z) - 3.0 * along / square
         return energy - 0.5 * self.gravitational_parameter * spread * (inverse * inverse * inverse)
 
     @observable(unit="m", doc="Distance of the centre of mass from the source.")

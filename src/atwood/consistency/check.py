@@ -16,7 +16,7 @@ from atwood.model.flatten import Part
 from atwood.model.laws import Law
 from atwood.model.space import Space
 
-__all__ = ["check_parts", "contradictions"]
+__all__ = ["check_laws", "check_names", "contradictions"]
 
 TRIALS, ATTEMPTS = 2, 6
 """At how many random states laws are compared, and at how many that is tried, since laws may have no value at some."""
@@ -25,16 +25,32 @@ _sound: WeakKeyDictionary[type[Component], set[Hashable]] = WeakKeyDictionary()
 """For each class, in which spaces and with which choices no contradiction was found."""
 
 
-def check_parts(parts: Mapping[str, Part], space: Space) -> None:
-    """Refuse parts whose laws contradict each other.
-
-    Joints are held against the constraints that they solve, observables against joint coordinates of their name and
-    against their rates, names against names, at random states, in all modes.
+def check_names(parts: Mapping[str, Part]) -> None:
+    """Refuse parts with names in their declarations that name nothing.
 
     Parameters
     ----------
     parts
         The leaves of a scene.
+
+    Raises
+    ------
+    DeclarationError
+        With the path of the part, and the file and line of the law.
+    """
+    _refuse(parts, lambda part: "names", lambda part: wrong_names(part.component, part.path))
+
+
+def check_laws(parts: Mapping[str, Part], space: Space) -> None:
+    """Refuse parts whose laws contradict each other.
+
+    Joints are held against the constraints that they solve, observables against joint coordinates of their name and
+    against their rates, at random states, in all modes.
+
+    Parameters
+    ----------
+    parts
+        The leaves of a scene, whose parameters are known to mean something in its space.
     space
         What it lives in.
 
@@ -43,12 +59,19 @@ def check_parts(parts: Mapping[str, Part], space: Space) -> None:
     DeclarationError
         With the path of the part, and the file and line of the law.
     """
+    _refuse(parts, lambda part: _shape_of(part, space), lambda part: contradictions(part, space))
+
+
+def _refuse(
+    parts: Mapping[str, Part],
+    key_of: Callable[[Part], Hashable],
+    look: Callable[[Part], Iterable[DeclarationError]],
+) -> None:
     for part in parts.values():
-        cls = type(part.component)
-        known = _sound.setdefault(cls, set())
-        key = _shape_of(part, space)
+        known = _sound.setdefault(type(part.component), set())
+        key = key_of(part)
         if key not in known:
-            for error in contradictions(part, space):
+            for error in look(part):
                 raise error
             known.add(key)
 
@@ -77,10 +100,6 @@ def contradictions(part: Part, space: Space) -> Iterator[DeclarationError]:
     space
         What it lives in.
     """
-    names = list(wrong_names(part.component, part.path))
-    yield from names
-    if names:
-        return  # what follows goes by names
     component = part.component
     joints = [law for law in component.laws("joint") if law.holds_in(space.name)]
     for law in joints:

@@ -36,6 +36,15 @@ class Pose:
     axes: Axes
 
 
+@dataclass(frozen=True)
+class Body:
+    """The inertia of the body that a connector is on; see `model.carried.Carried`."""
+
+    mass: float
+    center_of_mass: Vector
+    inertia: Axes
+
+
 WORLD_POSE = Pose(ZERO, 0.0, IDENTITY)
 
 
@@ -63,6 +72,8 @@ class Trial:
         Value and rate of each joint coordinate, by name.
     frames
         Connectors that have an orientation here.
+    bodies
+        Inertia of the bodies that connectors are on.
     sides
         On a line, the signs of lengths, by the names of connectors.
     """
@@ -78,6 +89,7 @@ class Trial:
     turning: Mapping[str, Vector]
     coordinates: Mapping[str, tuple[float, float]]
     frames: frozenset[str]
+    bodies: Mapping[str, Body]
     sides: Mapping[tuple[str, str], float]
 
     @property
@@ -131,10 +143,16 @@ class Trial:
     def motion(self, name: str, pose: Pose, velocity: Vector | None = None, spin: Vector | None = None) -> Motion:
         """Return what a connector knows."""
         if not self.is_frame(name):
-            still = ZERO if velocity is not None else None
-            return Motion(pose.position, velocity, axes=FIXED_AXES, angle=0.0, angular_velocity=still)
-        angle = pose.angle if self.space.name == "plane" else None
-        return Motion(pose.position, velocity, axes=pose.axes, angle=angle, angular_velocity=spin)
+            still, body = ZERO if velocity is not None else None, self.bodies[name]
+            return Motion(pose.position, velocity, axes=FIXED_AXES, angle=0.0, angular_velocity=still, body=body)
+        return Motion(
+            pose.position,
+            velocity,
+            axes=pose.axes,
+            angle=pose.angle if self.space.name == "plane" else None,
+            angular_velocity=spin,
+            body=self.bodies[name],
+        )
 
     def placement(self, law: Law, t: float, poses: Mapping[str, Pose], values: Mapping[str, float]) -> Placement | None:
         """Return where a joint puts b, seen from a; None if its method gives something else."""
@@ -313,7 +331,18 @@ def make_trial(part: Part, space: Space, seed: int) -> Trial:
     grips = {name: (number(), number()) for name in connectors if name not in free and not _is_offered(component, name)}
     frames = frozenset(name for name, one in connectors.items() if isinstance(one, Frame) and space.has_rotation)
     sides = {(a, b): 1.0 if i < j else -1.0 for i, a in enumerate(free) for j, b in enumerate(free)}
-    return Trial(part, space, length, values, inputs, grips, poses, going, turning, coordinates, frames, sides)
+    bodies = {name: _some_body(draw, length) for name in free}
+    return Trial(part, space, length, values, inputs, grips, poses, going, turning, coordinates, frames, bodies, sides)
+
+
+def _some_body(draw: random.Random, length: float) -> Body:
+    """Return the inertia of two points and a sphere, which some body can have."""
+    place = Vector(*(draw.uniform(-0.3, 0.3) * length for _ in range(3)))
+    rows = [
+        Vector(*((dot(place, place) + length**2 if i == j else 0.0) - place[i] * place[j] for j in range(3)))
+        for i in range(3)
+    ]
+    return Body(draw.uniform(1.0, 3.0), place, (rows[0], rows[1], rows[2]))
 
 
 def _is_offered(component: Component, name: str) -> bool:

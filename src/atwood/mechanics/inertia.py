@@ -20,7 +20,17 @@ from atwood.solids.checks import symmetric_part, verify_moments
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
-__all__ = ["CoupledMass", "Masses", "RigidMass", "add_masses", "check_tensors", "tensor_of", "turned_tensor"]
+__all__ = [
+    "CoupledMass",
+    "Masses",
+    "RigidMass",
+    "add_masses",
+    "check_tensors",
+    "shifted_tensor",
+    "sum_vectors",
+    "tensor_of",
+    "turned_tensor",
+]
 
 
 @dataclass(frozen=True)
@@ -194,9 +204,14 @@ def _merge(shares: Sequence[RigidMass]) -> RigidMass:
 
 
 def _shifted(moment: Scalar | Axes, mass: Scalar, r: Vector) -> Scalar | Axes:
-    """Return a moment or tensor about a point at a distance from the centre of mass: ``J + m (r^2 1 - r r)``."""
+    """Return a moment or tensor about a point at a distance from the centre of mass."""
     if not isinstance(moment, tuple):
         return moment + mass * (r.x * r.x + r.z * r.z)
+    return shifted_tensor(moment, mass, r)
+
+
+def shifted_tensor(moment: Axes, mass: Scalar, r: Vector) -> Axes:
+    """Return a tensor about a point at a distance from the centre of mass: ``J + m (r^2 1 - r r)``."""
     square = dot(r, r)
     units = (Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0))
     x, y, z = (moment[i] + (units[i] * square - r * r[i]) * mass for i in range(3))

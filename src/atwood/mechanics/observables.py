@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from atwood.expr import Expression, Scalar, substitute
 from atwood.mechanics.arms import arm_of
 from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.carried import CarriedInertia
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.forces import in_joint_coordinates, local_map
 from atwood.mechanics.inertia import tensor_of, turned_tensor
@@ -181,7 +182,8 @@ def make_binding(
         )
         if isinstance(one, Frame):
             motion = _turned(mechanism, equations, motion, node, body)
-        motions[name] = motion
+        carried = CarriedInertia(mechanism.graph, mechanism.bodies, mechanism.locals_, space, path, name)
+        motions[name] = replace(motion, body=carried)
     values = dict(local.binding.values)
     for name, symbol in local.signal_symbols.items():
         values[name] = signals[symbol]

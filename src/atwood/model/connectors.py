@@ -15,6 +15,7 @@ from atwood.expr import Scalar
 from atwood.model.vector import Vector, dot
 
 if TYPE_CHECKING:
+    from atwood.model.carried import Carried
     from atwood.model.component import Component
 
 __all__ = [
@@ -51,6 +52,8 @@ class Motion:
         Angular velocity along the frame's own axes, in space; None where it follows from the two above.
     value, rate
         Of a joint's coordinate, for a `Shaft` or a `Slide`.
+    body
+        Inertia of the body that the connector is on.
     """
 
     position: Vector | None = None
@@ -63,6 +66,7 @@ class Motion:
     spin: Vector | None = None
     value: Scalar = None
     rate: Scalar = None
+    body: Carried | None = None
 
 
 class Connector:
@@ -140,6 +144,11 @@ class Point(Connector):
         value: Vector = self._read("acceleration")
         return value
 
+    @property
+    def mass(self) -> Scalar:
+        """Mass of the body that it is on, kg: of all parts that are rigidly joined there."""
+        return self._read("body").mass
+
 
 class Frame(Point):
     """A point with an orientation, where forces and torques pass.
@@ -179,6 +188,18 @@ class Frame(Point):
     def axes(self) -> tuple[Vector, Vector, Vector]:
         """Its x, y and z axes, in world axes."""
         value: tuple[Vector, Vector, Vector] = self._read("axes")
+        return value
+
+    @property
+    def center_of_mass(self) -> Vector:
+        """Centre of mass of the body that it is on, in the axes of this frame, m."""
+        value: Vector = self._read("body").center_of_mass
+        return value
+
+    @property
+    def inertia(self) -> tuple[Vector, Vector, Vector]:
+        """Inertia tensor of the body that it is on, about its centre of mass, in the axes of this frame, kg m^2."""
+        value: tuple[Vector, Vector, Vector] = self._read("body").inertia
         return value
 
     def to_frame(self, vector: Vector) -> Vector:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, depends_on
+from atwood.model.carried import Asked, Carried
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, JointCoordinate, Motion
 from atwood.model.contributions import BodyInertia, Placement, PointInertia
@@ -52,6 +53,7 @@ def localize(
     table: ParameterTable,
     modes: Mapping[str, str],
     sides: Mapping[tuple[str, str, str], float] | None,
+    carried: Mapping[tuple[str, str], Carried] | None = None,
 ) -> dict[str, LocalPart]:
     """Evaluate the laws of every part on its local symbols.
 
@@ -70,6 +72,9 @@ def localize(
     sides
         On a line: for (part, connector, connector) the sign of the second's position minus the first's; None while
         they are not known yet.
+    carried
+        Inertia of the body that a connector is on, by part and connector, of those that ask for it; None while it is
+        not known yet.
 
     Raises
     ------
@@ -86,7 +91,7 @@ def localize(
     for path in sorted(flat.parts, key=lambda path: path in held):  # joints before what takes hold of them
         taken = [(one, found[one.joint]) for one in held.get(path, ())]
         part, own = flat.parts[path], counted.get(path, ())
-        found[path] = _localize_part(part, flat, space, time, table, modes, sides, taken, own)
+        found[path] = _localize_part(part, flat, space, time, table, modes, sides, taken, own, carried or {})
     return {path: found[path] for path in flat.parts}
 
 
@@ -115,6 +120,7 @@ def _localize_part(
     sides: Mapping[tuple[str, str, str], float] | None,
     taken: Sequence[tuple[Held, LocalPart]],
     counted: Collection[str],
+    carried: Mapping[tuple[str, str], Carried],
 ) -> LocalPart:
     graph, component = table.graph, part.component
     values = {name: _parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
@@ -133,7 +139,13 @@ def _localize_part(
     binding = Binding(values=values, motions=motions, time=time, space=space.name, line=space.line, sides=own_sides)
     for one in grips:
         connectors.update(one.connectors)
-    bound = bind(component, binding)
+    bound = bind(component, binding)  # inertia and joints say what bodies there are, and may not ask what these have
+    known = {
+        name: replace(one, body=carried.get((part.path, name)) or Asked(graph, f"{part.path}.{name}"))
+        for name, one in motions.items()
+    }
+    binding = replace(binding, motions=known)
+    acting = bind(component, binding)
     mode = modes.get(part.path, component.modes[0] if component.modes else "")
 
     def laws(kind: Any) -> list[Law]:
@@ -141,16 +153,16 @@ def _localize_part(
 
     def scalar_laws(kind: Any, only_in_modes: bool = False) -> tuple[Expression, ...]:
         chosen = [law for law in laws(kind) if law.options.modes or not only_in_modes]
-        found = [_call(part, law, functools.partial(_scalar, bound, law, graph)) for law in chosen]
+        found = [_call(part, law, functools.partial(_scalar, acting, law, graph)) for law in chosen]
         return tuple(one for one in found if not one.is_zero)
 
-    def listed_laws(kind: Any) -> list[Any]:
+    def listed_laws(kind: Any, bound: Any) -> list[Any]:
         return [one for law in laws(kind) for one in _call(part, law, functools.partial(_listed, bound, law))]
 
     potentials, dissipations = scalar_laws("potential"), scalar_laws("dissipation")
     switched = scalar_laws("potential", only_in_modes=True)
     _check_reads(part, connectors, potentials, dissipations)
-    inertias = listed_laws("inertia")
+    inertias = listed_laws("inertia", bound)
     joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws("joint"))
     own = [symbol for joint in joints for symbol in joint.coordinates]
     formulas = formulas_of(part, bound, own, graph) if space.name == "space" else {}
@@ -163,9 +175,9 @@ def _localize_part(
         body_inertias=tuple(one for one in inertias if isinstance(one, BodyInertia)),
         potentials=potentials,
         dissipations=dissipations,
-        loads=tuple(listed_laws("force")),
+        loads=tuple(listed_laws("force", acting)),
         constraints=(
-            *(one for law in laws("constraint") for one in _local_constraints(part, law, bound, graph)),
+            *(one for law in laws("constraint") for one in _local_constraints(part, law, acting, graph)),
             *counting_constraints(part, counted, formulas, graph),
         ),
         signal_symbols=signal_symbols,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from atwood.expr import Expression
 from atwood.model.binding import Binding
+from atwood.model.carried import Asked
 from atwood.model.contributions import BodyInertia, Load, Placement, PointInertia
 from atwood.model.flatten import Part
 from atwood.model.laws import Law
@@ -116,6 +117,11 @@ class LocalPart:
     formulas: Mapping[Expression, tuple[Expression, Expression | None]] = field(default_factory=dict)
     borrowed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     switched: tuple[Expression, ...] = ()
+
+    @property
+    def asks(self) -> list[str]:
+        """Connectors of which it asks for the inertia of the body that they are on, which is not known yet."""
+        return [name for name, one in self.binding.motions.items() if isinstance(one.body, Asked) and one.body.is_read]
 
     @property
     def velocities(self) -> list[Expression]:
