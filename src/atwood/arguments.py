@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from atwood.errors import AtwoodError, UsageError, suggestion
+from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
 
 __all__ = [
     "ANYTHING",
@@ -101,7 +101,9 @@ def takes(error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> Callable[[
                 args = (*read, *(check(kinds[rest], value, rest, where, error) if rest else value for value in further))
             for name, value in given.items():
                 if name not in kinds:
-                    raise error(f"it takes no {name!r}", where=where, advice=suggestion(name, names))
+                    close = suggestion(name, near_matches(name, names))
+                    advice = close or f"Its arguments are {', '.join(names)}."
+                    raise error(f"it takes no {name!r}", where=where, advice=advice)
                 given[name] = check(kinds[name], value, name, where, error)
             return function(*args, **given)
 
@@ -262,7 +264,7 @@ def each(kind: Kind, what: str, least: int = 0) -> Kind:
     """Return the kind of several values of a kind, which become a tuple; a single text is one of them."""
 
     def read(value: Any) -> tuple[Any, ...]:
-        if isinstance(value, (bytes, bytearray, Mapping)):
+        if isinstance(value, (bytes, bytearray)):
             raise Refused
         found = tuple(kind.read(one) for one in ((value,) if isinstance(value, str) else value))
         if len(found) < least:

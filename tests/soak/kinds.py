@@ -10,6 +10,7 @@ from collections.abc import Callable
 from .trial import Discarded, Finding, Trial
 
 KINDS = {
+    "arguments": "arguments",
     "files": "files",
 }
 """Name of a kind and its module, whose `check(seed)` makes a trial."""

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arguments import MAPPING, optional, takes
 from atwood.errors import ParameterError, UsageError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.collect import collect
@@ -170,6 +171,7 @@ class Assembly:
         """The values of the parameters."""
         return np.array([*self.mechanism.table.values.values(), *self.relation_values], dtype=float)
 
+    @takes(values=optional(MAPPING), start=optional(MAPPING), guess=optional(MAPPING))
     def with_values(
         self,
         values: Mapping[str, Any] | None = None,

@@ -24,12 +24,12 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arguments import FILE, instance, takes
+from atwood.arguments import FILE, check, instance, takes
 from atwood.errors import ResultError, UsageError, suggestion_in_parts
 from atwood.files import check_directory, check_readable, write_atomically
-from atwood.model.quantities import PATHS
+from atwood.model.quantities import PATH, PATHS
 from atwood.result.about import describe_run
-from atwood.result.result import Result
+from atwood.result.result import Result, output_number
 
 __all__ = ["SavedResult", "load_result", "save_result"]
 
@@ -77,7 +77,7 @@ class SavedResult:
         return self.meanings.get(self._known(path), "")
 
     def __contains__(self, path: object) -> bool:
-        return path in self.quantities
+        return isinstance(path, str) and path in self.quantities
 
     def __getitem__(self, path: str) -> FloatArray | dict[str, FloatArray]:
         """Return a quantity, or all quantities below a path.
@@ -87,6 +87,7 @@ class SavedResult:
         ResultError
             If there is nothing at this path.
         """
+        path = str(check(PATH, path, "path", "SavedResult"))
         if path in self.quantities:
             return self.quantities[path]
         cut = len(path) + 1
@@ -99,15 +100,18 @@ class SavedResult:
         """Return a quantity at the output times, shape (times,)."""
         return self.quantities[self._known(path)]
 
+    @takes(paths=PATHS)
     def table(self, paths: Iterable[str] | None = None) -> dict[str, FloatArray]:
         """Return quantities by path; all when no paths are given."""
         return {path: self.array(path) for path in (self.paths if paths is None else paths)}
 
     def at(self, index: int) -> dict[str, float]:
         """Return all quantities at one output time, by its number; -1 for the end."""
-        return {path: float(values[index]) for path, values in self.quantities.items()}
+        place = output_number(index, len(self.time))
+        return {path: float(values[place]) for path, values in self.quantities.items()}
 
-    def _known(self, path: str) -> str:
+    def _known(self, given: object) -> str:
+        path: str = check(PATH, given, "path", "SavedResult")
         if path not in self.quantities:
             raise ResultError("there is no such quantity", where=path, advice=suggestion_in_parts(path, self.paths))
         return path

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arguments import FILE, check, instance, takes, whole
 from atwood.errors import ResultError, suggestion_in_parts
 from atwood.expr import depends_on, substitute
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Constraint, Equations
 from atwood.mechanics.power import applied_power, switched_energy
-from atwood.model.quantities import Quantity
+from atwood.model.quantities import PATH, PATHS, Quantity
 from atwood.result.angles import unwrap
 from atwood.result.energy import EnergyLedger, make_ledger
 from atwood.solve.charts import Restated
@@ -33,12 +34,19 @@ from atwood.solve.record import Segment
 from atwood.solve.run import Run
 from atwood.solve.start import Start
 
-__all__ = ["Result"]
+__all__ = ["Result", "output_number"]
 
 FloatArray = NDArray[np.float64]
 
 
 _LONGER = "Give it more time; or assemble the scene first, and hand the assembly to several runs."
+
+
+def output_number(index: int, count: int) -> int:
+    """Return the number of an output time, or refuse one that there is not."""
+    last = count - 1
+    kind = whole(f"the number of an output time, 0 to {last}, or -1 to {-count} from the end", -count, last)
+    return int(check(kind, index, "index", "at", ResultError))
 
 
 def _moves_by_itself(equations: Equations, constraint: Constraint) -> bool:
@@ -61,6 +69,7 @@ class Result:
         What the solver gave.
     """
 
+    @takes(run=instance("a run, as solve.run makes it", Run))
     def __init__(self, run: Run) -> None:
         self.run = run
         self._cache: dict[str, FloatArray] = {}
@@ -184,9 +193,10 @@ class Result:
         """Return one line of meaning of a quantity."""
         return self.assembly.find_observables([self._known(path)])[0].doc
 
-    def __contains__(self, path: str) -> bool:
-        return path in self.assembly.observables
+    def __contains__(self, path: object) -> bool:
+        return isinstance(path, (str, Quantity)) and str(path) in self.assembly.observables
 
+    @takes(path=PATH)
     def __getitem__(self, path: str | Quantity) -> FloatArray | dict[str, FloatArray]:
         """Return a quantity at the output times, or all quantities below a path.
 
@@ -213,6 +223,7 @@ class Result:
         """
         return self.samples(self._known(path))[self._shown]
 
+    @takes(paths=PATHS)
     def table(self, paths: Iterable[str] | None = None) -> dict[str, FloatArray]:
         """Return quantities at the output times by path; all when no paths are given."""
         wanted = tuple(self.paths if paths is None else (self._known(path) for path in paths))
@@ -221,15 +232,18 @@ class Result:
 
     def at(self, index: int) -> dict[str, float]:
         """Return all quantities at one output time, by its number; -1 for the end."""
-        return {path: float(values[index]) for path, values in self.table().items()}
+        place = output_number(index, len(self.time))
+        return {path: float(values[place]) for path, values in self.table().items()}
 
     def samples(self, path: str) -> FloatArray:
         """Return a quantity at all samples of the run, outputs and others."""
+        path = self._known(path)
         if path not in self._cache:
             self._fill((path,))
         return self._cache[path]
 
-    def _known(self, path: str) -> str:
+    def _known(self, given: object) -> str:
+        path: str = check(PATH, given, "path", "Result")
         if path not in self:
             raise ResultError("there is no such quantity", where=path, advice=suggestion_in_parts(path, self.paths))
         return path
@@ -405,6 +419,7 @@ class Result:
 
     # -- keeping and showing --------------------------------------------------------------------------------------
 
+    @takes(file=FILE, paths=PATHS)
     def save(self, file: str | os.PathLike[str], paths: Iterable[str] | None = None) -> Path:
         """Save trajectories as NetCDF-3 (``.nc``), NumPy (``.npz``) or ``.csv``; see `atwood.load_result`.
 

@@ -90,7 +90,7 @@ OUTPUTS = either(
     Kind("the times themselves, s, finite and rising", _times),
 )
 LIMITS = {
-    "max_steps": optional(whole("a whole number of steps, at least 1", 1)),
+    "max_steps": optional(whole("a whole number of steps, at least 1", 1, 10**18)),
     "max_seconds": optional(number("a number of seconds above 0", above=0.0)),
 }
 SAMPLES = whole(f"a whole number of samples, 1 to {_MOST:,}", 1, _MOST)

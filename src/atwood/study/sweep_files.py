@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from atwood.arguments import FILE, instance, takes
 from atwood.errors import UsageError
 from atwood.files import check_directory, write_atomically
 from atwood.study.sweep_result import Sweep
@@ -18,6 +19,7 @@ from atwood.study.sweep_result import Sweep
 __all__ = ["check_sweep_target", "save_sweep"]
 
 
+@takes(sweep=instance("a Sweep", Sweep), file=FILE)
 def save_sweep(sweep: Sweep, file: str | os.PathLike[str]) -> Path:
     """Save a sweep.
 

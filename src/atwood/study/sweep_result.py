@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arguments import check
 from atwood.errors import ResultError, near_matches, suggestion
+from atwood.model.quantities import PATH
 
 __all__ = ["Sweep", "SweepStatistics"]
 
@@ -128,7 +130,7 @@ class Sweep:
         ResultError
             If it was not kept.
         """
-        path = str(path)
+        path = str(check(PATH, path, "path", "Sweep"))
         if path not in self.quantities:
             kept = suggestion(path, near_matches(path, self.paths)) or f"It kept {', '.join(self.paths[:12])}."
             advice = f"{kept} Whatever else a sweep keeps is said with its argument quantities."
@@ -147,6 +149,7 @@ class Sweep:
     def axis(self, path: str) -> NDArray[Any]:
         """Return the values of one axis of the grid."""
         varied = self.varied
+        path = str(check(PATH, path, "path", "Sweep.axis"))
         if path not in varied:
             raise ResultError("this was not varied", where=path, advice=suggestion(path, varied))
         if len(self.shape) == 1:

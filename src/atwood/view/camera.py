@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from atwood.arguments import show
 from atwood.errors import UsageError
 
 __all__ = ["DEFAULT_VIEW", "Camera", "View", "as_camera", "check_view"]
@@ -95,10 +96,10 @@ def as_camera(view: View | None) -> Camera:
     given = DEFAULT_VIEW if view is None else view
     try:
         numbers = [float(number) for number in (given.split(",") if isinstance(given, str) else given)]
-    except (TypeError, ValueError):
+    except Exception:  # what is no sequence of numbers may raise anything
         numbers = []
     if len(numbers) != 2 or not all(math.isfinite(number) for number in numbers):
-        raise UsageError(f"{view!r} is no direction to look from", where="view", advice=_ADVICE)
+        raise UsageError(f"{show(view)} is no direction to look from", where="view", advice=_ADVICE)
     azimuth, elevation = numbers
     if abs(elevation) > 90.0:
         advice = "It lies between -90, straight from below, and 90, straight from above; first comes the azimuth."

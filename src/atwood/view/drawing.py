@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arguments import ANYTHING, FILE, TEXT, each, instance, number, optional, takes, whole
 from atwood.errors import UsageError
 from atwood.files import write_atomically
 from atwood.result.result import Result
@@ -29,6 +30,12 @@ __all__ = ["animate", "plot_mechanism"]
 FloatArray = NDArray[np.float64]
 
 
+RESULT = instance("a Result, as simulate returns it", Result)
+TRACE = each(TEXT, "the paths of connectors, such as 'rod2.b'")
+TIMES = optional(each(number(), "a list of times, s", 1))
+
+
+@takes(result=RESULT, file=optional(FILE), times=TIMES, view=ANYTHING, trace=TRACE)
 def plot_mechanism(
     result: Result,
     file: str | os.PathLike[str] | None = None,
@@ -125,8 +132,8 @@ def _draw_traces(axes: Axes, picture: Picture, pen: Pen, shown: slice, traced: S
     chosen = moving if len(moving) <= _TRACES else moving[-1:]
     for shape in chosen:
         draw_trace(axes, picture.points[shape.nodes[0]][shown], pen.colour(shape))
-    for number, node in enumerate(traced):
-        draw_trace(axes, picture.points[node][shown], COLOURS[(4 + number) % len(COLOURS)])
+    for rank, node in enumerate(traced):
+        draw_trace(axes, picture.points[node][shown], COLOURS[(4 + rank) % len(COLOURS)])
 
 
 _TRACES = 4
@@ -155,6 +162,18 @@ def _draw_apart(result: Result, picture: Picture, moments: Sequence[int], traced
     return figure
 
 
+_LONGEST, _MOST = 3600.0, 240
+"""Seconds, and frames in a second, of an animated picture."""
+
+
+@takes(
+    result=RESULT,
+    file=FILE,
+    seconds=optional(number("a number of seconds, above 0 and at most an hour", above=0.0, most=_LONGEST)),
+    frames_per_second=whole(f"a whole number of frames, 1 to {_MOST}", 1, _MOST),
+    view=ANYTHING,
+    trace=TRACE,
+)
 def animate(
     result: Result,
     file: str | os.PathLike[str],

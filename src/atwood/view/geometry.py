@@ -125,7 +125,7 @@ def find_connectors(result: Result, paths: str | Sequence[str]) -> dict[str, int
     found = {}
     nodes = result.assembly.mechanism.graph.node_of
     known = {f"{part}.{name}": node for (part, name), node in nodes.items()}
-    for path in [paths] if isinstance(paths, str) else paths:
+    for path in paths:
         below = [one for one in known if one == path or one.rpartition(".")[0] == path]
         if len(below) > 1:
             raise UsageError("it has several connectors", where=path, advice=f"Choose one: {', '.join(below)}.")

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arguments import FILE, instance, optional, takes
 from atwood.errors import ResultError
+from atwood.model.quantities import PATHS
 from atwood.result.files import SavedResult
 from atwood.result.result import Result
 from atwood.view.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
@@ -39,6 +41,11 @@ _QUANTITIES = {
 }
 
 
+@takes(
+    result=instance("a result, as simulate or load_result returns it", Result, SavedResult),
+    paths=PATHS,
+    file=optional(FILE),
+)
 def plot(
     result: Result | SavedResult, paths: Iterable[str] | None = None, file: str | os.PathLike[str] | None = None
 ) -> Figure:
@@ -117,7 +124,7 @@ def _default(result: Result | SavedResult) -> list[str]:
 def _expand(result: Result | SavedResult, paths: Iterable[str]) -> list[str]:
     """Return paths with those of components replaced by all below them."""
     found: list[str] = []
-    for path in [paths] if isinstance(paths, str) else paths:
+    for path in paths:
         value = result[path]
         found += [f"{path}.{name}" for name in value] if isinstance(value, dict) else [path]
     return list(dict.fromkeys(found))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
+from atwood.arguments import FILE, instance, optional, takes
 from atwood.study.compare import Comparison, ComparisonRow
 from atwood.view.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
 
@@ -17,6 +18,7 @@ __all__ = ["plot_comparison"]
 _MARKERS = ("o", "s", "D", "^", "v")
 
 
+@takes(comparison=instance("a Comparison, as compare returns it", Comparison), file=optional(FILE))
 def plot_comparison(comparison: Comparison, file: str | os.PathLike[str] | None = None) -> Figure:
     """Draw error against time and against steps, one line for each form and level.
 

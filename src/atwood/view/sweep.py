@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from atwood.arguments import FILE, instance, optional, takes
 from atwood.errors import UsageError
+from atwood.model.quantities import PATHS
 from atwood.study.sweep_result import Sweep
 from atwood.view.canvas import COLOURS, INK, new_figure, polish, save_figure
 
@@ -21,6 +23,7 @@ __all__ = ["plot_sweep"]
 _PANELS = 6
 
 
+@takes(sweep=instance("a Sweep, as sweep returns it", Sweep), paths=PATHS, file=optional(FILE))
 def plot_sweep(sweep: Sweep, paths: Iterable[str] | None = None, file: str | os.PathLike[str] | None = None) -> Figure:
     """Draw quantities at the end of all runs, one panel for each.
 
@@ -46,7 +49,7 @@ def plot_sweep(sweep: Sweep, paths: Iterable[str] | None = None, file: str | os.
     UsageError
         If matplotlib is missing, words alone were varied, or there are more quantities than there is room for.
     """
-    wanted = [paths] if isinstance(paths, str) else list(paths or sweep.paths[:_PANELS])
+    wanted = list(paths or sweep.paths[:_PANELS])
     if not 1 <= len(wanted) <= _PANELS:
         raise UsageError(f"there is room for 1 to {_PANELS} quantities, not {len(wanted)}", where=sweep.scene)
     numbers = [path for path, values in sweep.varied.items() if values.dtype.kind == "f"]
