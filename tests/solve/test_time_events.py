@@ -28,7 +28,9 @@ from atwood import (
 from atwood.errors import SolveError
 from atwood.pipeline import assemble
 from atwood.solve.breaks import find_schedule
-from atwood_library import Drive, Force, Ground, PointMass, Rod
+from atwood_library import Drive, Force, Ground, Link, Pivot, PointMass, Rod, RotaryDrive
+
+from ..helpers.runs import FORMS
 
 SOLVERS = [
     *(("reduced", solver) for solver in ("ida", "ida-sundae", "explicit", "taylor")),
@@ -202,11 +204,91 @@ def test_a_jump_in_a_prescribed_position_is_refused_by_name(form: str, solver: s
     assert caught.value.where.startswith("drive.")
 
 
-@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("form", FORMS)
 def test_a_jump_in_a_prescribed_acceleration_is_no_event_of_its_own(form: str) -> None:
     result = simulate(driven(lambda t: select(t < 0.5, 0.0, (t - 0.5) ** 2)), form=form, rtol=1e-9)
     assert not result.happenings
     assert result.energy.max_drift < 1e-7
+
+
+def two_links(space: str, rotation: Function, size: float = 1.0, mass: float = 1.0) -> Scene:
+    """A link that is turned as prescribed, and one that hangs on its end."""
+    scene = Scene(gravity=9.81 * size, t_end=1.0, space=space)
+    ground, drive = scene.add("ground", Ground()), scene.add("drive", RotaryDrive(rotation=rotation))
+    axial = {"axial_moment": 1e-2 * mass * size**2} if space == "space" else {}
+    first = scene.add("first", Link(length=size, mass=mass, **axial))
+    second = scene.add("second", Link(length=0.5 * size, mass=mass, **axial))
+    pivot = scene.add("pivot", Pivot(axis=(0.0, -0.6, 0.8) if space == "space" else (0.0, -1.0, 0.0)))
+    for a, b in (
+        (ground.frame, drive.a),
+        (drive.b, first.a),
+        (first.b, pivot.a),
+        (pivot.b, second.a),
+    ):
+        scene.connect(a, b)
+    return scene
+
+
+@pytest.mark.parametrize("space", ["plane", "space"])
+@pytest.mark.parametrize(("size", "mass"), [(1.0, 1.0), (1e-3, 1e-6), (1e3, 1e6)])
+def test_a_motor_that_stops_at_once_is_the_same_impact_in_every_form_and_size(
+    space: str, size: float, mass: float
+) -> None:
+    rotation = lambda t: select(t < 0.5, 2.0 * t, 1.0)  # noqa: E731
+    results = [simulate(two_links(space, rotation, size, mass), form=form, rtol=1e-9) for form in FORMS]
+    for result in results:
+        before, after = (i for i, t in enumerate(result.time) if t == 0.5)
+        speeds = result.array("pivot.angular_velocity")
+        assert abs(speeds[after] - speeds[before]) > 0.01
+        assert result.energy.max_drift < 1e-6
+        np.testing.assert_allclose(speeds, results[0].array("pivot.angular_velocity"), atol=1e-4)
+    if space == "plane":  # about the pivot, where the impulse acts, the second link keeps its angular momentum
+        turned, rates = (results[0].array(f"second.{name}") for name in ("angle", "angular_velocity"))
+        x, z = (results[0].array(f"second.velocity.{axis}") for axis in "xz")
+        momentum = rates * (0.5 * size) ** 2 / 12.0 + 0.25 * size * (z * np.cos(turned) - x * np.sin(turned))
+        np.testing.assert_allclose(momentum[after], momentum[before], rtol=1e-7)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("space", "jump"), [("plane", 0.1), ("plane", math.pi), ("space", 0.1), ("space", math.pi)])
+def test_a_motor_that_jumps_is_refused_also_by_half_a_turn(form: str, space: str, jump: float) -> None:
+    with pytest.raises(SolveError, match=r"t = 0\.5 .*jumps") as caught:
+        simulate(two_links(space, lambda t: select(t < 0.5, 0.0, jump)), form=form)
+    assert caught.value.where.startswith("drive.")
+
+
+@pytest.mark.parametrize("space", ["plane", "space"])
+def test_a_motor_in_a_loop_may_turn_back_at_once(space: str) -> None:
+    def rows(form: str) -> np.ndarray:
+        scene = Scene(t_end=1.0, space=space)
+        left, right = scene.add("left", Ground()), scene.add("right", Ground(position=(2.5, 0.0, 0.0)))
+        drive = RotaryDrive(axis=(0.0, -1.0, 0.0), rotation=lambda t: 1.0 + select(t < 0.5, t, 1.5 - 2.0 * t))
+        drive = scene.add("drive", drive)
+        axial = {"axial_moment": 1e-2} if space == "space" else {}
+        links = [
+            scene.add(name, Link(length=length, mass=0.1 * length, **axial))
+            for name, length in (("crank", 1.0), ("coupler", 2.5), ("rocker", 2.0))
+        ]
+        pivots = [scene.add(name, Pivot(axis=(0.0, -1.0, 0.0))) for name in ("pivot2", "pivot3", "pivot4")]
+        for a, b in (
+            (left.frame, drive.a),
+            (drive.b, links[0].a),
+            (links[0].b, pivots[0].a),
+            (pivots[0].b, links[1].a),
+            (links[1].b, pivots[1].a),
+            (pivots[1].b, links[2].b),
+            (links[2].a, pivots[2].b),
+            (pivots[2].a, right.frame),
+        ):
+            scene.connect(a, b)
+        scene.guess.update({"pivot2.angle": -0.7, "pivot4.angle": 1.9})
+        result = simulate(scene, form=form, rtol=1e-9)
+        assert len(result.happenings) == 1
+        return result.array("pivot4.angular_velocity")
+
+    speeds = rows("reduced")
+    np.testing.assert_allclose(rows("dae"), speeds, rtol=1e-7, atol=1e-7)
+    assert abs(speeds[101] + 2.0 * speeds[100]) < 1e-9
 
 
 def test_switching_without_end_is_refused_by_name() -> None:

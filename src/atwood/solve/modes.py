@@ -18,9 +18,9 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import event_program
 from atwood.forms.places import to_maximal
 from atwood.mechanics.watches import Watch, list_watches
-from atwood.solve.balance import Balance, BalanceValues, balance_of, least_norm
+from atwood.solve.balance import Balance, BalanceValues, balance_of, least_norm, row_scales
 from atwood.solve.charts import CHART, Reassemble, chart_watches, enter_charts
-from atwood.solve.matrices import is_full, to_array
+from atwood.solve.matrices import is_full, scaled, to_array
 from atwood.solve.problem import Plan
 from atwood.solve.reactions import ReactionSolver, maximal_state
 from atwood.solve.scales import motion_scales
@@ -250,7 +250,7 @@ def enter_mode(
     if happening.impact:
         met, _ = balance.project(t, big_q, big_u, sizes)
         _check_in_place(happening, balance.turning.difference(t, big_q, met) / sizes)
-        big_u = plastic_impact(after, balance, happening, t, met, big_u)
+        big_u = plastic_impact(after, balance, happening, (t, met, big_u), sizes)
         big_q = met
     if after.form == "dae":
         return after, big_q, big_u
@@ -275,17 +275,30 @@ def _check_in_place(happening: Happening, moved: FloatArray) -> None:
 
 
 def plastic_impact(
-    after: Assembly, balance: Balance, happening: Happening, t: float, q: FloatArray, u: FloatArray
+    after: Assembly,
+    balance: Balance,
+    happening: Happening,
+    state: tuple[float, FloatArray, FloatArray],
+    sizes: FloatArray,
 ) -> FloatArray:
     """Return the velocities after an impact: the nearest admissible ones in the metric of the masses.
 
     Impulses act along the constraints only: ``M (u+ - u-) = G^T Lambda``, ``G u+ + g_t = 0``. What has modes, as a rope
     has, can only pull: an impact that would make it push is refused.
+
+    Parameters
+    ----------
+    after, balance
+        The scene after the impact, and its balance of forces in maximal coordinates.
+    happening
+        What the impact is told as.
+    state
+        Time, coordinates and speeds just before it, in maximal coordinates.
+    sizes
+        Size of a displacement along each speed.
     """
-    now = balance.at(t, q, u)
-    n = len(u)
-    solution = _solve_impact(now, u)
-    impulses = solution[n:]
+    t, q, u = state
+    velocities, impulses = _solve_impact(balance.at(t, q, u), u, sizes)
     size = float(np.max(np.abs(impulses), initial=0.0))
     for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
         if one.key[0] in after.modes and one.sign * impulse < -1e-9 * size:
@@ -294,21 +307,28 @@ def plastic_impact(
                 where=one.key[0],
                 advice="Several ropes that jerk at once, of which some go slack, cannot be solved yet.",
             )
-    return solution[:n]
+    return velocities
 
 
-def _solve_impact(now: BalanceValues, u: FloatArray) -> FloatArray:
-    """Return velocities after an impact, and impulses: those of least size where constraints depend on each other."""
+def _solve_impact(now: BalanceValues, u: FloatArray, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return velocities after an impact, and impulses: those of least size where constraints depend on each other.
+
+    All is written in displacements of the scene's size, and impulses come out as their work along these: what is small
+    beside the rest is then small in truth, and not in its unit.
+    """
+    rows = row_scales(now.slope, sizes)
     if not is_full(now.mass):
         from atwood.solve.sparse import solve_bordered
 
         solved = solve_bordered(now.mass, now.slope, -(now.mass @ u), now.drift)
         if solved is not None:
-            return np.concatenate(solved)
-    m = len(now.gamma)
-    mass, slope = to_array(now.mass), to_array(now.slope)
+            return solved[0], solved[1] * rows
+    m, n = len(now.gamma), len(u)
+    mass, slope = sizes[:, None] * to_array(now.mass) * sizes, to_array(scaled(now.slope, sizes, rows))
+    mass = mass / (np.max(np.abs(mass), initial=0.0) or 1.0)
     matrix = np.block([[mass, -slope.T], [slope, np.zeros((m, m))]])
-    return np.asarray(np.linalg.lstsq(matrix, np.concatenate([mass @ u, -now.drift]), rcond=1e-12)[0])
+    found = np.linalg.lstsq(matrix, np.concatenate([mass @ (u / sizes), -now.drift / rows]), rcond=1e-12)[0]
+    return found[:n] * sizes, found[n:]
 
 
 def _to_reduced(

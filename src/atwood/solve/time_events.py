@@ -15,6 +15,7 @@ from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Constraint
 from atwood.solve.balance import balance_of, row_scales
+from atwood.solve.matrices import to_array
 from atwood.solve.modes import Happening, generalized_speeds, plastic_impact
 from atwood.solve.reactions import maximal_state
 from atwood.solve.scales import motion_scales
@@ -69,13 +70,20 @@ def pass_time_event(
             where=constraints[worst].label,
             advice="Prescribe a motion that is continuous; its speed may jump, which is an impact.",
         )
+    turned_over = np.flatnonzero(np.sum(to_array(now.slope) * to_array(was.slope), axis=1) < 0.0)
+    if len(turned_over):  # as after a jump by half a turn, at which the sine of an angle is zero again
+        raise SolveError(
+            f"at t = {t:.9g} its prescribed motion jumps by more than a quarter turn",
+            where=constraints[int(turned_over[0])].label,
+            advice="Prescribe a motion that is continuous; its speed may jump, which is an impact.",
+        )
     fastest = max(float(np.max(np.abs(x), initial=0.0)) for x in (big_u / sizes, was.drift / rows, now.drift / rows))
     missed = np.abs(now.rate - was.rate) / rows
     if np.max(missed, initial=0.0) <= _SAME_SPEED * fastest:
         return q, u, None
     path, law, _ = constraints[int(np.argmax(missed))].key
     happening = Happening(t, path, law, "the speed of the prescribed motion jumps: an impact", "", True)
-    big_u = plastic_impact(after, balance, happening, t, big_q, big_u)
+    big_u = plastic_impact(after, balance, happening, (t, big_q, big_u), sizes)
     left = np.abs(now.slope @ big_u + now.drift) / rows
     if np.max(left) > _HOLDS * fastest:
         raise SolveError(
