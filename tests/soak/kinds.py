@@ -12,6 +12,7 @@ from .trial import Discarded, Finding, Trial
 KINDS = {
     "arguments": "arguments",
     "files": "files",
+    "scenes": "scenes",
 }
 """Name of a kind and its module, whose `check(seed)` makes a trial."""
 

@@ -1,0 +1,204 @@
+"""Atwood's scene of a described mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import atwood_library as lib
+from atwood import Component, Scene, sin
+
+from .description import Array, Body, Mechanism, Mount, Signal, Tie, axis_and_angle, rotation
+
+POINTS = {
+    "spring": ("a", "b"),
+    "damper": ("a", "b"),
+    "rod": ("a", "b"),
+    "drag": ("point",),
+    "point_on_line": ("b",),
+    "point_on_plane": ("b",),
+    "point_on_circle": ("b",),
+}
+"""Connectors that are points, which a material point can be joined to."""
+
+
+def class_name(sort: str) -> str:
+    """Return the name of the library's part."""
+    return "".join(word.capitalize() for word in sort.split("_"))
+
+
+def connectors(tie: Tie) -> tuple[str, ...]:
+    """Return the connectors of a part in the order of the tie's mounts."""
+    if tie.sort == "drag":
+        return ("point",)
+    if tie.sort == "force":
+        return {"world": ("point",), "body": ("frame",), "other": ("point", "other")}[tie.values["resolved_in"]]
+    if tie.sort == "torque":
+        return ("frame", "other")[: len(tie.mounts)]
+    if tie.sort == "central_gravity":
+        return ("source", "point")
+    return ("a", "b")
+
+
+def build_scene(mechanism: Mechanism, start: str = "all") -> Scene:
+    """Return the scene.
+
+    Parameters
+    ----------
+    mechanism
+        What to build.
+    start
+        ``"all"``: places and speeds of all bodies are said exactly. ``"guess"``: places are guessed, and speeds are not
+        said.
+    """
+    scene = Scene(space=mechanism.space, gravity=mechanism.gravity, line_axis=tuple(mechanism.line))
+    for body in mechanism.bodies:
+        scene.add(body.name, _part_of(body))
+    for tie in mechanism.ties:
+        _add_tie(scene, mechanism, tie)
+    for body in mechanism.bodies:
+        places, speeds = start_values(mechanism, body)
+        (scene.guess if start == "guess" else scene.start).update(places)
+        if start != "guess":
+            scene.start.update(speeds)
+    return scene
+
+
+def plane_angles(mechanism: Mechanism) -> dict[str, float]:
+    """Return the angle of each body in a plane, counter-clockwise, with turns that fit those of the joints it hangs on.
+
+    In a plane angles are absolute and count turns: along a joint, the angle of a body is that of the other one, plus
+    what welds and the joint turn, which are within half a turn each.
+    """
+    found = {"": 0.0}
+    for body in mechanism.bodies:
+        angle = _counter_clockwise(body.rotation)
+        hung = next((tie for tie in mechanism.ties if tie.mounts and tie.mounts[-1].body == body.name), None)
+        if hung is not None and hung.sort in ("pivot", "slider", "weld", "drive", "rotary_drive"):
+            a, b = hung.mounts
+            if a.body in found:
+                joint = _counter_clockwise((mechanism.turned(a)).T @ mechanism.turned(b))
+                hangs = found[a.body] + _counter_clockwise(a.rotation) + joint - _counter_clockwise(b.rotation)
+                angle += 2.0 * np.pi * round((hangs - angle) / (2.0 * np.pi))
+        found[body.name] = angle
+    return found
+
+
+def _counter_clockwise(matrix: Array) -> float:
+    axis, angle = axis_and_angle(matrix)
+    return -angle * float(np.sign(axis[1]))
+
+
+def _part_of(body: Body) -> Component:
+    if body.inertia is None:
+        return lib.PointMass(mass=body.mass)
+    j = body.inertia
+    return lib.RigidBody(
+        mass=body.mass,
+        center=tuple(body.center),
+        moments=(j[0, 0], j[1, 1], j[2, 2]),
+        products=(j[0, 1], j[0, 2], j[1, 2]),
+    )
+
+
+def moving_axes(mechanism: Mechanism) -> str:
+    """Return the axes along which bodies can move; a line is along one of them."""
+    return {"space": "xyz", "plane": "xz"}.get(mechanism.space, "xyz"[int(np.argmax(np.abs(mechanism.line)))])
+
+
+def start_values(mechanism: Mechanism, body: Body) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the start values of a body's place and of its speeds, by path."""
+    arm = body.rotation @ body.center
+    center, velocity = body.position + arm, body.velocity + np.cross(body.spin, arm)
+    axes = moving_axes(mechanism)
+    places = {f"{body.name}.position.{a}": float(center["xyz".index(a)]) for a in axes}
+    speeds = {f"{body.name}.velocity.{a}": float(velocity["xyz".index(a)]) for a in axes}
+    if body.is_point or mechanism.space == "line":
+        return places, speeds
+    if mechanism.space == "plane":
+        places[f"{body.name}.angle"] = plane_angles(mechanism)[body.name]
+        speeds[f"{body.name}.angular_speed"] = -float(body.spin[1])
+        return places, speeds
+    for k, name in enumerate(("x_axis", "y_axis", "z_axis")):
+        places.update({f"{body.name}.{name}.{a}": float(body.rotation[i, k]) for i, a in enumerate("xyz")})
+    speeds.update({f"{body.name}.angular_velocity.{a}": float(body.spin[i]) for i, a in enumerate("xyz")})
+    return places, speeds
+
+
+def _value(value: Any) -> Any:
+    if isinstance(value, Signal):
+        if not value.amplitude and not value.slope:
+            return value.offset
+        return _function(value)
+    return tuple(float(x) for x in value) if isinstance(value, np.ndarray) else value
+
+
+def _function(signal: Signal) -> Callable[[Any], Any]:
+    return lambda t: (
+        signal.offset + signal.slope * t + signal.amplitude * sin(signal.frequency * t + signal.phase)
+        if signal.slope
+        else signal.offset + signal.amplitude * sin(signal.frequency * t + signal.phase)
+    )
+
+
+def _add_tie(scene: Scene, mechanism: Mechanism, tie: Tie) -> None:
+    values = {name: _value(value) for name, value in tie.values.items()}
+    if tie.grips:
+        part = scene.add(tie.name, getattr(lib, class_name(tie.sort))(**values))
+        names = {"rack_and_pinion": ("rack", "pinion"), "planetary_gear": ("sun", "carrier", "ring")}
+        for name, (joint, coordinate) in zip(names.get(tie.sort, ("a", "b")), tie.grips, strict=True):
+            scene.connect(getattr(part, name), getattr(scene[joint], grip(coordinate)))
+        return
+    if tie.sort == "rope":
+        part = scene.add(tie.name, lib.Rope(pulleys=len(tie.mounts) - 2, **values))
+        ends = [part.a, *part.over, part.b]
+        for i, (end, mount) in enumerate(zip(ends, tie.mounts, strict=True)):
+            at = _mounted(scene, mechanism, mount, f"{tie.name}_{i}", as_point=True)
+            if 0 < i < len(ends) - 1:
+                pulley = scene.add(f"{tie.name}_pulley{i}", lib.Pulley())
+                scene.connect(at, pulley.center)
+                at = pulley.groove
+            scene.connect(at, end)
+        return
+    part = scene.add(tie.name, getattr(lib, class_name(tie.sort))(**values))
+    for name, mount in zip(connectors(tie), tie.mounts, strict=True):
+        as_point = name in POINTS.get(tie.sort, ()) or name in ("point", "source")
+        at = _mounted(scene, mechanism, mount, f"{tie.name}_{name}", as_point)
+        scene.connect(at, getattr(part, name))
+
+
+def grip(coordinate: str) -> str:
+    """Return the connector by which a gear takes hold of a coordinate."""
+    return {"angle": "shaft", "angle_a": "shaft_a", "angle_b": "shaft_b", "displacement": "carriage"}[coordinate]
+
+
+def _mounted(scene: Scene, mechanism: Mechanism, mount: Mount, name: str, as_point: bool) -> Any:
+    """Return the connector at a mount; what is not at a body's frame is at a weld of its own."""
+    axis, angle = axis_and_angle(mount.rotation)
+    if not mount.body:
+        at = scene.add(f"{name}_ground", lib.Ground(position=tuple(map(float, mount.position)))).frame
+        shift: Array = np.zeros(3)
+    else:
+        body = scene[mount.body]
+        if mechanism.body(mount.body).is_point:
+            return body.point
+        at, shift = body.frame, mount.position
+    angle = 0.0 if as_point else angle
+    if angle < 1e-15 and not np.any(shift):
+        return at
+    weld = scene.add(
+        f"{name}_weld",
+        lib.Weld(displacement=tuple(map(float, shift)), **_turn(mechanism.space, axis, angle)),
+    )
+    scene.connect(at, weld.a)
+    return weld.b
+
+
+def _turn(space: str, axis: Array, angle: float) -> dict[str, Any]:
+    if angle < 1e-15:
+        return {}
+    if space == "space":
+        return {"angle": angle, "axis": tuple(map(float, axis))}
+    return {"angle": _counter_clockwise(rotation(axis, angle))}

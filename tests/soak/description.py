@@ -1,0 +1,176 @@
+"""The neutral description of a mechanism, from which both Atwood's scene and the oracle's system are built.
+
+Everything is in space, also for scenes in a plane (x-z) or on a line: plain numbers in SI units, and rotation matrices
+whose columns are the axes of a frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+WORLD = ""
+"""The body that a mount in the world is on."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body or a material point, and how it starts.
+
+    Parameters
+    ----------
+    name
+        Unlike all others.
+    mass, center, inertia
+        Mass, centre of mass in the body's frame, and inertia tensor about it in its axes; None for a material point.
+    position, rotation
+        Of the body's frame in the world.
+    velocity, spin
+        Of the body's frame: velocity of its origin, and angular velocity in world axes.
+    """
+
+    name: str
+    mass: float
+    position: Array
+    velocity: Array
+    center: Array = field(default_factory=lambda: np.zeros(3))
+    inertia: Array | None = None
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    spin: Array = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def is_point(self) -> bool:
+        """Whether it has no orientation."""
+        return self.inertia is None
+
+
+@dataclass(frozen=True)
+class Mount:
+    """A frame that is fixed in a body, or in the world."""
+
+    body: str
+    position: Array
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A function of time, ``offset + slope t + amplitude sin(frequency t + phase)``."""
+
+    offset: float = 0.0
+    slope: float = 0.0
+    amplitude: float = 0.0
+    frequency: float = 1.0
+    phase: float = 0.0
+
+    def at(self, t: Any) -> Any:
+        """Return the value; `t` may be complex."""
+        return self.offset + self.slope * t + self.amplitude * np.sin(self.frequency * t + self.phase)
+
+    def rate(self, t: Any) -> Any:
+        """Return the derivative."""
+        return self.slope + self.amplitude * self.frequency * np.cos(self.frequency * t + self.phase)
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A joint or a force between mounts.
+
+    Parameters
+    ----------
+    name
+        Unlike all others.
+    sort
+        The name of the library's part in small letters, such as ``"pivot"``.
+    mounts
+        Where it is: frame a and frame b, mostly.
+    values
+        Parameters by the names that the library has; axes are unit vectors, functions of time are `Signal`.
+    grips
+        Of gears: the coordinates that they hold, as pairs of a joint's name and a coordinate's.
+    """
+
+    name: str
+    sort: str
+    mounts: tuple[Mount, ...] = ()
+    values: dict[str, Any] = field(default_factory=dict)
+    grips: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Bodies and what ties them together.
+
+    Parameters
+    ----------
+    space
+        ``"line"`` (along x), ``"plane"`` (x-z) or ``"space"``.
+    gravity
+        Along -z.
+    """
+
+    space: str
+    gravity: float
+    bodies: tuple[Body, ...]
+    ties: tuple[Tie, ...]
+    line: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+
+    def body(self, name: str) -> Body:
+        """Return the body of a name."""
+        return next(body for body in self.bodies if body.name == name)
+
+    def turned(self, mount: Mount) -> Array:
+        """Return the rotation of a mount in the world."""
+        return (self.body(mount.body).rotation if mount.body else np.eye(3)) @ mount.rotation
+
+    def tie(self, name: str) -> Tie:
+        """Return the tie of a name."""
+        return next(tie for tie in self.ties if tie.name == name)
+
+
+def outline(mechanism: Mechanism) -> str:
+    """Return in a few lines what ties which bodies together; all numbers follow from the seed."""
+    lines = [f"{mechanism.space}, gravity {mechanism.gravity:g}, {', '.join(body.name for body in mechanism.bodies)}"]
+    for tie in mechanism.ties:
+        between = [mount.body or "world" for mount in tie.mounts] or [".".join(grip) for grip in tie.grips]
+        more = ", ".join(name for name in tie.values if name not in ("axis", "length"))
+        lines.append(f"  {tie.name}: {' - '.join(between)} {more}")
+    return "\n".join(lines)
+
+
+def cross_matrix(v: Array) -> Array:
+    """Return the matrix of the cross product with a vector from the left."""
+    return np.array([[0.0 * v[0], -v[2], v[1]], [v[2], 0.0 * v[0], -v[0]], [-v[1], v[0], 0.0 * v[0]]])
+
+
+def rotation(axis: Array, angle: float) -> Array:
+    """Return the rotation about a unit vector by an angle (Rodrigues' formula)."""
+    k = cross_matrix(axis)
+    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
+
+
+def axis_and_angle(matrix: Array) -> tuple[Array, float]:
+    """Return the unit vector and the angle of a rotation, which is at least zero."""
+    vee = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+    angle = float(np.arctan2(np.linalg.norm(vee), np.trace(matrix) - 1.0))
+    if angle < 1e-300:
+        return np.array([0.0, 0.0, 1.0]), 0.0
+    if angle < 3.0:
+        return vee / np.linalg.norm(vee), angle
+    symmetric = matrix + matrix.T + (1.0 - np.trace(matrix)) * np.eye(3)  # (3 - tr) n n^T
+    n = symmetric[:, int(np.argmax(np.diag(symmetric)))]
+    n = n / np.linalg.norm(n)
+    return (n if n @ vee >= 0.0 else -n), angle
+
+
+def normals(axis: Array) -> tuple[Array, Array]:
+    """Return the two normals of an axis by the convention that the library's parts document."""
+    helper = np.eye(3)[(int(np.argmax(np.abs(axis))) + 1) % 3]
+    first = helper - axis * (axis @ helper)
+    first = first / np.linalg.norm(first)
+    return first, np.cross(axis, first)

@@ -1,0 +1,41 @@
+"""A few trials of each kind with fixed seeds; thousands are made by `python -m tests.soak`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from .draw import draw
+from .oracle import STEP, Oracle
+from .scenes import Way, check_mechanism
+from .trial import Discarded
+
+WAYS = Way("reduced", solver="ida-sundae"), Way("dae", solver="ida-sundae")
+
+
+@pytest.mark.parametrize("seed", [1, 2, 10, 16, 23, 42])
+def test_scenes_agree_with_the_oracle(seed: int) -> None:
+    trial = check_mechanism(draw(seed), WAYS)
+    assert "compared reduced" in trial.tried
+    assert "compared dae" in trial.tried
+    assert not trial.findings, trial.findings[0].detail
+
+
+def test_the_oracle_is_consistent_by_itself() -> None:
+    """The rows on the speeds are the rates of what the constraints hold, by complex steps along the motion."""
+    looked_at = 0
+    for seed in range(40):
+        try:
+            mechanism = draw(seed)
+        except Discarded:
+            continue
+        oracle = Oracle(mechanism)
+        place, speeds = oracle.start()
+        values, rows, rates = oracle.constraints(oracle._moving(place, speeds), 1j * STEP)
+        for (name, number), value, row, rate in zip(oracle.owners(), values, rows, rates, strict=True):
+            tie = mechanism.tie(name)
+            if tie.grips or (tie.sort.startswith("rolling") and number > 0):
+                continue  # angles are counted in real numbers; what holds speeds alone has no value
+            assert np.imag(value) / STEP == pytest.approx(float((row @ speeds + rate).real), abs=1e-9), tie.sort
+            looked_at += 1
+    assert looked_at > 100
