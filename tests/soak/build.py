@@ -38,7 +38,7 @@ def connectors(tie: Tie) -> tuple[str, ...]:
     if tie.sort == "torque":
         return ("frame", "other")[: len(tie.mounts)]
     if tie.sort == "central_gravity":
-        return ("source", "point")
+        return ("source", "frame" if tie.values["attracts"] == "body" else "point")
     return ("a", "b")
 
 
@@ -144,7 +144,7 @@ def _function(signal: Signal) -> Callable[[Any], Any]:
 
 
 def _add_tie(scene: Scene, mechanism: Mechanism, tie: Tie) -> None:
-    values = {name: _value(value) for name, value in tie.values.items()}
+    values = {name: _value(value) for name, value in tie.values.items() if name != "attracted"}
     if tie.grips:
         part = scene.add(tie.name, getattr(lib, class_name(tie.sort))(**values))
         names = {"rack_and_pinion": ("rack", "pinion"), "planetary_gear": ("sun", "carrier", "ring")}

@@ -124,6 +124,16 @@ class Mechanism:
         """Return the body of a name."""
         return next(body for body in self.bodies if body.name == name)
 
+    def rigidly_joined(self, name: str) -> set[str]:
+        """Return the names of all bodies that are welded to a body, itself included; the world is one of them."""
+        found = {name}
+        for _ in self.ties:
+            for tie in self.ties:
+                ends = {mount.body for mount in tie.mounts}
+                if tie.sort == "weld" and ends & found:
+                    found |= ends
+        return found
+
     def turned(self, mount: Mount) -> Array:
         """Return the rotation of a mount in the world."""
         return (self.body(mount.body).rotation if mount.body else np.eye(3)) @ mount.rotation

@@ -262,6 +262,18 @@ def _load(draft: Draft) -> None:
         mounts = (first, draft.mount_at(other, p + chance.place(0.2), r @ chance.small_turn()))
     elif gap < 0.3:
         return
+    if sort == "central_gravity":
+        joined = Mechanism(chance.space, 0.0, tuple(draft.bodies), tuple(draft.ties)).rigidly_joined(other)
+        rods = [tie for tie in draft.ties if tie.sort == "rod" and tie.values["mass"] > 0.0]
+        if "" in joined or not other or any(mount.body in joined for rod in rods for mount in rod.mounts):
+            return
+        body = next(body for body in draft.bodies if body.name == other)
+        if len(joined) == 1 and body.inertia is not None and chance.space == "space" and chance.random.random() < 0.5:
+            values["attracts"] = "body"
+        mass = sum(body.mass for body in draft.bodies if body.name in joined)
+        turn = second.rotation.T
+        tensor = None if body.inertia is None else turn @ body.inertia @ turn.T
+        values["attracted"] = mass, turn @ (body.center - second.position), tensor
     draft.add(sort, mounts, values)
 
 

@@ -129,7 +129,7 @@ class Chance:
                 "turning_damping": 0.05 * three[3],
                 "free_rotation": zero if self.space != "space" else 0.2 * self.random.uniform(-1.0, 1.0, 3),
             },
-            "central_gravity": lambda: {"gravitational_parameter": self.size(2.0), "mass": self.size(1.0)},
+            "central_gravity": lambda: {"gravitational_parameter": self.size(2.0), "attracts": "point"},
         }[sort]()
 
 

@@ -298,8 +298,22 @@ def spring_energy(tie: Tie, p: Array, axes: Array, q: Array, turned: Array, near
         turn = rotated - values["free_rotation"]
         return 0.5 * (values["stiffness"] @ stretch**2 + values["turning_stiffness"] @ turn**2)
     if tie.sort == "central_gravity":
-        return -values["gravitational_parameter"] * values["mass"] / np.sqrt(d @ d)
+        return _attraction(values, d, relative=turned)
     return None
+
+
+def _attraction(values: dict[str, Any], d: Array, relative: Array) -> Any:
+    """Return the energy of a body in the field of a point: that of its mass, and MacCullagh's for its extent."""
+    mass, center, tensor = values["attracted"]
+    if values["attracts"] == "body":
+        d = d + relative @ center
+    square = d @ d
+    energy = -values["gravitational_parameter"] * mass / np.sqrt(square)
+    if values["attracts"] == "body":
+        e = relative.T @ d
+        spread = np.trace(tensor) - 3.0 * (e @ tensor @ e) / square
+        energy = energy - 0.5 * values["gravitational_parameter"] * spread / square**1.5
+    return energy
 
 
 def twist_in_plane(tie: Tie, axes: Array, turned: Array) -> float:
