@@ -67,9 +67,15 @@ class TimeRelations:
         self._is_reading = False
 
     @contextmanager
-    def reading(self) -> Iterator[None]:
-        """Take up relations while laws that make motions are read; what is only shown is evaluated as it stands."""
-        before, self._is_reading = self._is_reading, True
+    def reading(self, is_reading: bool = True) -> Iterator[None]:
+        """Take up relations while laws that make motions are read; what is only shown is evaluated as it stands.
+
+        Parameters
+        ----------
+        is_reading
+            False for what a solution is worked out with, and is no law.
+        """
+        before, self._is_reading = self._is_reading, is_reading
         try:
             yield
         finally:

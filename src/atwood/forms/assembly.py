@@ -16,6 +16,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.collect import collect
 from atwood.expr.relations import Relation, values_just_after
 from atwood.forms.dae import dae_form, keep_constraints
+from atwood.forms.places import with_reactions
 from atwood.forms.program import (
     BalanceProgram,
     FormProgram,
@@ -121,7 +122,8 @@ class Assembly:
         mechanism = self.mechanism
         forest = grow_forest(form, mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space, orientation)
         with mechanism.relations.reading():
-            return build_equations(mechanism, forest)
+            made = build_equations(mechanism, forest)
+        return made if form == "dae" or not mechanism.can_read_multipliers else with_reactions(made, self.maximal)
 
     @property
     def rows(self) -> tuple[Expression, ...]:

@@ -50,7 +50,8 @@ def dae_form(
     if level not in LEVELS:
         raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
     multipliers = equations.multipliers
-    dynamic = [r - f for r, f in zip(equations.rows, equations.constraint_rows, strict=True)]
+    rows = equations.rows_with_multipliers or equations.rows
+    dynamic = [r - f for r, f in zip(rows, equations.constraint_rows, strict=True)]
     if not multipliers:
         return make_form_program(name, "dae", "ggl", equations, parameters, tidy(kinematic_rows(equations) + dynamic))
     if level == "ggl":

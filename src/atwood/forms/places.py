@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from atwood.expr import Expression, OutputGroup, Program
+from atwood.expr import Expression, OutputGroup, Program, substitute
 from atwood.forms.program import state_groups
 from atwood.mechanics.equations import Equations
+from atwood.mechanics.read_multipliers import with_known
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = ["to_maximal"]
+__all__ = ["to_maximal", "with_reactions"]
 
 
 def to_maximal(assembly: Assembly, given: Literal["reduced", "regular"] = "reduced") -> Program:
@@ -29,7 +30,8 @@ def to_maximal(assembly: Assembly, given: Literal["reduced", "regular"] = "reduc
     return assembly.shared.get(key, lambda: _make(assembly, equations, assembly.maximal))
 
 
-def _make(assembly: Assembly, reduced: Equations, maximal: Equations) -> Program:
+def _places(reduced: Equations, maximal: Equations) -> tuple[list[Expression], list[Expression]]:
+    """Return maximal coordinates and speeds in terms of generalized ones."""
     forest = maximal.forest
     positions: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.coordinates)
     speeds: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.speeds)
@@ -49,6 +51,26 @@ def _make(assembly: Assembly, reduced: Equations, maximal: Equations) -> Program
     for symbol, (coordinate, speed) in forest.counted.items():
         positions[coordinate] = kinematics.placements.joint_coordinates[symbol]
         speeds[speed] = kinematics.joint_rates[symbol]
+    return positions, speeds
+
+
+def with_reactions(reduced: Equations, maximal: Equations) -> Equations:
+    """Return equations in generalized coordinates with the reactions that forces read as functions of the state.
+
+    Parameters
+    ----------
+    reduced
+        Equations in generalized coordinates, whose rows may depend on multipliers.
+    maximal
+        The same in maximal coordinates, where these are known.
+    """
+    positions, speeds = _places(reduced, maximal)
+    where = dict(zip((*maximal.coordinates, *maximal.speeds), (*positions, *speeds), strict=True))
+    return with_known(reduced, dict(zip(maximal.read, substitute(list(maximal.read.values()), where), strict=True)))
+
+
+def _make(assembly: Assembly, reduced: Equations, maximal: Equations) -> Program:
+    positions, speeds = _places(reduced, maximal)
     outputs = (OutputGroup("q", tuple(positions)), OutputGroup("u", tuple(speeds)))
     name = f"{assembly.flat.name} to maximal coordinates"
     return Program(name, state_groups(reduced), assembly.parameters, outputs)

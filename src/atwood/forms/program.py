@@ -160,6 +160,16 @@ class BalanceProgram:
     holonomic: tuple[int, ...]
     mass_product: Program | None = None
 
+    @cached_property
+    def constraints_alone(self) -> Program:
+        """The program of the constraints' values, slopes and drifts, without masses and forces.
+
+        Positions are looked at without speeds, where a force in the direction of a velocity has no value.
+        """
+        groups = {group.name: group for group in self.program.outputs}
+        outputs = tuple(groups[name] for name in ("value", "slope", "drift"))
+        return replace(self.program, name=f"{self.program.name} of constraints", outputs=outputs)
+
 
 @dataclass(frozen=True)
 class RatesProgram:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from atwood.errors import DeclarationError
-from atwood.expr import Expression, Graph, depends_on, substitute
+from atwood.expr import Expression, Graph, depends_on, live, substitute
 from atwood.mechanics.constraints import constraint_values, find_constraints, levels, velocity_levels
 from atwood.mechanics.elimination import SOLVED, check_held, drop_closed, eliminate_linear
 from atwood.mechanics.equations import Equations, force_rows, motion_rows, put_in_place
@@ -15,9 +16,11 @@ from atwood.mechanics.kinematics import Kinematics, shapes
 from atwood.mechanics.mechanism import Mechanism, check_closures, extent, make_gravity
 from atwood.mechanics.motion import motion_in_plane, motion_in_space
 from atwood.mechanics.orientation import body_offsets
+from atwood.mechanics.read_multipliers import known_multipliers, with_known
 from atwood.mechanics.rolling import Taken, integrated, take_up
 from atwood.model.component import bind
 from atwood.model.local import LocalConstraint
+from atwood.model.local_parts import multiplier_symbol
 from atwood.model.vector import Vector
 from atwood.topology.forest import Forest
 
@@ -67,7 +70,11 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     rows = motion_rows(site, mechanism.locals_, masses, state.kinematics, state.lifted, signals, state.speeds)
     # Before the constraints' rates, which can then be written with the slopes that the forces are made of.
     forces = force_rows(site, mechanism.locals_, state.kinematics, [*held, *rolling], signals, state.speeds)
-    return Equations(
+    constraints = (
+        *levels(mechanism, site, state, held, [value for _, _, value in values]),
+        *velocity_levels(mechanism, site, state, rolling, signals, integrals),
+    )
+    made = Equations(
         graph=graph,
         forest=forest,
         site=site,
@@ -84,24 +91,44 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
         rates=state.rates,
         rows=tuple(rows),
         constraint_rows=tuple(forces),
-        constraints=(
-            *levels(mechanism, site, state, held, [value for _, _, value in values]),
-            *velocity_levels(mechanism, site, state, rolling, signals, integrals),
-        ),
+        constraints=constraints,
         eliminated=tuple(c.name for c, s in zip(forest.coordinates, every, strict=True) if s in solution),
         prescribed=prescribed,
         charts=state.charts,
         solved_speeds=tuple(s.name.removeprefix("u:") for s in taken.speeds),
         integrals=(*taken.integrals, *integrals.values()),
     )
+    is_asked = forest.form == "dae" and mechanism.can_read_multipliers
+    read = _read_multipliers(mechanism, signals) if is_asked else []
+    with mechanism.relations.reading(False):
+        return with_known(made, known_multipliers(mechanism, made, read)) if read else made
 
 
 def _multiplier(graph: Graph, path: str, one: LocalConstraint) -> Expression:
-    return graph.symbol(f"lambda:{path}.{one.law.name}[{one.index}]")
+    return multiplier_symbol(graph, path, one.law.name, one.index)
 
 
-def resolve_signals(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[Expression, Expression]:
-    """Return what each linked input stands for.
+def _read_multipliers(mechanism: Mechanism, signals: Mapping[Expression, Expression]) -> list[Expression]:
+    """Return the multipliers that laws of force read, by themselves or through linked inputs."""
+    read = [symbol for local in mechanism.locals_.values() for symbol in local.reads]
+    graph, feeding = mechanism.table.graph, {source: None for source, _ in mechanism.links.values()}
+    offered = [_multiplier(graph, path, c) for path in feeding for c in mechanism.locals_[path].constraints]
+    used = {node.index for node in live(list(signals.values()))} if offered else set()
+    read += [symbol for symbol in offered if symbol.index in used]
+    return list(dict.fromkeys(read))
+
+
+def resolve_signals(
+    mechanism: Mechanism, site: Site, kinematics: Kinematics, read: Mapping[Expression, Expression] | None = None
+) -> dict[Expression, Expression]:
+    """Return what each linked input stands for, and the multipliers that laws of force read where these are known.
+
+    Parameters
+    ----------
+    mechanism, site, kinematics
+        The mechanism.
+    read
+        Multipliers as functions of the state (`Equations.read`); where it is not given, their symbols stay.
 
     Raises
     ------
@@ -109,7 +136,10 @@ def resolve_signals(mechanism: Mechanism, site: Site, kinematics: Kinematics) ->
         If inputs feed each other in a circle, or an output needs what is known only after the forces are.
     """
     with mechanism.relations.reading():
-        return _resolved(mechanism, site, kinematics)
+        found = _resolved(mechanism, site, kinematics)
+    if read:
+        found = {**dict(zip(found, substitute(list(found.values()), dict(read)), strict=True)), **read}
+    return found
 
 
 def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[Expression, Expression]:
@@ -120,7 +150,9 @@ def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[
         local = mechanism.locals_[source]
         law, _, axis = observable.partition(".")
         inputs = replace(local.binding, values={**local.binding.values, **local.signal_symbols})
-        value = getattr(bind(local.part.component, inputs), law)()
+        bound = bind(local.part.component, inputs)
+        is_reaction = observable in local.binding.reactions
+        value = bound.reaction(observable) if is_reaction else getattr(bound, law)()
         if isinstance(value, Vector):
             if axis not in ("x", "y", "z"):
                 raise DeclarationError(

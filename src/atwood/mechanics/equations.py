@@ -7,7 +7,7 @@ The generalized force on speed u_k is the sum over all nodes and bodies of ``(m 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
 from atwood.mechanics.forces import Forces, Site, constraint_forces, local_map, part_forces
@@ -127,6 +127,10 @@ class Equations:
         Speeds that constraints on velocities gave as functions of the others, by name.
     integrals
         Constraints on velocities that turned out to be ones on positions.
+    read
+        The multipliers that laws of force read, as functions of the state; `rows` has these in their place.
+    rows_with_multipliers
+        In maximal coordinates, the rows as they are: with the multipliers themselves; empty if they have none.
     """
 
     graph: Graph
@@ -151,6 +155,8 @@ class Equations:
     charts: tuple[Chart, ...] = ()
     solved_speeds: tuple[str, ...] = ()
     integrals: tuple[Integral, ...] = ()
+    read: Mapping[Expression, Expression] = field(default_factory=dict)
+    rows_with_multipliers: tuple[Expression, ...] = ()
 
     @property
     def multipliers(self) -> tuple[Expression, ...]:

@@ -71,6 +71,12 @@ class Mechanism:
         assert found is not None
         return found
 
+    @property
+    def can_read_multipliers(self) -> bool:
+        """Whether forces read reactions: of their own part, or perhaps through inputs that are linked to one."""
+        feeding = (self.locals_[source] for source, _ in self.links.values())
+        return any(one.reads for one in self.locals_.values()) or any(one.binding.reactions for one in feeding)
+
 
 def decide(mechanism: Mechanism, how: Callable[[Mechanism], T]) -> T:
     """Decide something by the size of numbers, and note it: other values may decide it otherwise."""

@@ -277,7 +277,7 @@ def _energy_of_turning(path: str, body: BodyInertia, turn: NodeTurn, spin: Seque
 
 def energies(mechanism: Mechanism, equations: Equations) -> tuple[Expression, Expression]:
     """Return kinetic and potential energy of the scene."""
-    signals = resolve_signals(mechanism, equations.site, equations.kinematics)
+    signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
     parts = [part_energies(mechanism, equations, path, signals) for path in mechanism.locals_]
     return add_up([k for k, _ in parts]), add_up([v for _, v in parts])
 

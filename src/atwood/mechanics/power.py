@@ -26,7 +26,7 @@ def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
         Its equations in one form.
     """
     graph, kinematics = equations.graph, equations.kinematics
-    signals = resolve_signals(mechanism, equations.site, kinematics)
+    signals = resolve_signals(mechanism, equations.site, kinematics, equations.read)
     forces = Forces(graph)
     total = graph.constant(0.0)
     for local in mechanism.locals_.values():
@@ -57,7 +57,7 @@ def switched_energy(mechanism: Mechanism, equations: Equations) -> Expression:
         Its equations in one form.
     """
     kinematics = equations.kinematics
-    signals = resolve_signals(mechanism, equations.site, kinematics)
+    signals = resolve_signals(mechanism, equations.site, kinematics, equations.read)
     total = equations.graph.constant(0.0)
     for local in mechanism.locals_.values():
         mapping = {**local_map(equations.site, local, kinematics), **signals}

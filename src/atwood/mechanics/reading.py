@@ -134,7 +134,7 @@ class Reader:
 
     def __init__(self, mechanism: Mechanism, equations: Equations, reactions: Sequence[Reaction]) -> None:
         self._mechanism, self._equations = mechanism, equations
-        self._signals = resolve_signals(mechanism, equations.site, equations.kinematics)
+        self._signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
         self._energies: dict[str, tuple[Expression, Expression]] = {}
         self._around: dict[str, _EnergiesAround] = {}
         self._reactions: dict[str, dict[str, Expression]] = {}

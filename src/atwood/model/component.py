@@ -227,7 +227,7 @@ class Component:
         return None
 
     def reaction(self, name: str) -> Scalar:
-        """Return a reaction of this component; only within an observable or an event."""
+        """Return a reaction of this component; only within a force, a dissipation, an observable or an event."""
         reactions = self._binding().reactions
         if name not in reactions:
             raise DeclarationError(
@@ -350,11 +350,17 @@ class Component:
         return InputRef(self, name)
 
     def output(self, name: str) -> OutputRef:
-        """Return a scalar observable, to be connected to an input of another component."""
-        names = [law.name for law in self.laws("observable")]
+        """Return a scalar observable, or a reaction, to be connected to an input of another component."""
+        names = self.output_names()
         if name.split(".")[0] not in names:
             raise DeclarationError(f"it has no output {name!r}", where=self.path, advice=suggestion(name, names))
         return OutputRef(self, name)
+
+    @classmethod
+    def output_names(cls) -> list[str]:
+        """Return the names of its outputs: observables, and reactions of its constraints."""
+        reactions = (name.split(".")[0] for law in cls.laws("constraint") for name in law.options.reactions)
+        return [*(law.name for law in cls.laws("observable")), *dict.fromkeys(reactions)]
 
     def copy(self) -> Self:
         """Return a component with the same settings, that belongs to no model."""

@@ -83,6 +83,11 @@ class Load:
         object.__setattr__(self, "force", as_vector(self.force))
         object.__setattr__(self, "torque", as_vector(self.torque))
 
+    @property
+    def components(self) -> tuple[Scalar, ...]:
+        """The components of force and torque."""
+        return (*self.force, *self.torque)
+
 
 @dataclass(frozen=True)
 class Placement:

@@ -197,7 +197,7 @@ def find_end(model: Component, path: str) -> Connector | InputRef | OutputRef:
         return connectors[name]
     if name in component.signal_specs():
         return component.input(name)
-    if steps[0] in [law.name for law in component.laws("observable")]:
+    if steps[0] in component.output_names():
         return component.output(name)
     raise UsageError(
         f"there is no connector, input or output {name!r}",

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, UnsupportedError
-from atwood.expr import Expression, Graph, Scalar, depends_on
+from atwood.expr import Expression, Graph, Scalar, depends_on, live
 from atwood.model.carried import Asked, Carried
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, JointCoordinate, Motion
@@ -21,7 +21,7 @@ from atwood.model.fields import ParameterSpec
 from atwood.model.flatten import FlatScene, Part
 from atwood.model.grips import counting_constraints, find_grips, formulas_of
 from atwood.model.laws import Law, scalars
-from atwood.model.local_parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart
+from atwood.model.local_parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart, multiplier_symbol
 from atwood.model.shafts import Held, find_held
 from atwood.model.space import FIXED_AXES, Space, planar_axes
 from atwood.model.vector import Vector
@@ -159,13 +159,18 @@ def _localize_part(
     def listed_laws(kind: Any, bound: Any) -> list[Any]:
         return [one for law in laws(kind) for one in _call(part, law, functools.partial(_listed, bound, law))]
 
-    potentials, dissipations = scalar_laws("potential"), scalar_laws("dissipation")
-    switched = scalar_laws("potential", only_in_modes=True)
-    _check_reads(part, connectors, potentials, dissipations)
+    potentials, switched = scalar_laws("potential"), scalar_laws("potential", only_in_modes=True)
+    constraints = [one for law in laws("constraint") for one in _local_constraints(part, law, acting, graph)]
     inertias = listed_laws("inertia", bound)
     joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws("joint"))
     own = [symbol for joint in joints for symbol in joint.coordinates]
     formulas = formulas_of(part, bound, own, graph) if space.name == "space" else {}
+    # Only forces may read reactions: they are solved for together with the accelerations.
+    binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
+    acting = bind(component, binding)
+    dissipations, loads = scalar_laws("dissipation"), listed_laws("force", acting)
+    forces: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components)]
+    _check_reads(part, connectors, potentials, dissipations)
     return LocalPart(
         part=part,
         binding=binding,
@@ -175,16 +180,39 @@ def _localize_part(
         body_inertias=tuple(one for one in inertias if isinstance(one, BodyInertia)),
         potentials=potentials,
         dissipations=dissipations,
-        loads=tuple(listed_laws("force", acting)),
-        constraints=(
-            *(one for law in laws("constraint") for one in _local_constraints(part, law, acting, graph)),
-            *counting_constraints(part, counted, formulas, graph),
-        ),
+        loads=tuple(loads),
+        constraints=(*constraints, *counting_constraints(part, counted, formulas, graph)),
         signal_symbols=signal_symbols,
         formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in grips}},
         borrowed={full: end for one in grips for full, end in one.borrowed.items()},
         switched=switched,
+        reads=_multipliers_read(part, constraints, forces, graph),
     )
+
+
+def _readable_reactions(
+    part: Part, constraints: Sequence[LocalConstraint], mode: str, space: Space, graph: Graph
+) -> dict[str, Scalar]:
+    """Return the reactions of a part's constraints by name: multipliers times their sign; zero in other modes."""
+    found: dict[str, Scalar] = {}
+    for law in part.component.laws("constraint"):
+        if law.holds_in(space.name) and not law.acts_in(mode):
+            for name in law.options.reactions:
+                found |= dict.fromkeys((name, *(f"{name}.{axis}" for axis in "xyz")), 0.0)
+    for one in constraints:
+        found[one.reaction] = one.sign * multiplier_symbol(graph, part.path, one.law.name, one.index)
+    return found
+
+
+def _multipliers_read(
+    part: Part, constraints: Sequence[LocalConstraint], forces: Sequence[Scalar], graph: Graph
+) -> tuple[Expression, ...]:
+    """Return the multipliers of a part that its forces depend on."""
+    if not constraints or not forces:
+        return ()
+    used = {node.index for node in live([graph.convert(one) for one in forces])}
+    own = (multiplier_symbol(graph, part.path, one.law.name, one.index) for one in constraints)
+    return tuple(symbol for symbol in own if symbol.index in used)
 
 
 def _scalar(bound: Any, law: Law, graph: Graph) -> Expression:

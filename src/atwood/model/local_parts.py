@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
-from atwood.expr import Expression
+from atwood.expr import Expression, Graph
 from atwood.model.binding import Binding
 from atwood.model.carried import Asked
 from atwood.model.contributions import BodyInertia, Load, Placement, PointInertia
@@ -14,7 +14,7 @@ from atwood.model.laws import Law
 from atwood.model.rotation import Axes
 from atwood.model.vector import Vector
 
-__all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart"]
+__all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "multiplier_symbol"]
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,11 @@ class LocalConstraint:
     counts: Expression | None = None
 
 
+def multiplier_symbol(graph: Graph, path: str, law: str, index: int) -> Expression:
+    """Return the symbol of a constraint's multiplier: of the part's path, its law, and the number within the law."""
+    return graph.symbol(f"lambda:{path}.{law}[{index}]")
+
+
 @dataclass(frozen=True)
 class LocalPart:
     """What one part contributes, on its local symbols.
@@ -99,6 +104,8 @@ class LocalPart:
         of the part's own, and everywhere of those that it takes hold of.
     borrowed
         Connectors of joints that it takes hold of, which are among its own under their full paths.
+    reads
+        The multipliers that its laws of force read.
     switched
         Those of its potentials that act in some of its modes only.
     """
@@ -117,6 +124,7 @@ class LocalPart:
     formulas: Mapping[Expression, tuple[Expression, Expression | None]] = field(default_factory=dict)
     borrowed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     switched: tuple[Expression, ...] = ()
+    reads: tuple[Expression, ...] = ()
 
     @property
     def asks(self) -> list[str]:

@@ -52,6 +52,15 @@ class BalanceValues:
     drift: FloatArray
 
 
+@dataclass(frozen=True)
+class HeldValues:
+    """The constraints at one state: values, slopes along the speeds, and explicit time derivatives of their rates."""
+
+    value: FloatArray
+    slope: Matrix
+    drift: FloatArray
+
+
 class Balance:
     """The balance of forces of one form with its parameters.
 
@@ -59,8 +68,8 @@ class Balance:
     ----------
     program
         The program.
-    kernel
-        The same, ready to run on one state.
+    kernel, held_kernel
+        The same, and the constraints alone, ready to run on one state.
     turning
         How the coordinates move with the speeds.
     mass
@@ -71,11 +80,13 @@ class Balance:
         self,
         program: BalanceProgram,
         kernel: BoundKernel,
+        held_kernel: Callable[[], BoundKernel],
         turning: Turning,
         mass: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
     ) -> None:
         self.program, self.kernel, self.turning, self._mass = program, kernel, turning, mass
         self._all = len(program.holonomic) == program.constraints
+        self._held_kernel = held_kernel
         self.holonomic = np.asarray(program.holonomic, dtype=np.intp)
 
     @property
@@ -96,6 +107,14 @@ class Balance:
         parts = (np.asarray(x, dtype=float) for x in (bias, value, rate, gamma))
         b, v, r, g = parts
         return BalanceValues(matrix, b, v, r, g, jacobian, np.asarray(drift, dtype=float))
+
+    def held(self, t: float, q: FloatArray, u: FloatArray) -> HeldValues:
+        """Return the constraints at a state."""
+        p = self.program
+        value, slope, drift = self._held_kernel()([t], q, u)
+        full = self._mass is not None or is_best_full((p.speeds, p.speeds), len(p.mass_rows))
+        matrix = from_entries(p.slope_rows, p.slope_columns, slope, (p.constraints, p.speeds), full)
+        return HeldValues(np.asarray(value, dtype=float), matrix, np.asarray(drift, dtype=float))
 
     def accelerate(
         self, t: float, q: FloatArray, u: FloatArray, kept: NDArray[np.intp] | None = None
@@ -138,21 +157,21 @@ class Balance:
         still = np.zeros_like(u)
         last = np.inf
         for _ in range(iterations if len(self.holonomic) else 0):
-            slope, value = self.on_positions(self.at(t, q, still))
+            slope, value = self.on_positions(self.held(t, q, still))
             rows = row_scales(slope, scales)
             miss = float(np.max(np.abs(value / rows)))
             if miss == 0.0 or (miss < 1e-11 and miss >= 0.5 * last):
                 break
             last = miss
             q = self.turning.moved(t, q, -scales * least_norm(scaled(slope, scales, rows), value / rows))
-        now = self.at(t, q, u)
+        now = self.held(t, q, u)
         rows = row_scales(now.slope, scales)
         for _ in range(2):  # the second pass takes out the rounding of the first
             rate = now.slope @ u + now.drift
             u = u - scales * least_norm(scaled(now.slope, scales, rows), rate / rows)
         return q, u
 
-    def on_positions(self, now: BalanceValues) -> tuple[FloatArray, FloatArray]:
+    def on_positions(self, now: HeldValues) -> tuple[FloatArray, FloatArray]:
         """Return slopes and values of the constraints that hold positions."""
         if self._all:
             return now.slope, now.value
@@ -166,16 +185,17 @@ class Balance:
         """Return by how much a state misses the constraints on position and on velocity, relative to the scales."""
         if not self.constraints:
             return 0.0, 0.0
-        now = self.at(t, q, u)
-        rows = row_scales(now.slope, scales)
-        return float(np.max(np.abs(now.value / rows))), float(np.max(np.abs(now.rate / rows)))
+        now = self.held(t, q, u)
+        rows, rate = row_scales(now.slope, scales), now.slope @ u + now.drift
+        return float(np.max(np.abs(now.value / rows))), float(np.max(np.abs(rate / rows)))
 
 
 def balance_of(assembly: Assembly, form: FormName) -> Balance:
     """Return the balance of forces of a scene in the coordinates of either form."""
     program = assembly.balance(form)
     mass = None if program.mass_product is None else partial(mass_at, assembly, form)
-    return Balance(program, assembly.kernel(program.program), turning_of(assembly, form), mass)
+    held = partial(assembly.kernel, program.constraints_alone)
+    return Balance(program, assembly.kernel(program.program), held, turning_of(assembly, form), mass)
 
 
 def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -> tuple[FloatArray, FloatArray]:

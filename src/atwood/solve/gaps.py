@@ -73,7 +73,7 @@ def find_gaps(assembly: Assembly, equations: Equations, t: float, q: FloatArray,
     """
     table = {**assembly.mechanism.table.values, **assembly.known_relations}
     place = {**table, equations.time: t, **dict(zip(equations.coordinates, np.asarray(q).tolist(), strict=True))}
-    signals = resolve_signals(assembly.mechanism, equations.site, equations.kinematics)
+    signals = resolve_signals(assembly.mechanism, equations.site, equations.kinematics, equations.read)
     rows: dict[str, list[LocalConstraint]] = {}
     for one in equations.constraints:
         if one.value is not None:

@@ -60,6 +60,7 @@ class Missing:
 class _Quantity:
     part: str
     words: str
+    why: str = ""
 
 
 def states_ahead(
@@ -106,7 +107,7 @@ def find_missing(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray
         return None
     i = int(places[0])
     row = int(np.argmax(missing[:, i]))
-    reason = _reason(assembly, program, row, (float(t[i]), q[:, i], u[:, i]))
+    reason = quantities[row].why or _reason(assembly, program, row, (float(t[i]), q[:, i], u[:, i]))
     return Missing(float(t[i]), quantities[row].part, quantities[row].words, reason)
 
 
@@ -118,7 +119,9 @@ def missing_at(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Mi
 def _law_values(assembly: Assembly) -> tuple[list[_Quantity], Program]:
     """Return every law and input of every component as a program of (t, q, u)."""
     equations, mechanism = assembly.equations, assembly.mechanism
-    signals = resolve_signals(mechanism, equations.site, equations.kinematics)
+    # Laws that read reactions are looked at by themselves first, with any value of these.
+    some = dict.fromkeys(equations.read, equations.graph.one)
+    signals = resolve_signals(mechanism, equations.site, equations.kinematics, some)
     quantities: list[_Quantity] = []
     expressions: list[Expression] = []
     known = {*assembly.parameters, *(s for group in state_groups(equations) for s in group.symbols)}
@@ -130,6 +133,11 @@ def _law_values(assembly: Assembly) -> tuple[list[_Quantity], Program]:
                 if all(node in known for node in live([value]) if node.is_symbol):
                     quantities.append(_Quantity(path, words))
                     expressions.append(value)
+    for symbol, value in equations.read.items():
+        path, _, law = symbol.name.removeprefix("lambda:").partition("[")[0].rpartition(".")
+        why = "no reaction agrees with the forces that it causes, as where friction jams or is without bounds"
+        quantities.append(_Quantity(path, f"the reaction of the law {law!r}, which a force reads,", why))
+        expressions.append(value)
     outputs = (OutputGroup("laws", tuple(expressions)),)
     return quantities, Program(f"{assembly.flat.name} laws", state_groups(equations), assembly.parameters, outputs)
 

@@ -102,7 +102,7 @@ class Nearness:
 
     def slope_at(self, t: float, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return slopes of all constraints at one place, scaled, and by how much positions miss them."""
-        now = self.plan.balance.at(t, q, np.zeros_like(self.plan.sizes))
+        now = self.plan.balance.held(t, q, np.zeros_like(self.plan.sizes))
         slope = to_array(scaled(now.slope, self.plan.sizes, self.rows))
         return slope, np.abs(now.value / self.rows)[self.plan.balance.holonomic]
 

@@ -21,6 +21,7 @@ from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.solve.matrices import to_array
 from atwood.solve.rank import RankFinding, find_rank
+from atwood.solve.read_reactions import check_read_reactions
 from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_scales
 from atwood.solve.uncompiled import announce, find_uncompiled
 from atwood.solve.without_inertia import check_inertia
@@ -115,7 +116,7 @@ class Plan:
         """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
         if not self.dependent_speeds:
             return False
-        slope = to_array(self.balance.at(t, q, np.zeros_like(self.sizes)).slope)
+        slope = to_array(self.balance.held(t, q, np.zeros_like(self.sizes)).slope)
         speeds = review_choice(slope[list(self.finding.kept)], self.sizes, self.dependent_speeds)
         holding = self.balance.holding(self.finding.kept)
         is_same = len(holding) == len(speeds)
@@ -308,6 +309,7 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     balance = balance_of(assembly, assembly.form)
     sizes, coordinate_sizes = motion_scales(equations, length), coordinate_scales(equations, length)
     finding = find_rank(balance, t, q, sizes)
+    check_read_reactions(assembly, t, q, u, length)
     try:
         now = balance.at(t, q, u)
     except KernelEvaluationError as error:

@@ -8,13 +8,12 @@ constraints nearly depend on each other.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.expr import Program
 from atwood.solve.driver import FloatArray
 from atwood.solve.matrices import is_best_full
 from atwood.solve.problem import Plan
@@ -163,22 +162,10 @@ def _largest(now: ConstraintsAt, speeds: FloatArray) -> FloatArray:
     return np.stack([np.max(np.abs(now.value), axis=1), np.max(np.abs(now.rate(speeds)), axis=1)])
 
 
-def _constraints_alone(plan: Plan) -> Program:
-    """Return the program of the balance of forces without what projections do not ask for: masses and forces."""
-    whole = plan.balance.program.program
-
-    def make() -> tuple[Program, Program]:  # the whole is kept along, so that its identity stays its own
-        groups = {group.name: group for group in whole.outputs}
-        wanted = tuple(groups[name] for name in ("value", "slope", "drift"))
-        return whole, replace(whole, name=f"{whole.name} of constraints", outputs=wanted)
-
-    return plan.assembly.shared.get(("constraints alone", id(whole)), make)[1]
-
-
 def constraints_at(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> ConstraintsAt:
     """Return the constraints at states, of shape (states,) and (number, states)."""
     p, count = plan.balance.program, len(t)
-    program = _constraints_alone(plan)
+    program = p.constraints_alone
     if count == 1:  # numbers one by one take a tenth of the time of arrays with one number each
         alone = plan.assembly.kernel(program)(t, q[:, 0], u[:, 0])
         value, slope, drift = (np.reshape(one, (-1, 1)) for one in alone)

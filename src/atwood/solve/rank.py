@@ -75,7 +75,7 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     still = np.zeros_like(scales)
 
     def scaled(position: FloatArray) -> Matrix:
-        slope = balance.at(t, position, still).slope
+        slope = balance.held(t, position, still).slope
         return scale(slope, scales, row_scales(slope, scales))
 
     whole = scaled(q)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.clock import GRACE, Clock, TimeIsUp
-from atwood.errors import AtwoodError, SolveError, StartError, TopologyError
+from atwood.errors import AtwoodError, SolveError, StartError, TopologyError, UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.solve.breaks import Schedule, find_schedule
@@ -270,6 +270,8 @@ class _Walk:
         span = self.options.t_end - self.start.time
         try:
             return make_plan(self.assembly, self.t, self.q, self.u, self.start.length, span)
+        except UnsupportedError:
+            raise
         except AtwoodError as error:
             found = missing_at(self.assembly, self.t, self.q, self.u)
             if found is None:

@@ -65,6 +65,7 @@ def can_be_stiff(assembly: Assembly) -> bool:
             for one in local.connectors.values():
                 speeds += [*one.velocity, *one.spin]
             speeds += local.signal_symbols.values()  # what it is linked to may be a velocity
+            speeds += local.reads  # a reaction depends on velocities
             for load in local.loads:
                 read = [*assembly.mechanism.space.components(load.force), *load.torque]
                 if any(isinstance(one, Expression) and depends_on(one, speeds) for one in read):

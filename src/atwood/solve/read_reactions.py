@@ -1,0 +1,50 @@
+"""Reactions that laws of force read must be determined: with redundant constraints none is told from the others."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import UnsupportedError
+from atwood.forms.assembly import Assembly
+from atwood.solve.balance import balance_of
+from atwood.solve.rank import find_rank
+from atwood.solve.reactions import maximal_state
+from atwood.solve.scales import motion_scales
+
+__all__ = ["check_read_reactions"]
+
+FloatArray = NDArray[np.float64]
+
+
+def check_read_reactions(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float) -> None:
+    """Refuse a scene with redundant constraints in which a force reads a reaction.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    t, q, u
+        A state in the coordinates of the form.
+    length
+        Extent of the scene, m.
+
+    Raises
+    ------
+    UnsupportedError
+        If there are; with the reaction's constraint, and the constraints that follow from the others.
+    """
+    if not assembly.equations.read:
+        return
+    maximal = assembly.maximal
+    big_q, _ = maximal_state(assembly, np.array([t]), q[:, None], u[:, None])
+    finding = find_rank(balance_of(assembly, "dae"), t, big_q[:, 0], motion_scales(maximal, length))
+    if finding.redundant:
+        read = next(iter(assembly.equations.read)).name.removeprefix("lambda:")
+        follow = ", ".join(maximal.constraints[i].label for i in finding.redundant)
+        raise UnsupportedError(
+            f"a force reads the reaction of {read}, and constraints of the scene are redundant ({follow} follow from "
+            "the others), so that reactions are not determined",
+            where=read.partition("[")[0].rpartition(".")[0],
+            advice="Take out what holds twice: let a joint leave free what the others hold already.",
+        )
