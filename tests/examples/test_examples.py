@@ -21,7 +21,7 @@ def test_example_runs(path: Path, tmp_path: Path) -> None:
     paths = [str(ROOT / "src"), str(ROOT / "library"), environment.get("PYTHONPATH", "")]
     environment["PYTHONPATH"] = os.pathsep.join(p for p in paths if p)
     done = subprocess.run(
-        [sys.executable, "-W", "error::RuntimeWarning", str(path)],
+        [sys.executable, "-W", "error::RuntimeWarning", str(path), str(tmp_path)],  # pictures go there
         cwd=tmp_path,
         env=environment,
         capture_output=True,
