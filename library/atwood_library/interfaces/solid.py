@@ -19,6 +19,7 @@ from atwood import (
     observable,
     sqrt,
 )
+from atwood_library.interfaces.poles import angle_off_pole, rate_off_pole
 
 __all__ = ["Solid", "Tensor"]
 
@@ -30,7 +31,8 @@ class Solid(Component):
     """A rigid body; subclasses say its mass, its centre of mass and its inertia tensor in the axes of its frame.
 
     Its orientation is reported as the three axes of its frame and as Euler angles in the z-y-z convention: phi about z,
-    theta about the new y, psi about the new z.
+    theta about the new y, psi about the new z. Where theta is zero or half a turn, within 1e-10 rad, phi and psi are
+    zero and the three rates have no value.
     """
 
     frame: Frame = connector(Frame, "The frame that everything about the body is given in.")
@@ -132,7 +134,7 @@ class Solid(Component):
     def phi(self) -> Scalar:
         """Return the azimuth of the frame's z axis (Goldstein, section 4.4, in the z-y-z convention)."""
         z = self.frame.axes[2]
-        return atan2(z.y, z.x)
+        return angle_off_pole(z.y, z.x)
 
     @observable(unit="rad", doc="Second Euler angle, of the frame's z axis from the world's.", spaces=("space",))
     def theta(self) -> Scalar:
@@ -150,19 +152,21 @@ class Solid(Component):
     def psi(self) -> Scalar:
         """Return the angle about the frame's own z axis."""
         x, y, _ = self.frame.axes
-        return atan2(y.z, -x.z)
+        return angle_off_pole(y.z, -x.z)
 
     @observable(unit="rad/s", doc="Rate of phi (precession).", spaces=("space",))
     def phi_rate(self) -> Scalar:
         """Return the rate of the first Euler angle (Goldstein, section 4.9, in the z-y-z convention)."""
         (x, y, _), w = self.frame.axes, self.spin()
-        return (w.x * x.z + w.y * y.z) / (x.z * x.z + y.z * y.z)
+        square = x.z * x.z + y.z * y.z
+        return rate_off_pole(w.x * x.z + w.y * y.z, square, square)
 
     @observable(unit="rad/s", doc="Rate of theta (nutation).", spaces=("space",))
     def theta_rate(self) -> Scalar:
         """Return the rate of the second Euler angle."""
         (x, y, _), w = self.frame.axes, self.spin()
-        return (w.x * y.z - w.y * x.z) / sqrt(x.z * x.z + y.z * y.z)
+        square = x.z * x.z + y.z * y.z
+        return rate_off_pole(w.x * y.z - w.y * x.z, sqrt(square), square)
 
     @observable(unit="rad/s", doc="Rate of psi (spin).", spaces=("space",))
     def psi_rate(self) -> Scalar:

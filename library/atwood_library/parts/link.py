@@ -11,7 +11,6 @@ from atwood import (
     Placement,
     Scalar,
     Vector,
-    atan2,
     connector,
     cross,
     inertia,
@@ -19,6 +18,7 @@ from atwood import (
     observable,
     parameter,
 )
+from atwood_library.interfaces.poles import angle_off_pole, rate_off_pole
 
 
 class Link(Component):
@@ -70,7 +70,7 @@ class Link(Component):
         if not self.in_space:
             return self.a.angle
         x = self.a.axes[0]
-        return atan2(x.z, x.x)
+        return angle_off_pole(x.z, x.x)
 
     @observable(unit="rad/s", doc="Rate of the angle.", spaces=("plane", "space"))
     def angular_velocity(self) -> Scalar:
@@ -79,7 +79,8 @@ class Link(Component):
             return -self.a.angular_velocity.y
         x = self.a.axes[0]
         rate = cross(self.a.angular_velocity, x)
-        return (x.x * rate.z - x.z * rate.x) / (x.x * x.x + x.z * x.z)
+        square = x.x * x.x + x.z * x.z
+        return rate_off_pole(x.x * rate.z - x.z * rate.x, square, square)
 
     @observable(unit="m", doc="Position of the centre of mass in world axes.")
     def position(self) -> Vector:

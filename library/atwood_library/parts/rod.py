@@ -20,9 +20,9 @@ from atwood import (
     joint,
     observable,
     parameter,
-    select,
     sin,
 )
+from atwood_library.interfaces.poles import angle_off_pole, rate_off_pole
 
 
 class Rod(Component):
@@ -80,11 +80,12 @@ class Rod(Component):
         r = self.b.position - self.a.position
         if not self.in_space:
             return atan2(r.x, -r.z)
-        return atan2(r.x, select(r.x * r.x + r.z * r.z > 0.0, -r.z, self.length))
+        return angle_off_pole(r.x, -r.z, self.length)
 
     @observable(unit="rad/s", doc="Rate of the angle.", spaces=("plane", "space"))
     def angular_velocity(self) -> Scalar:
         """Return ``(r x v) / r^2``, of the components along x and z."""
         r = self.b.position - self.a.position
         v = self.b.velocity - self.a.velocity
-        return (r.x * v.z - r.z * v.x) / (r.x * r.x + r.z * r.z)
+        turning, square = r.x * v.z - r.z * v.x, r.x * r.x + r.z * r.z
+        return rate_off_pole(turning, square, square, self.length) if self.in_space else turning / square

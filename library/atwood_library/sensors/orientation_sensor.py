@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from itertools import permutations
 
-from atwood import Component, Frame, Scalar, Vector, atan2, connector, cross, dot, norm, observable, parameter, sqrt
+from atwood import Component, Frame, Scalar, Vector, atan2, connector, cross, dot, observable, parameter, sqrt
+from atwood_library.interfaces.poles import angle_off_pole, rate_off_pole
 from atwood_library.interfaces.rotation_vector import rotation_vector
 
 CONVENTIONS = tuple(
@@ -19,7 +20,9 @@ class OrientationSensor(Component):
     Frame a is turned into frame b by three turns, each about an axis of the frame that those before it have made. The
     convention names these axes in order: ``"zyz"`` and ``"zxz"`` are those of textbooks on tops, ``"zyx"`` is yaw,
     pitch, roll (Goldstein, section 4.4 and appendix A). The second angle is within 0 to a half turn where the first
-    axis comes again, within a quarter turn either way where it does not; the others count turns. A part of space.
+    axis comes again, within a quarter turn either way where it does not; the others count turns. Where the first
+    and the third axis are parallel, within 1e-10 rad, the first and third angles are zero and the rates have no value.
+    A part of space.
     """
 
     spaces = ("space",)
@@ -44,8 +47,8 @@ class OrientationSensor(Component):
         """Return the angle of the first turn."""
         i, j, k, again, sense = self._sequence()
         if again:
-            return atan2(self._entry(j, i), -sense * self._entry(k, i))
-        return atan2(-sense * self._entry(j, k), self._entry(k, k))
+            return angle_off_pole(self._entry(j, i), -sense * self._entry(k, i))
+        return angle_off_pole(-sense * self._entry(j, k), self._entry(k, k))
 
     @observable(unit="rad", doc="Second Euler angle.", spaces=("space",))
     def angle_2(self) -> Scalar:
@@ -62,37 +65,35 @@ class OrientationSensor(Component):
         """Return the angle of the third turn."""
         i, j, k, again, sense = self._sequence()
         if again:
-            return atan2(self._entry(i, j), sense * self._entry(i, k))
-        return atan2(-sense * self._entry(i, j), self._entry(i, i))
+            return angle_off_pole(self._entry(i, j), sense * self._entry(i, k))
+        return angle_off_pole(-sense * self._entry(i, j), self._entry(i, i))
 
-    def _outer_axes(self) -> tuple[Vector, Vector, Scalar]:
-        """Return the axes of the first and the third turn in world axes, and the cosine between them."""
+    def _outer_axes(self) -> tuple[Vector, Vector, Vector, Scalar]:
+        """Return the axes of the first and the third turn in world axes, their vector product, and its square."""
         first = self.a.axes["xyz".index(self.convention[0])]
         third = self.b.axes["xyz".index(self.convention[2])]
-        return first, third, dot(first, third)
+        normal = cross(first, third)
+        return first, third, normal, dot(normal, normal)
 
     @observable(unit="rad/s", doc="Rate of the first angle.", spaces=("space",))
     def rate_1(self) -> Scalar:
         """Return the component of the relative angular velocity along the first axis, in the frame of the three."""
-        first, third, cosine = self._outer_axes()
-        spin = self.relative_spin()
-        return (dot(spin, first) - cosine * dot(spin, third)) / (1.0 - cosine * cosine)
+        _, third, normal, square = self._outer_axes()
+        return rate_off_pole(dot(self.relative_spin(), cross(third, normal)), square, square)
 
     @observable(unit="rad/s", doc="Rate of the second angle.", spaces=("space",))
     def rate_2(self) -> Scalar:
         """Return the component of the relative angular velocity along the second axis, the normal of the others."""
-        first, third, _ = self._outer_axes()
+        _, _, normal, square = self._outer_axes()
         _, _, _, again, sense = self._sequence()
-        normal = cross(first, third) if again else cross(third, first)
-        factor = 1.0 if again else sense
-        return factor * dot(self.relative_spin(), normal) / norm(normal)
+        factor = 1.0 if again else -sense
+        return rate_off_pole(factor * dot(self.relative_spin(), normal), sqrt(square), square)
 
     @observable(unit="rad/s", doc="Rate of the third angle.", spaces=("space",))
     def rate_3(self) -> Scalar:
         """Return the component of the relative angular velocity along the third axis."""
-        first, third, cosine = self._outer_axes()
-        spin = self.relative_spin()
-        return (dot(spin, third) - cosine * dot(spin, first)) / (1.0 - cosine * cosine)
+        first, _, normal, square = self._outer_axes()
+        return rate_off_pole(dot(self.relative_spin(), cross(normal, first)), square, square)
 
     def relative_spin(self) -> Vector:
         """Return the angular velocity of frame b as seen from frame a, in world axes."""
