@@ -12,7 +12,7 @@ from atwood.pipeline import assemble
 from atwood.solve import matrices
 from atwood.solve.matrices import from_entries, independent_rows, least_norm
 from atwood.solve.sparse import csr_of, free_columns, smallest_direction, solve_bordered
-from atwood.solve.sparse_batch import Elimination, Normal, Pattern, solve_borders
+from atwood.solve.sparse_batch import Borders, Elimination, Normal, Pattern
 from atwood_library import Ground, PointMass, Rod
 from atwood_library.scenes.chain import Chain
 from atwood_library.scenes.four_bar import FourBar
@@ -176,7 +176,7 @@ def test_many_states_at_once() -> None:
     at = Pattern(np.array([*range(n), 0, 1]), np.array([*range(n), 1, 0]), (n, n))
     masses = np.concatenate([random.uniform(1.0, 2.0, (n, states)), np.full((2, states), 0.25)])
     bias = random.standard_normal((n, states))
-    a, multipliers, good = solve_borders((at, masses), (held, entries), bias, right)
+    a, multipliers, good = Borders(at, held).solve(masses, entries, bias, right)
     assert good.all()
     for k in range(states):
         slope = csr_of(rows, columns, entries[:, k], (m, n))
@@ -188,10 +188,27 @@ def test_many_states_at_once() -> None:
         np.testing.assert_allclose(multipliers[:, k], solved[1], atol=1e-11)
 
 
+def test_multipliers_of_least_size_for_many_states_at_once() -> None:
+    m, n, states = 40, 90, 5
+    rows, columns, _ = _local_matrix(m, n, 7)
+    entries = np.random.default_rng(9).standard_normal((len(rows), states))
+    # three more rows, each a combination of two others, and one that is another in other units
+    full = np.stack([csr_of(rows, columns, entries[:, k], (m, n)).toarray() for k in range(states)])
+    made = [full[:, 3] - 2.0 * full[:, 4], full[:, 5] + full[:, 30], 1e6 * full[:, 7]]
+    every = np.concatenate([full, np.stack(made, axis=1)], axis=1)
+    places = np.nonzero(np.any(every != 0.0, axis=0))
+    whole = Pattern(*places, (m + 3, n))
+    multipliers = np.random.default_rng(10).standard_normal((m, states))
+    found = Normal(whole, range(m)).least_size(every[:, *places].T, multipliers)
+    for k in range(states):
+        expected = np.linalg.pinv(every[k].T, rcond=1e-12) @ (full[k].T @ multipliers[:, k])
+        np.testing.assert_allclose(found[:, k], expected, atol=1e-10)
+
+
 def test_what_has_no_mass_of_its_own_is_reported_as_not_solved() -> None:
     at, held = Pattern(np.array([1]), np.array([1]), (2, 2)), Pattern(np.array([0, 0]), np.array([0, 1]), (1, 2))
-    *_, good = solve_borders(
-        (at, np.ones((1, 1))), (held, np.array([[1.0], [-1.0]])), np.array([[0.5], [1.0]]), np.zeros((1, 1))
+    *_, good = Borders(at, held).solve(
+        np.ones((1, 1)), np.array([[1.0], [-1.0]]), np.array([[0.5], [1.0]]), np.zeros((1, 1))
     )
     assert not good.any()
 

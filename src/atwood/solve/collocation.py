@@ -9,8 +9,9 @@ repeated integration, with each state projected onto the constraints before forc
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
+from typing import TypeAlias
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -18,17 +19,26 @@ from numpy.polynomial import legendre
 from atwood.errors import AtwoodError
 from atwood.solve.driver import FloatArray
 from atwood.solve.problem import Plan
-from atwood.solve.projection import project_safely, project_states
-from atwood.solve.reactions import accelerations_and_multipliers
+from atwood.solve.projection import Held, nearly_projected, project_safely, project_states
+from atwood.solve.reactions import accelerations_at
 
 __all__ = ["Arc", "Path", "find_arc", "follow"]
 
-_POINTS, _FEWER = 12, 10
-"""Of the polynomials, and of those that they are compared with."""
+States: TypeAlias = tuple[FloatArray, FloatArray]
+"""Coordinates and speeds, each of shape (number, times)."""
+
+_POINTS = 12
+"""Of the polynomials."""
+
+_LAST = 2
+"""What the last so many coefficients add up to tells the error of a polynomial."""
 
 _SWEEPS = 60
 _PATIENCE = 8
 """In so many sweeps changes must become clearly smaller."""
+
+_CLOSE = 1e-4
+"""Once a sweep changes less, one Newton step is enough to project what it gave."""
 
 _SETTLED = 1e-14
 _ROUNDED = 1e-8
@@ -93,7 +103,14 @@ class Path:
         return found[0], found[1], found[2]
 
 
-def find_arc(plan: Plan, t: float, q: FloatArray, u: FloatArray, end: float) -> Arc | None:
+def find_arc(
+    plan: Plan,
+    t: float,
+    q: FloatArray,
+    u: FloatArray,
+    end: float,
+    guess: Callable[[FloatArray], States | None] | None = None,
+) -> Arc | None:
     """Return how a motion goes on from a state; None where no smooth motion is found.
 
     Parameters
@@ -104,53 +121,53 @@ def find_arc(plan: Plan, t: float, q: FloatArray, u: FloatArray, end: float) -> 
         A state that fulfils the constraints.
     end
         When the arc is to end. A place where constraints depend on each other may lie in the middle between.
+    guess
+        Gives coordinates and speeds at times, about, or None where it cannot; then they are those of the state.
     """
+    x, _ = _points()
+    times = t + 0.5 * (end - t) * (x + 1.0)
     try:
         with np.errstate(all="ignore"):
-            begin = (q[:, None] + np.zeros(_FEWER), u[:, None] + np.zeros(_FEWER))
-            rough = _settle(plan, (t, q, u), end, begin, _FEWER)
-            if rough is None:
-                return None
-            x, _ = _points(_POINTS)
-            times = t + 0.5 * (end - t) * (x + 1.0)
-            fine = _settle(plan, (t, q, u), end, rough.at(times)[:2], _POINTS)
+            known = None if guess is None else guess(times)
+            begin = known or (np.repeat(q[:, None], _POINTS, 1), np.repeat(u[:, None], _POINTS, 1))
+            return _settle(plan, (t, q, u), end, times, begin)
     except AtwoodError:  # a state without a value, or without accelerations: nothing goes on smoothly here
         return None
-    if fine is None:
-        return None
-    apart = [one - other for one, other in zip(fine.at(times)[:2], rough.at(times)[:2], strict=True)]
-    return replace(fine, error=max(fine.error, _size(plan, *apart)))
 
 
 @cache
-def _points(count: int) -> tuple[FloatArray, FloatArray]:
+def _points() -> tuple[FloatArray, FloatArray]:
     """Return the points, and the matrix that gives coefficients of the integral from values at them."""
-    x, weights = legendre.leggauss(count)
-    order = np.arange(count)
-    coefficients = (order + 0.5)[:, None] * (legendre.legvander(x, count - 1) * weights[:, None]).T
+    x, weights = legendre.leggauss(_POINTS)
+    order = np.arange(_POINTS)
+    coefficients = (order + 0.5)[:, None] * (legendre.legvander(x, _POINTS - 1) * weights[:, None]).T
     return x, np.asarray(legendre.legint(coefficients, lbnd=-1), dtype=np.float64)
 
 
+_REACH = legendre.legvander(legendre.leggauss(_POINTS)[0], _POINTS)
+"""Gives values at the points from coefficients."""
+
+
 def _settle(
-    plan: Plan,
-    begin: tuple[float, FloatArray, FloatArray],
-    end: float,
-    guess: tuple[FloatArray, FloatArray],
-    count: int,
+    plan: Plan, begin: tuple[float, FloatArray, FloatArray], end: float, times: FloatArray, guess: States
 ) -> Arc | None:
     """Integrate the rates at the points again and again until nothing changes."""
     t, q, u = begin
-    x, integral = _points(count)
+    integral = _points()[1]
     half = 0.5 * (end - t)
-    times, reach = t + half * (x + 1.0), legendre.legvander(x, count)
+    kept = np.asarray(plan.finding.kept, dtype=np.intp)
     last, sizes = np.inf, []
     places, speeds = guess
     for _ in range(_SWEEPS):
-        rates, accelerations = _rates(plan, times, places, speeds)
-        moved, turned = half * (integral @ rates.T), half * (integral @ accelerations.T)
-        moved[0] += q
+        held = _held(plan, times, places, speeds, last > _CLOSE)
+        accelerations = accelerations_at(plan.assembly, plan.assembly.form, times, held.coordinates, held.speeds, kept)
+        turned = half * (integral @ accelerations.T)
         turned[0] += u
-        now = (reach @ moved).T, (reach @ turned).T
+        later = (_REACH @ turned).T  # known already, and twice as near as what the places would follow from
+        rates = plan.balance.turning.rates_each(times, held.coordinates, held.hold(later))
+        moved = half * (integral @ rates.T)
+        moved[0] += q
+        now = (_REACH @ moved).T, later
         change = _size(plan, now[0] - places, now[1] - speeds)
         places, speeds = now
         if not np.isfinite(change) or change > 1e3:
@@ -158,26 +175,26 @@ def _settle(
         sizes.append(change)
         if len(sizes) > _PATIENCE and change > 0.3 * sizes[-_PATIENCE] and change > _ROUNDED:
             return None
-        if change < _SETTLED or (change < _ROUNDED and change >= 0.5 * last):
-            return Arc(t, end, moved, turned, change)
+        left = change * change / last if last < np.inf else change  # what the next sweep would change, about
+        if min(change, 10.0 * left) < _SETTLED or (change < _ROUNDED and change >= 0.5 * last):
+            rest = np.sum(np.abs(moved[-_LAST:]), axis=0), np.sum(np.abs(turned[-_LAST:]), axis=0)
+            return Arc(t, end, moved, turned, max(min(change, left), _size(plan, *rest)))
         last = change
     return None
 
 
-def _rates(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives of coordinates and speeds at states near the constraints."""
-    if plan.balance.constraints:
-        made = project_states(plan, t, q, u)
-        q, u = made.coordinates, made.speeds
-        bad = made.doubtful | ~np.all(np.isfinite(q), axis=0) | ~np.all(np.isfinite(u), axis=0)
-        for i in np.flatnonzero(bad):
-            q[:, i], u[:, i] = project_safely(plan, float(t[i]), q[:, i], u[:, i])
-    kept = np.asarray(plan.finding.kept, dtype=np.intp)
-    accelerations = accelerations_and_multipliers(plan.assembly, plan.assembly.form, t, q, u, kept)[0]
-    turning = plan.balance.turning
-    if turning.is_plain:
-        return u, accelerations
-    return np.stack([turning.rates(float(t[i]), q[:, i], u[:, i]) for i in range(len(t))], axis=1), accelerations
+def _held(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray, is_far: bool) -> Held:
+    """Return states near the constraints, or at first far from them, that are projected onto these."""
+    if not plan.balance.constraints:
+        return Held(q, u, lambda speeds: speeds)
+    if not is_far:
+        return nearly_projected(plan, t, q, u)
+    made = project_states(plan, t, q, u)
+    q, u = made.coordinates, made.speeds
+    bad = made.doubtful | ~np.all(np.isfinite(q), axis=0) | ~np.all(np.isfinite(u), axis=0)
+    for i in np.flatnonzero(bad):
+        q[:, i], u[:, i] = project_safely(plan, float(t[i]), q[:, i], u[:, i])
+    return Held(q, u, lambda speeds: speeds)
 
 
 def _size(plan: Plan, q: FloatArray, u: FloatArray) -> float:
@@ -225,7 +242,7 @@ def follow(
     whole, arcs = end - t, []
     h = 0.25 * whole
     far = here = float(measure(np.array([t]), q[:, None])[0])
-    x = _points(_POINTS)[0]
+    x = _points()[0]
     for _ in range(int(np.clip(_WORK / plan.program.size, _FEWEST, _TRIES))):
         h = min(h, end - t)
         arc = find_arc(plan, t, q, u, t + h)

@@ -297,10 +297,8 @@ class Guard:
             s = np.linspace(0.0, 1.0, _FINE)
             if first == 0:  # perhaps it starts quite near
                 s = np.unique(np.concatenate([s, np.geomspace(1e-5, 0.05, _FINE)]))
-            # the cubic through both states with their rates
-            a, b = one.y[: self._n, None], other.y[: self._n, None]
-            v, w = h * one.yp[: self._n, None], h * other.yp[: self._n, None]
-            places.append(a + s * v + s**2 * (3.0 * (b - a) - 2.0 * v - w) + s**3 * (2.0 * (a - b) + v + w))
+            a, b, v, w = (part[: self._n, None] for part in (one.y, other.y, h * one.yp, h * other.yp))
+            places.append(_cubic(s, (a, b), (v, w)))
             times.append(one.t + h * s)
         if not times:
             return None
@@ -383,7 +381,7 @@ class Guard:
         """Return the way over a singular position near a time, from a state."""
         plan, accurate = self.plan, max(self.tolerance, _ACCURATE)
         for _ in range(8):
-            arc = find_arc(plan, t, q, u, 2.0 * near - t)
+            arc = find_arc(plan, t, q, u, 2.0 * near - t, self._between)
             if arc is None or not arc.error < accurate:
                 # It is too long: perhaps one half of the way is not.
                 arc = find_arc(plan, t, q, u, 0.5 * (t + near))
@@ -402,7 +400,28 @@ class Guard:
             return self._passage(arc, now, away)
         return None
 
+    def _between(self, t: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Return coordinates and speeds at times, from what the solver gave around them; None beyond that."""
+        looks = self._looks
+        if not (looks[0].t <= t[0] and t[-1] <= looks[-1].t):
+            return None
+        times = np.array([one.t for one in looks])
+        y, yp = (np.stack([getattr(one, name)[: self._n + self._m] for one in looks], axis=1) for name in ("y", "yp"))
+        after = np.clip(np.searchsorted(times, t), 1, len(times) - 1)
+        h = times[after] - times[after - 1]
+        both = _cubic(
+            (t - times[after - 1]) / h, (y[:, after - 1], y[:, after]), (h * yp[:, after - 1], h * yp[:, after])
+        )
+        return both[: self._n], both[self._n :]
+
     def _passage(self, arc: Arc, t: float, away: float) -> Passage | None:
         """Return the passage that an arc makes at a time; None if that is no singular position."""
         loss = find_loss(self._measures, arc, t, away)
         return None if loss is None else Passage(t, loss.rank, *self._said(loss.constraints), Path((arc,)), loss.gap)
+
+
+def _cubic(s: FloatArray, ends: tuple[FloatArray, FloatArray], slopes: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Return the cubic through two states with their rates, at shares of the way from one to the other."""
+    (a, b), (v, w) = ends, slopes
+    found: FloatArray = a + s * v + s**2 * (3.0 * (b - a) - 2.0 * v - w) + s**3 * (2.0 * (a - b) + v + w)
+    return found

@@ -7,7 +7,7 @@ constraints nearly depend on each other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,15 @@ from atwood.solve.problem import Plan
 if TYPE_CHECKING:
     from atwood.solve.sparse_batch import Normal
 
-__all__ = ["ConstraintsAt", "Projected", "constraints_at", "misses_of", "project_safely", "project_states"]
+__all__ = [
+    "ConstraintsAt",
+    "Projected",
+    "constraints_at",
+    "misses_of",
+    "nearly_projected",
+    "project_safely",
+    "project_states",
+]
 
 _MET = 1e-11
 """Relative to the scene's sizes: a constraint that is missed by less is met."""
@@ -87,10 +95,19 @@ class ConstraintsAt:
         rows
             Of positions, which of them hold positions; the independent ones if not given.
         """
+        if self.normal is not None or rows is None:
+            return self.solver()(right)
+        chosen = list(rows)
+        return _least_norm(self.slope[:, chosen])(right[:, chosen])
+
+    def solver(self) -> Callable[[FloatArray], FloatArray]:
+        """Return what gives such displacements for one right-hand side after another."""
+        kept = self.kept
         if self.normal is not None:
-            return self.normal.least_norm(self.slope, right[:, self.kept].T).T
-        chosen = self.kept if rows is None else list(rows)
-        return _least_norm(self.slope[:, chosen], right[:, chosen])
+            solve = self.normal.factorised(self.slope)
+            return lambda right: solve(right[:, kept].T).T
+        dense = _least_norm(self.slope[:, kept])
+        return lambda right: dense(right[:, kept])
 
 
 def project_states(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
@@ -114,6 +131,52 @@ def project_states(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> P
         for name in ("coordinates", "speeds", "held", "doubtful")
     )
     return Projected(*joined)
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """States after one step of Newton's method towards the constraints.
+
+    Attributes
+    ----------
+    coordinates, speeds
+        Shape (number, states).
+    hold
+        Projects other speeds at the same places.
+    """
+
+    coordinates: FloatArray
+    speeds: FloatArray
+    hold: Callable[[FloatArray], FloatArray]
+
+
+def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Held:
+    """Return states after one step of Newton's method towards the constraints on position and velocity.
+
+    For iterations that come ever nearer to the constraints by themselves: what is missed is missed squared afterwards.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    t, q, u
+        States quite near the constraints, of shape (states,) and (number, states).
+    """
+    sizes, turning = plan.sizes[:, None], plan.balance.turning
+    holding = plan.balance.holding(list(plan.finding.kept))
+    q = turning.normalized(q)
+    now = constraints_at(plan, t, q, u)
+    q = turning.moved_each(t, q, -sizes * now.step(now.value, holding).T)
+    now = constraints_at(plan, t, q, u)
+    solve = now.solver()
+
+    def hold(other: FloatArray) -> FloatArray:
+        speeds = (other / sizes).T
+        for _ in range(2):  # the second pass takes out the rounding of the first
+            speeds = speeds - solve(now.rate(speeds))
+        return sizes * speeds.T
+
+    return Held(q, hold(u), hold)
 
 
 def misses_of(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
@@ -203,22 +266,29 @@ def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Project
         step = now.step(now.value, holding)
         q = turning.moved_each(t, q, -sizes * np.where(active[:, None], step, 0.0).T)
         now = constraints_at(plan, t, q, u)
+    solve = now.solver()
     for _ in range(2):  # the second pass takes out the rounding of the first
-        speeds = speeds - now.step(now.rate(speeds))
+        speeds = speeds - solve(now.rate(speeds))
     left = _largest(now, speeds) * np.array([[1.0], [plan.scales.time]])
     doubtful = active | ~np.all(left <= 10.0 * _MET, axis=0)
     return Projected(q, sizes * speeds.T, held, doubtful)
 
 
-def _least_norm(slope: FloatArray, right: FloatArray) -> FloatArray:
-    """Return the shortest solutions of ``slope x = right``; not finite where rows depend on each other."""
+def _least_norm(slope: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Return what gives the shortest solutions of ``slope x = right``; not finite where rows depend on each other."""
+    across = np.swapaxes(slope, 1, 2)
     with np.errstate(all="ignore"):
-        square = slope @ np.swapaxes(slope, 1, 2)
-        try:
-            solved = np.linalg.solve(square, right[:, :, None])
-        except np.linalg.LinAlgError:
-            return np.full((len(slope), slope.shape[2]), np.nan)
-        return np.asarray((np.swapaxes(slope, 1, 2) @ solved)[:, :, 0])
+        square = slope @ across
+
+    def solve(right: FloatArray) -> FloatArray:
+        with np.errstate(all="ignore"):
+            try:
+                solved = np.linalg.solve(square, right[:, :, None])
+            except np.linalg.LinAlgError:
+                return np.full((len(slope), slope.shape[2]), np.nan)
+            return np.asarray((across @ solved)[:, :, 0])
+
+    return solve
 
 
 def project_safely(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:

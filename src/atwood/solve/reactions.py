@@ -21,9 +21,10 @@ from atwood.solve.columns import masses_at
 from atwood.solve.matrices import is_best_full
 from atwood.solve.rank import find_rank
 from atwood.solve.scales import motion_scales, scene_length
+from atwood.solve.sparse_states import States
 from atwood.solve.turning import turning_of
 
-__all__ = ["ReactionSolver", "accelerations_and_multipliers", "maximal_state"]
+__all__ = ["ReactionSolver", "accelerations_and_multipliers", "accelerations_at", "maximal_state"]
 
 FloatArray = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ def maximal_state(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArra
 def accelerations_and_multipliers(
     assembly: Assembly, form: FormName, t: FloatArray, q: FloatArray, u: FloatArray, kept: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Solve the balance of forces for many states.
+    """Solve the balance of forces for many states, with the multipliers of all constraints.
 
     Parameters
     ----------
@@ -60,13 +61,37 @@ def accelerations_and_multipliers(
         multipliers are those of least size.
     """
     program = assembly.balance(form)
-    n, m, samples = program.speeds, program.constraints, len(t)
-    mass, bias, _, _, gamma, slope, drift = assembly.kernel(program.program, vectorized=True)(t[None, :], q, u)
-    if program.mass_product is None and not is_best_full((n, n), len(mass), many=True):
-        from atwood.solve.sparse_states import solve_states
+    values = assembly.kernel(program.program, vectorized=True)(t[None, :], q, u)
+    return *_solved(assembly, form, (t, q, u), kept, values, True), np.asarray(values[6])
 
-        return *solve_states(program, t, (mass, bias, gamma, slope), kept), np.asarray(drift)
-    found_a, found_l = np.zeros((n, samples)), np.zeros((m, samples))
+
+def accelerations_at(
+    assembly: Assembly, form: FormName, t: FloatArray, q: FloatArray, u: FloatArray, kept: NDArray[np.intp]
+) -> FloatArray:
+    """Return the accelerations alone; see `accelerations_and_multipliers`."""
+    values = assembly.kernel(assembly.balance(form).program, vectorized=True)(t[None, :], q, u)
+    return _solved(assembly, form, (t, q, u), kept, values, False)[0]
+
+
+def _solved(
+    assembly: Assembly,
+    form: FormName,
+    state: tuple[FloatArray, FloatArray, FloatArray],
+    kept: NDArray[np.intp],
+    values: tuple[FloatArray, ...],
+    every: bool,
+) -> tuple[FloatArray, FloatArray]:
+    """Return accelerations and multipliers, those of redundant constraints too if every one is asked for."""
+    program, (t, q, u) = assembly.balance(form), state
+    n, m, samples = program.speeds, program.constraints, len(t)
+    mass, bias, _, _, gamma, slope, _ = values
+    if program.mass_product is None and not is_best_full((n, n), len(mass), many=True):
+        chosen = tuple(kept.tolist())
+        states = assembly.shared.get(("states", form, chosen), lambda: States(program, chosen))
+        a, found = states.solve(t, (mass, bias, gamma, slope))
+        return a, states.least_size(slope, found) if every else found
+    is_redundant = every and len(kept) < m
+    found_a, found_l = np.zeros((n, samples)), np.zeros((m if every else len(kept), samples))
     size = n + len(kept)
     step = max(1, _CHUNK // max(1, size * size))
     for first in range(0, samples, step):
@@ -95,13 +120,12 @@ def accelerations_and_multipliers(
             ) from None
         solved = solution[..., 0] / scale
         found_a[:, part] = solved[:, :n].T
-        if len(kept) == m:
-            found_l[:, part] = solved[:, n:].T
-        else:
-            force = np.einsum("sij,sj->si", full_mass, solved[:, :n]) + bias[:, part].T
-            pseudo = np.linalg.pinv(np.swapaxes(full_slope, 1, 2), rcond=1e-9)
-            found_l[:, part] = np.einsum("sij,sj->si", pseudo, force).T
-    return found_a, found_l, np.asarray(drift)
+        found = solved[:, n:, None]
+        if is_redundant:
+            across = np.swapaxes(full_slope, 1, 2)
+            found = np.linalg.pinv(across, rcond=1e-9) @ (across[:, :, kept] @ found)
+        found_l[:, part] = found[:, :, 0].T
+    return found_a, found_l
 
 
 class ReactionSolver:
@@ -166,4 +190,4 @@ class ReactionSolver:
             if rates is not None:
                 found: FloatArray = self.assembly.kernel(rates.program, vectorized=True)(t[None, :], q, u)[-1]
                 return found
-        return accelerations_and_multipliers(self.assembly, self.assembly.form, t, q, u, kept)[0]
+        return accelerations_at(self.assembly, self.assembly.form, t, q, u, kept)

@@ -8,13 +8,13 @@ entry, and one column for each state.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Elimination", "Normal", "Pattern", "solve_borders"]
+__all__ = ["Augmented", "Borders", "Elimination", "Normal", "Pattern"]
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -193,7 +193,7 @@ class Normal:
     """
 
     def __init__(self, whole: Pattern, kept: Sequence[int]) -> None:
-        self.whole = whole
+        self.whole, self.kept = whole, tuple(kept)
         self.pattern, self._which = whole.chosen(kept)
         pattern = self.pattern
         by_column: dict[int, list[tuple[int, int]]] = {}
@@ -231,61 +231,166 @@ class Normal:
         right
             What A x is to be, shape (kept rows, states).
         """
+        return self.factorised(entries)(right)
+
+    def factorised(self, entries: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        """Return what gives the shortest solutions for one right-hand side after another; see `least_norm`."""
         entries = entries[self._which]
         factors = self._factorise(entries)
-        found = self.pattern.times_across(entries, self.elimination.solve(factors, right))
-        missing = right - self.pattern.times(entries, found)
-        return found + self.pattern.times_across(entries, self.elimination.solve(factors, missing))
+
+        def solve(right: FloatArray) -> FloatArray:
+            found = self.pattern.times_across(entries, self.elimination.solve(factors, right))
+            missing = right - self.pattern.times(entries, found)
+            found += self.pattern.times_across(entries, self.elimination.solve(factors, missing))
+            return found
+
+        return solve
+
+    def least_size(self, entries: FloatArray, multipliers: FloatArray) -> FloatArray:
+        """Return the multipliers of all rows of least size whose force is that of some of those that are kept.
+
+        The rows that are left out are combinations ``D = C K`` of those that are kept. Their multipliers minimise
+        ``|k - C^T d|^2 + |d|^2``, so that ``(1 + C C^T) d = C k``.
+
+        Parameters
+        ----------
+        entries
+            Of the whole matrix, shape (entries, states).
+        multipliers
+            Of the rows that are kept, shape (kept rows, states).
+        """
+        rows, states = self.whole.shape[0], entries.shape[1]
+        kept = np.array(self.kept, dtype=np.intp)
+        left_out = np.setdiff1d(np.arange(rows), kept)
+        sizes = self.whole.largest(entries)
+        sizes[sizes == 0.0] = 1.0
+        scaled = entries / sizes[self.whole.rows]
+        held = scaled[self._which]
+        factors = self._factorise(held)
+        shares = np.empty((len(left_out), len(kept), states))
+        for i, row in enumerate(left_out):
+            wanted = np.zeros((self.whole.shape[1], states))
+            own = np.flatnonzero(self.whole.rows == row)
+            wanted[self.whole.columns[own]] = scaled[own]
+            found = self.elimination.solve(factors, self.pattern.times(held, wanted))
+            for _ in range(2):
+                missing = wanted - self.pattern.times_across(held, found)
+                found = found + self.elimination.solve(factors, self.pattern.times(held, missing))
+            shares[i] = found * sizes[row] / sizes[kept]
+        moved = np.moveaxis(shares, 2, 0)
+        square = np.eye(len(left_out)) + moved @ np.swapaxes(moved, 1, 2)
+        taken = np.linalg.solve(square, moved @ multipliers.T[:, :, None])
+        every = np.zeros((rows, states))
+        every[kept] = multipliers - (np.swapaxes(moved, 1, 2) @ taken)[:, :, 0].T
+        every[left_out] = taken[:, :, 0].T
+        return every
 
 
-def solve_borders(
-    mass: tuple[Pattern, FloatArray], slope: tuple[Pattern, FloatArray], bias: FloatArray, gamma: FloatArray
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Solve ``M a + bias = G^T lambda``, ``G a + gamma = 0`` for many states, the masses first.
+class Borders:
+    """Solutions of ``M a + bias = G^T lambda``, ``G a + gamma = 0`` for many states, the masses first.
 
     Parameters
     ----------
     mass, slope
-        M and G, with their entries for each state.
-    bias, gamma
-        Shape (number, states).
-
-    Returns
-    -------
-    accelerations, multipliers
-        Shape (number, states).
-    good
-        For which states the solution fulfils its equations; where something has no mass of its own it may not.
+        Where M and G have entries.
     """
-    n, m = len(bias), len(gamma)
-    (at, masses), (held, slopes) = mass, slope
-    places = list(zip(at.rows.tolist(), at.columns.tolist(), strict=True))
-    borders = [(c, n + r) for r, c in zip(held.rows.tolist(), held.columns.tolist(), strict=True)]
-    elimination = Elimination(n + m, [*places, *borders], range(n, n + m))
-    entries = np.zeros((len(elimination.number), bias.shape[1]))
-    upper = np.flatnonzero(at.rows <= at.columns)
-    entries[[elimination.number[places[k]] for k in upper.tolist()]] = masses[upper]
-    entries[[elimination.number[one] for one in borders]] = -slopes
-    factors = elimination.factorise(entries)
-    right = np.concatenate([-bias, gamma])
-    found = np.zeros((n + m, bias.shape[1]))
-    sizes = np.zeros((n + m, bias.shape[1]))
-    for _ in range(2):
+
+    def __init__(self, mass: Pattern, slope: Pattern) -> None:
+        self.mass, self.slope = mass, slope
+        n, m = slope.shape[1], slope.shape[0]
+        places = list(zip(mass.rows.tolist(), mass.columns.tolist(), strict=True))
+        borders = [(c, n + r) for r, c in zip(slope.rows.tolist(), slope.columns.tolist(), strict=True)]
+        self._elimination = Elimination(n + m, [*places, *borders], range(n, n + m))
+        number = self._elimination.number
+        self._upper = np.flatnonzero(mass.rows <= mass.columns)
+        self._masses = np.array([number[places[k]] for k in self._upper.tolist()], dtype=np.intp)
+        self._slopes = np.array([number[one] for one in borders], dtype=np.intp)
+
+    def solve(
+        self, masses: FloatArray, slopes: FloatArray, bias: FloatArray, gamma: FloatArray
+    ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+        """Return the solutions.
+
+        Parameters
+        ----------
+        masses, slopes
+            Entries of M and G for each state.
+        bias, gamma
+            Shape (number, states).
+
+        Returns
+        -------
+        accelerations, multipliers
+            Shape (number, states).
+        good
+            For which states the solution fulfils its equations; where something has no mass of its own it may not.
+        """
+        n, m = len(bias), len(gamma)
+        elimination = self._elimination
+        entries = np.zeros((len(elimination.number), bias.shape[1]))
+        entries[self._masses] = masses[self._upper]
+        entries[self._slopes] = -slopes
+        factors = elimination.factorise(entries)
+        right = np.concatenate([-bias, gamma])
+        found = elimination.solve(factors, right)
+        found = found + elimination.solve(factors, self._missing(masses, slopes, right, found))
         a, multipliers = found[:n], found[n:]
-        missing = np.concatenate(
-            [
-                right[:n] - at.times(masses, a) + held.times_across(slopes, multipliers),
-                right[n:] + held.times(slopes, a),
-            ]
-        )
-        found = found + elimination.solve(factors, missing)
-    a, multipliers = found[:n], found[n:]
-    sizes[:n] = at.times(np.abs(masses), np.abs(a)) + held.times_across(np.abs(slopes), np.abs(multipliers))
-    sizes[n:] = held.times(np.abs(slopes), np.abs(a))
-    left = np.concatenate(
-        [right[:n] - at.times(masses, a) + held.times_across(slopes, multipliers), right[n:] + held.times(slopes, a)]
-    )
-    scale = np.max(sizes, axis=0, initial=0.0) + np.max(np.abs(right), axis=0, initial=0.0)
-    with np.errstate(invalid="ignore"):
-        good = np.all(np.abs(left) <= 1e-10 * np.maximum(scale, 1e-300), axis=0)
-    return a, multipliers, good
+        sizes = np.zeros((n + m, bias.shape[1]))
+        sizes[:n] = self.mass.times(np.abs(masses), np.abs(a))
+        sizes[:n] += self.slope.times_across(np.abs(slopes), np.abs(multipliers))
+        sizes[n:] = self.slope.times(np.abs(slopes), np.abs(a))
+        scale = np.max(sizes, axis=0, initial=0.0) + np.max(np.abs(right), axis=0, initial=0.0)
+        left = self._missing(masses, slopes, right, found)
+        with np.errstate(invalid="ignore"):
+            good: NDArray[np.bool_] = np.all(np.abs(left) <= 1e-10 * np.maximum(scale, 1e-300), axis=0)
+        return a, multipliers, good
+
+    def _missing(self, masses: FloatArray, slopes: FloatArray, right: FloatArray, found: FloatArray) -> FloatArray:
+        n = self.slope.shape[1]
+        a, multipliers = found[:n], found[n:]
+        forces = self.slope.times_across(slopes, multipliers) - self.mass.times(masses, a)
+        missing: FloatArray = right + np.concatenate([forces, self.slope.times(slopes, a)])
+        return missing
+
+
+class Augmented:
+    """The same solutions with ``M + s G^T G`` in place of M, where something has no mass of its own but is held.
+
+    The constraints make the addition ``-s G^T gamma``, which goes to the other side (M. Fortin and R. Glowinski,
+    *Augmented Lagrangian Methods*, chapter I).
+
+    Parameters
+    ----------
+    mass, slope
+        Where M and G have entries.
+    """
+
+    def __init__(self, mass: Pattern, slope: Pattern) -> None:
+        by_row: dict[int, list[tuple[int, int]]] = {}
+        for entry, (row, column) in enumerate(zip(slope.rows.tolist(), slope.columns.tolist(), strict=True)):
+            by_row.setdefault(row, []).append((column, entry))
+        number: dict[tuple[int, int], int] = {}
+        own = [
+            number.setdefault(one, len(number)) for one in zip(mass.rows.tolist(), mass.columns.tolist(), strict=True)
+        ]
+        pairs = [
+            (number.setdefault((i, j), len(number)), e, f) for row in by_row.values() for i, e in row for j, f in row
+        ]
+        self._own, order = np.array(own, dtype=np.intp), sorted(pairs)
+        targets, first, second = (np.array([one[k] for one in order], dtype=np.intp) for k in range(3))
+        self._first, self._second = first, second
+        self._targets, self._starts = np.unique(targets, return_index=True)
+        rows, columns = (np.array([one[k] for one in number], dtype=np.intp) for k in range(2))
+        self._slope, self._borders = slope, Borders(Pattern(rows, columns, mass.shape), slope)
+
+    def solve(
+        self, masses: FloatArray, slopes: FloatArray, bias: FloatArray, gamma: FloatArray
+    ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+        """Return the solutions; see `Borders.solve`."""
+        share = np.max(np.abs(masses), axis=0, initial=0.0) / np.max(np.abs(slopes), axis=0, initial=1e-300) ** 2
+        share[share == 0.0] = 1.0
+        entries = np.zeros((len(self._borders.mass.rows), bias.shape[1]))
+        products = slopes[self._first] * slopes[self._second]
+        entries[self._targets] = share * _sums(products, self._starts, len(self._targets))
+        entries[self._own] += masses
+        return self._borders.solve(entries, slopes, bias + share * self._slope.times_across(slopes, gamma), gamma)

@@ -63,6 +63,11 @@ class Turning:
         program = self.program.program
         return u if program is None else np.asarray(self._kernel(program, False)([t], q, u)[0], dtype=float)
 
+    def rates_each(self, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
+        """Do the same for many states, of shape (states,) and (number, states)."""
+        program = self.program.program
+        return u if program is None else np.asarray(self._kernel(program, True)(t[None, :], q, u)[0])
+
     def tangent(self, t: float, q: FloatArray) -> FloatArray:
         """Return B, of shape (coordinates, speeds)."""
         made = self.program
