@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from atwood.expr.analysis import evaluate, live
+from atwood.expr.analysis import evaluate
 from atwood.expr.derivatives import jvp
-from atwood.expr.graph import Expression, Graph
+from atwood.expr.graph import Expression
 from atwood.expr.intervals import bounds
 
-__all__ = ["Relation", "TimeRelations", "relation_value", "values_just_after", "written_out"]
+__all__ = ["Relation", "TimeRelations", "relation_value", "values_just_after"]
 
 _KNOWN, _TIMED, _MOVING = 0, 1, 2
 
@@ -171,39 +171,3 @@ def _side_after(difference: Expression, values: Mapping[Expression, float], time
         if derivative.is_zero:
             break
     return evaluate([difference], values)[0] if derivative is not difference and not derivative.is_zero else 0.0
-
-
-def written_out(expressions: Sequence[Expression]) -> list[Expression]:
-    """Return expressions with relations of functions of time as they were written, to be read by people.
-
-    Parameters
-    ----------
-    expressions
-        Of one graph.
-    """
-    graph = expressions[0].graph if expressions else Graph()
-    if graph.relations is None or not graph.relations.found:
-        return list(expressions)
-    made: dict[int, Expression] = {}
-    for one in graph.relations.found:
-        (difference,) = _with(graph, [one.difference], made)
-        made[one.symbol.index] = _RAW[one.kind](graph, difference)
-    return _with(graph, expressions, made)
-
-
-def _with(graph: Graph, expressions: Sequence[Expression], made: Mapping[int, Expression]) -> list[Expression]:
-    """Put expressions in the place of symbols, and leave all else as it stands."""
-    found = dict(made)
-    for node in live(expressions):
-        arguments = tuple(found.get(one.index, one) for one in node.arguments)
-        if arguments != node.arguments:
-            found[node.index] = graph.node(node.operation, arguments, node.payload)
-    return [found.get(one.index, one) for one in expressions]
-
-
-_RAW: Mapping[str, Callable[[Graph, Expression], Expression]] = {
-    "less": lambda graph, d: graph.node("less", (d, graph.zero)),
-    "less_equal": lambda graph, d: graph.node("less_equal", (d, graph.zero)),
-    "nonzero": lambda graph, d: d,
-    "sign": lambda graph, d: graph.node("sign", (d,)),
-}

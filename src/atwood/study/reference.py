@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from atwood.model.flatten import FlatScene
 from atwood.pipeline import simulate
 from atwood.result.result import Result
 
-__all__ = ["Assembled", "Reference", "compared_paths", "find_reference", "run_form", "scaled_difference"]
+__all__ = ["Assembled", "Reference", "compared_paths", "find_reference", "run_form", "scaled_difference", "table_at"]
 
 Assembled = Callable[[str, str], Assembly]
 """Gives a scene in a form and at a level of the constraints."""
@@ -102,19 +102,20 @@ def find_reference(
     (best, said), (second, other) = tight
     paths = compared_paths(best)
     scales = {path: best.start.length if best.unit(path) == "m" else 1.0 for path in paths}
-    quantities = best.table(paths)
-    error = scaled_difference(quantities, second.table(paths), scales)
-    given = _closed_form(scene, best)
+    time = np.linspace(best.time[0], best.time[-1], outputs)
+    quantities = table_at(best, paths, time)
+    error = scaled_difference(quantities, table_at(second, paths, time), scales)
+    given = {path: values[_places(best, time)] for path, values in _closed_form(scene, best).items()}
     if given:
         known = {path: values for path, values in given.items() if path in best and best.unit(path) in _COMPARED}
         known_scales = {path: best.start.length if best.unit(path) == "m" else 1.0 for path in known}
-        miss = scaled_difference(known, best.table(known), known_scales)
+        miss = scaled_difference(known, table_at(best, known, time), known_scales)
         if known and miss < max(_HOLDS, 100.0 * error):
             text = f"closed form of the scene; {said} agrees with it to {miss:.1e}"
-            return Reference("closed form", text, best.time, known, known_scales, 1e-15, note)
+            return Reference("closed form", text, time, known, known_scales, 1e-15, note)
         note = f"{note} The closed form of the scene belongs to another start and is not used.".strip()
     text = f"{said}; its error is at most about {error:.1e}, by {other}"
-    return Reference("tight solution", text, best.time, quantities, scales, error, note)
+    return Reference("tight solution", text, time, quantities, scales, error, note)
 
 
 def _tight_solutions(
@@ -184,6 +185,26 @@ def run_form(
     if result.status == "interrupted":  # who interrupts one run of a comparison means all of it
         raise KeyboardInterrupt
     return result
+
+
+def table_at(result: Result, paths: Iterable[str], times: FloatArray) -> dict[str, FloatArray]:
+    """Return quantities at output times that were asked for; just after an event, where one happens then.
+
+    Parameters
+    ----------
+    result
+        A run to the last of these times at least.
+    paths
+        Which quantities.
+    times
+        Output times of the run, s.
+    """
+    places = _places(result, times)
+    return {path: values[places] for path, values in result.table(paths).items()}
+
+
+def _places(result: Result, times: FloatArray) -> NDArray[np.intp]:
+    return np.searchsorted(result.time, times, side="right") - 1
 
 
 def compared_paths(result: Result) -> list[str]:
