@@ -362,6 +362,10 @@ def unary(operation: str, a: Expression) -> Expression:
         inner = a.arguments[0]
         if _is_condition(inner):
             return inner
+    if operation in _INVERSES:
+        wave = _time_wave(operation, a)
+        if wave is not None:
+            return wave
     if operation in ("sign", "absolute"):
         side = _time_relation("sign", a)
         if side is not None:
@@ -397,6 +401,31 @@ def binary(operation: str, a: Expression, b: Expression) -> Expression:
             around = add(a.graph.node("atan2", (negate(a), negate(b))), half)
             return select(is_left, around, a.graph.node("atan2", (a, b)))
     return a.graph.node(operation, (a, b))
+
+
+_INVERSES = frozenset({"asin", "acos", "atan"})
+
+
+def _time_wave(operation: str, a: Expression) -> Expression | None:
+    """Return a triangular or saw-tooth wave of time, such as ``asin(sin(w t))``, as an angle that is smooth in pieces.
+
+    So its kinks and jumps, at which sine and cosine only touch or have a pole, are relations like any others.
+    """
+    if a.operation not in ("sin", "cos", "tan"):
+        return None
+    x = a.arguments[0]
+    along, across = unary("cos", x), unary("sin", x)
+    if operation == "atan" and a.operation == "tan":
+        side = _time_relation("sign", along)
+        return None if side is None else a.graph.node("atan2", (multiply(side, across), multiply(side, along)))
+    if operation == "atan" or a.operation == "tan":
+        return None
+    first, second = (across, along) if a.operation == "sin" else (along, across)
+    side = _time_relation("sign", second)
+    if side is None:
+        return None
+    angle = a.graph.node("atan2", (first, multiply(side, second)))  # far from where this jumps
+    return angle if operation == "asin" else subtract(a.graph.constant(0.5 * math.pi), angle)
 
 
 def _time_relation(kind: str, a: Expression, b: Expression | None = None) -> Expression | None:

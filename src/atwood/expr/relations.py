@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from atwood.expr.analysis import evaluate
+from atwood.expr.analysis import evaluate, live
 from atwood.expr.derivatives import jvp
 from atwood.expr.graph import Expression
 from atwood.expr.intervals import bounds
@@ -162,6 +162,8 @@ def values_just_after(relations: Sequence[Relation], known: Mapping[Expression, 
 def _side_after(difference: Expression, values: Mapping[Expression, float], time: Expression) -> float:
     """Return a number with the sign that a function of time has just after a time; 0 where it stays zero."""
     points = {symbol: (np.array([value]), np.array([value])) for symbol, value in values.items()}
+    if any(node.operation == "external" for node in live([difference])):  # it has no bounds, and maybe no derivatives
+        return evaluate([difference], values)[0]
     derivative = difference
     for _ in range(_ORDERS):
         ((low, high),) = bounds([derivative], points)
