@@ -6,7 +6,7 @@ import re
 import pytest
 
 import atwood as aw
-from atwood_library import Ground, PointMass, RigidBody
+from atwood_library import Ground, PointMass, RigidBody, Slider
 
 
 class Wire(aw.Component):
@@ -98,6 +98,18 @@ def test_sound_ones_are_taken(part, space):
 
 def test_a_sound_hinge_in_space_is_taken():
     assert aw.assemble(scene_with(Hinge(), "space")).regular is not None
+
+
+def test_a_slider_along_an_oblique_line_is_taken():
+    """Its normal is square to the line but for rounding, and so is the constraint."""
+    for angle in (0.3, 0.7, 1.1, 2.0, 2.9):
+        axis = (math.cos(angle), 0.0, math.sin(angle))
+        scene = aw.Scene(space="line", line_axis=axis)
+        ground, slider = scene.add("ground", Ground()), scene.add("slider", Slider(axis=axis))
+        bob = scene.add("bob", PointMass())
+        scene.connect(ground.frame, slider.a)
+        scene.connect(slider.b, bob.point)
+        assert aw.assemble(scene).regular is not None
 
 
 # -- joints against constraints ----------------------------------------------------------------------------------------

@@ -186,7 +186,8 @@ def _unsolved(
     values = _value(trial, constraint, poses, moving)
     apart = max([1.0, *(abs(c) / trial.length for pose in poses.values() for c in pose.position)])
     for value, row in zip(values, slopes, strict=True):
-        if abs(value) > TOLERANCE * float(np.abs(row).sum()) * apart:
+        rounding = 1e-12 * apart * max(1.0, trial.length)  # of a constraint that holds in this space by itself
+        if abs(value) > TOLERANCE * float(np.abs(row).sum()) * apart + rounding:
             cls = type(trial.component)
             yield DeclarationError(
                 f"it says that it solves {constraint.name!r}, which is {value:.3g} and not zero where it places "
