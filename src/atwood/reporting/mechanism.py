@@ -28,8 +28,10 @@ from atwood.reporting.parts import (
     list_ties,
 )
 from atwood.solve.immobile import Immobile, find_immobile
+from atwood.solve.matrices import scaled, to_array
 from atwood.solve.placement import Placement, find_placement
 from atwood.solve.problem import Plan, make_plan
+from atwood.solve.rank import FREE, row_scales
 from atwood.solve.run_arguments import NAME, ORIENTATION
 from atwood.solve.scales import motion_names
 from atwood.solve.start import Start, find_start, own_state, settle
@@ -288,11 +290,10 @@ def _plan(assembly: Assembly, start: Start) -> Plan:
 def _not_unique(assembly: Assembly, plan: Plan, start: Start) -> tuple[str, ...]:
     """Return the reactions that a stress without any force from outside could change."""
     q, u = own_state(assembly, start)
-    slope = plan.balance.at(start.time, q, np.zeros_like(u)).slope * plan.sizes
-    sizes = np.maximum(np.max(np.abs(slope), axis=1), 1e-300)
-    _, values, directions = np.linalg.svd((slope / sizes[:, None]).T)
-    rank = int(np.sum(values > 1e-9 * values[0]))
-    involved = np.max(np.abs(directions[rank:]), axis=0, initial=0.0) > 1e-9
+    slope = scaled(to_array(plan.balance.at(start.time, q, np.zeros_like(u)).slope), plan.sizes)
+    rows = row_scales(slope, np.ones_like(u), plan.balance.errors.near(start.time, q, plan.sizes))
+    _, _, directions = np.linalg.svd((slope / rows[:, None]).T)
+    involved = np.max(np.abs(directions[plan.finding.rank :]), axis=0, initial=0.0) > FREE
     constraints = assembly.maximal.constraints
     return tuple(
         dict.fromkeys(f"{one.key[0]}.{one.reaction}" for one, hit in zip(constraints, involved, strict=True) if hit)

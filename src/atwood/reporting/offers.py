@@ -17,8 +17,11 @@ from atwood.mechanics.orientation import node_axes, spin_in_world
 from atwood.model.flatten import FlatScene
 from atwood.model.vector import Vector
 from atwood.pipeline import assemble_flat
-from atwood.solve.balance import balance_of, independent_rows
+from atwood.solve.balance import balance_of
+from atwood.solve.matrices import scaled
 from atwood.solve.problem import make_plan
+from atwood.solve.rank import independent_rows
+from atwood.solve.scales import motion_scales
 from atwood.solve.start import Start, find_start, own_state
 from atwood.solve.symmetry import Symmetry, find_symmetries
 
@@ -232,7 +235,9 @@ def _nodes(assembly: Assembly, start: Start) -> dict[tuple[str, str], FloatArray
     kinematics, graph = equations.kinematics, assembly.mechanism.table.graph
     balance = balance_of(assembly, "reduced")
     q, u = start.coordinates, start.speeds
-    kept = np.asarray(independent_rows(balance.at(start.time, q, u).slope), dtype=np.intp)
+    sizes = motion_scales(equations, start.length)
+    slope = scaled(balance.at(start.time, q, u).slope, sizes)
+    kept = np.asarray(independent_rows(slope, balance.errors.of_slopes(start.time, q, sizes)), dtype=np.intp)
     a, _ = balance.accelerate(start.time, q, u, kept)
     placements = kinematics.placements
     tables = (placements.positions, kinematics.velocities, kinematics.accelerations)

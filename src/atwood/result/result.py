@@ -299,7 +299,7 @@ class Result:
 
     def _accelerations(self, segment: Segment) -> FloatArray:
         """Return the accelerations of the form's coordinates; near singular positions those of the smooth motion."""
-        kept, solver = np.asarray(segment.plan.finding.kept, dtype=np.intp), self._solver(segment)
+        solver = self._solver(segment)
         found, clear = np.zeros_like(segment.speeds), np.ones(len(segment.time), dtype=bool)
         for passage in segment.passages:
             inside = passage.has_in_its_middle(segment.time)
@@ -307,7 +307,7 @@ class Result:
                 found[:, inside] = passage.path.at(segment.time[inside])[2]
                 clear &= ~inside
         state = segment.time[clear], segment.coordinates[:, clear], segment.speeds[:, clear]
-        found[:, clear] = solver.own_accelerations(*state, kept)
+        found[:, clear] = solver.own_accelerations(*state, segment.plan.finding)
         return found
 
     def _reactions(self, segment: Segment) -> tuple[FloatArray, FloatArray]:

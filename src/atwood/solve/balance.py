@@ -17,22 +17,18 @@ from atwood.solve.columns import mass_at
 from atwood.solve.matrices import (
     Matrix,
     from_entries,
-    independent_rows,
     is_best_full,
     is_full,
-    least_norm,
-    row_scales,
     scaled,
 )
+from atwood.solve.rank import least_norm, row_scales
+from atwood.solve.rounding import RowErrors
 from atwood.solve.turning import Turning, turning_of
 
 __all__ = [
     "Balance",
     "BalanceValues",
     "balance_of",
-    "independent_rows",
-    "least_norm",
-    "row_scales",
     "solve_balance",
 ]
 
@@ -72,6 +68,8 @@ class Balance:
         The same, and the constraints alone, ready to run on one state.
     turning
         How the coordinates move with the speeds.
+    errors
+        How far rounding can take the constraints' slopes.
     mass
         Gives the mass matrix where the program does not.
     """
@@ -82,9 +80,10 @@ class Balance:
         kernel: BoundKernel,
         held_kernel: Callable[[], BoundKernel],
         turning: Turning,
+        errors: RowErrors,
         mass: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
     ) -> None:
-        self.program, self.kernel, self.turning, self._mass = program, kernel, turning, mass
+        self.program, self.kernel, self.turning, self.errors, self._mass = program, kernel, turning, errors, mass
         self._all = len(program.holonomic) == program.constraints
         self._held_kernel = held_kernel
         self.holonomic = np.asarray(program.holonomic, dtype=np.intp)
@@ -156,16 +155,18 @@ class Balance:
             return q, u
         still = np.zeros_like(u)
         last = np.inf
+        errors = self.errors.near(t, q, scales)
+        on_positions = errors if self._all else errors[self.holonomic]
         for _ in range(iterations if len(self.holonomic) else 0):
             slope, value = self.on_positions(self.held(t, q, still))
-            rows = row_scales(slope, scales)
+            rows = row_scales(slope, scales, on_positions)
             miss = float(np.max(np.abs(value / rows)))
             if miss == 0.0 or (miss < 1e-11 and miss >= 0.5 * last):
                 break
             last = miss
             q = self.turning.moved(t, q, -scales * least_norm(scaled(slope, scales, rows), value / rows))
         now = self.held(t, q, u)
-        rows = row_scales(now.slope, scales)
+        rows = row_scales(now.slope, scales, errors)
         for _ in range(2):  # the second pass takes out the rounding of the first
             rate = now.slope @ u + now.drift
             u = u - scales * least_norm(scaled(now.slope, scales, rows), rate / rows)
@@ -177,6 +178,10 @@ class Balance:
             return now.slope, now.value
         return now.slope[self.holonomic], now.value[self.holonomic]
 
+    def row_scales(self, now: BalanceValues | HeldValues, t: float, q: FloatArray, scales: FloatArray) -> FloatArray:
+        """Return the size of each constraint at a place; see `atwood.solve.rank.row_scales`."""
+        return row_scales(now.slope, scales, self.errors.near(t, q, scales))
+
     def holding(self, chosen: Sequence[int]) -> list[int]:
         """Return which of some constraints hold positions."""
         return [i for i in chosen if self._all or i in self.program.holonomic]
@@ -186,7 +191,7 @@ class Balance:
         if not self.constraints:
             return 0.0, 0.0
         now = self.held(t, q, u)
-        rows, rate = row_scales(now.slope, scales), now.slope @ u + now.drift
+        rows, rate = self.row_scales(now, t, q, scales), now.slope @ u + now.drift
         return float(np.max(np.abs(now.value / rows))), float(np.max(np.abs(rate / rows)))
 
 
@@ -195,7 +200,10 @@ def balance_of(assembly: Assembly, form: FormName) -> Balance:
     program = assembly.balance(form)
     mass = None if program.mass_product is None else partial(mass_at, assembly, form)
     held = partial(assembly.kernel, program.constraints_alone)
-    return Balance(program, assembly.kernel(program.program), held, turning_of(assembly, form), mass)
+    places, turning = (program.slope_rows, program.slope_columns), turning_of(assembly, form)
+    laws = [one.key[:2] for one in assembly.in_coordinates(form).constraints]
+    errors = RowErrors(assembly, program.constraints_alone, ("value", "slope"), laws, places, turning)
+    return Balance(program, assembly.kernel(program.program), held, turning, errors, mass)
 
 
 def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -> tuple[FloatArray, FloatArray]:

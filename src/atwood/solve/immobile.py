@@ -13,7 +13,8 @@ from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Constraint
 from atwood.solve.balance import balance_of
-from atwood.solve.matrices import LARGEST_FULL, row_scales, scaled, to_array
+from atwood.solve.matrices import LARGEST_FULL, scaled, to_array
+from atwood.solve.rank import independent_rows
 from atwood.solve.scales import motion_scales
 from atwood.solve.start import Start, maximal_state
 
@@ -86,18 +87,20 @@ def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | 
         return Immobile(None, 0)
     scales = motion_scales(equations, start.length)
     q, _ = maximal_state(assembly, start)
-    slope = to_array(balance_of(assembly, "dae").at(start.time, q, np.zeros_like(scales)).slope)
-    rows = scaled(slope, scales, row_scales(slope, scales))
+    balance = balance_of(assembly, "dae")
+    rows = scaled(to_array(balance.at(start.time, q, np.zeros_like(scales)).slope), scales)
+    errors = balance.errors.of_slopes(start.time, q, scales)
     groups: dict[str, list[int]] = {}
     for i, one in enumerate(equations.constraints):
         groups.setdefault(_name(assembly, one), []).append(i)
     found = []
     for name, numbers in groups.items():
-        left = len(scales) - _rank(np.delete(rows, numbers, axis=0))
+        others = np.delete(np.arange(len(rows)), numbers)
+        left = len(scales) - len(independent_rows(rows[others], errors[others]))
         if left > 0:
             found.append((name, left))
     found.sort(key=lambda one: one[1])
-    return Immobile(tuple(found), len(rows) - _rank(rows))
+    return Immobile(tuple(found), len(rows) - len(independent_rows(rows, errors)))
 
 
 def refuse_immobile(assembly: Assembly, freedom: int, start: Start) -> None:
@@ -129,10 +132,3 @@ def _name(assembly: Assembly, one: Constraint) -> str:
     part, law, _ = one.key
     laws = {other.key[1] for other in assembly.maximal.constraints if other.key[0] == part}
     return part if len(laws) == 1 else f"{part}.{law}"
-
-
-def _rank(matrix: FloatArray) -> int:
-    if 0 in matrix.shape:
-        return 0
-    sizes = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(sizes > 1e-7 * sizes[0]))

@@ -13,9 +13,10 @@ from atwood.forms.assembly import Assembly
 from atwood.kernels import compile_program
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.orientation import spin_in_world
-from atwood.solve.balance import BalanceValues, independent_rows, solve_balance
+from atwood.solve.balance import BalanceValues, balance_of, solve_balance
 from atwood.solve.loosening import Loosened, loosen
 from atwood.solve.matrices import from_entries, to_array
+from atwood.solve.rank import independent_rows
 from atwood.solve.scales import motion_scales
 from atwood.solve.start import Start
 from atwood.solve.turning import Turning, turning_of
@@ -70,6 +71,7 @@ class LooseScene:
         self.turning: Turning = turning_of(assembly, "reduced")
         self.sizes = motion_scales(equations, start.length)
         balance = assembly.balance("reduced")
+        self._errors = balance_of(assembly, "reduced").errors
         self._balance, self.holonomic = balance, list(balance.holonomic)
         groups, self._counts = _body_groups(assembly, equations)
         inputs = (*balance.program.inputs, InputGroup("a", equations.accelerations))
@@ -132,7 +134,8 @@ class LooseScene:
     def accelerations(self, t: float, q: FloatArray, u: FloatArray) -> Bodies:
         """Return the accelerations of the bodies at a state."""
         now, _ = self.at(t, q, u)
-        kept = np.asarray(independent_rows(np.asarray(now.slope) * self.sizes), dtype=np.intp)
+        errors = self._errors.of_slopes(t, q, self.sizes)
+        kept = np.asarray(independent_rows(np.asarray(now.slope) * self.sizes, errors), dtype=np.intp)
         return self.at(t, q, u, solve_balance(now, kept, t)[0])[1]
 
 

@@ -15,11 +15,8 @@ __all__ = [
     "LARGEST_FULL_OF_MANY",
     "Matrix",
     "from_entries",
-    "independent_rows",
     "is_best_full",
     "is_full",
-    "least_norm",
-    "row_scales",
     "scaled",
     "to_array",
 ]
@@ -40,9 +37,6 @@ long.
 
 _DENSE, _DENSE_OF_MANY = 0.1, 0.3
 """Share of entries above which nothing is gained by leaving out zeros."""
-
-_RANK = 1e-9
-"""Relative size below which a direction counts as lost."""
 
 
 def is_full(matrix: Matrix) -> bool:
@@ -101,50 +95,3 @@ def scaled(matrix: Matrix, columns: FloatArray, rows: FloatArray | None = None) 
     from atwood.solve.sparse import csr_scaled
 
     return csr_scaled(matrix, columns, rows)
-
-
-def row_scales(slope: Matrix, scales: FloatArray) -> FloatArray:
-    """Return the size of each constraint: how much it changes when a coordinate changes by its scale."""
-    rows: FloatArray
-    if is_full(slope):
-        rows = np.max(np.abs(slope * scales), axis=1, initial=0.0)
-    else:
-        from atwood.solve.sparse import csr_row_sizes
-
-        rows = csr_row_sizes(slope, scales)
-    rows[rows == 0.0] = 1.0
-    return rows
-
-
-def least_norm(matrix: Matrix, right: FloatArray) -> FloatArray:
-    """Return the shortest solution of a linear system, or the best where there is none."""
-    if is_full(matrix):
-        return np.asarray(np.linalg.lstsq(matrix, right, rcond=_RANK)[0], dtype=float)
-    from atwood.solve.sparse import csr_least_norm
-
-    return csr_least_norm(matrix, right)
-
-
-def independent_rows(matrix: Matrix, tolerance: float = 1e-7) -> list[int]:
-    """Return the numbers of rows that depend on none before them (Gram-Schmidt, twice for safety)."""
-    if not is_full(matrix):
-        from atwood.solve.sparse import rows_are_independent
-
-        if rows_are_independent(matrix, tolerance):
-            return list(range(matrix.shape[0]))
-        matrix = matrix.toarray()
-    kept: list[int] = []
-    basis = np.empty((min(matrix.shape), matrix.shape[1]))
-    for i, row in enumerate(matrix):
-        size = float(np.linalg.norm(row))
-        if size == 0.0 or len(kept) == len(basis):
-            continue
-        known = basis[: len(kept)]
-        left = row / size
-        for _ in range(2):
-            left = left - (known @ left) @ known
-        rest = float(np.linalg.norm(left))
-        if rest > tolerance:
-            basis[len(kept)] = left / rest
-            kept.append(i)
-    return kept

@@ -18,10 +18,11 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import event_program
 from atwood.forms.places import to_maximal
 from atwood.mechanics.watches import Watch, list_watches
-from atwood.solve.balance import Balance, BalanceValues, balance_of, least_norm, row_scales
+from atwood.solve.balance import Balance, BalanceValues, balance_of
 from atwood.solve.charts import CHART, Reassemble, chart_watches, enter_charts
 from atwood.solve.matrices import is_full, scaled, to_array
 from atwood.solve.problem import Plan
+from atwood.solve.rank import least_norm
 from atwood.solve.reactions import ReactionSolver, maximal_state
 from atwood.solve.scales import motion_scales
 from atwood.solve.sides import actual_sides
@@ -298,7 +299,8 @@ def plastic_impact(
         Size of a displacement along each speed.
     """
     t, q, u = state
-    velocities, impulses = _solve_impact(balance.at(t, q, u), u, sizes)
+    now = balance.at(t, q, u)
+    velocities, impulses = _solve_impact(now, u, sizes, balance.row_scales(now, t, q, sizes))
     size = float(np.max(np.abs(impulses), initial=0.0))
     for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
         if one.key[0] in after.modes and one.sign * impulse < -1e-9 * size:
@@ -310,13 +312,14 @@ def plastic_impact(
     return velocities
 
 
-def _solve_impact(now: BalanceValues, u: FloatArray, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _solve_impact(
+    now: BalanceValues, u: FloatArray, sizes: FloatArray, rows: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return velocities after an impact, and impulses: those of least size where constraints depend on each other.
 
     All is written in displacements of the scene's size, and impulses come out as their work along these: what is small
     beside the rest is then small in truth, and not in its unit.
     """
-    rows = row_scales(now.slope, sizes)
     if not is_full(now.mass):
         from atwood.solve.sparse import solve_bordered
 

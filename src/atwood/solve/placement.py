@@ -20,7 +20,8 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
 from atwood.mechanics.equations import Equations
 from atwood.solve.gaps import Gap, find_gaps
-from atwood.solve.matrices import row_scales, scaled, to_array
+from atwood.solve.matrices import scaled, to_array
+from atwood.solve.rank import FREE, independent_rows, least_norm, open_directions, row_scales
 from atwood.solve.scales import motion_scales
 from atwood.solve.start import Start
 from atwood.solve.start_system import System
@@ -272,14 +273,13 @@ class _Bodies:
         scales = motion_scales(self.equations, start.length)
         slopes = to_array(system.at(t, start.rough, np.zeros_like(scales))[1]) if system.targets else None
         if slopes is None:
-            known = np.zeros((0, len(scales)))
+            free = np.eye(len(scales))
         else:
-            _, sizes, directions = np.linalg.svd(scaled(slopes, scales, row_scales(slopes, scales)))
-            known = directions[: int(np.sum(sizes > 1e-7 * np.max(sizes, initial=0.0)))]
+            slopes = scaled(slopes, scales)
+            free = open_directions(slopes[independent_rows(slopes, system.errors.of_slopes(t, start.rough, scales))])
 
         def is_told(rows: FloatArray) -> bool:
-            left = rows - (rows @ known.T) @ known
-            return float(np.linalg.norm(left)) <= 1e-6 * float(np.linalg.norm(rows))
+            return float(np.linalg.norm(rows @ free.T)) <= FREE * float(np.linalg.norm(rows))
 
         moves = self._movements(t, start.rough, start.length)
         return [(is_told(shift), is_told(turn)) for shift, turn in moves]
@@ -292,9 +292,9 @@ class _Bodies:
         slopes = to_array(system.at(t, q, np.zeros_like(scales))[1])
         if not slopes.shape[0]:
             return dict.fromkeys(wanted, ())
-        slopes = scaled(slopes, scales, row_scales(slopes, scales))
+        slopes = scaled(slopes, scales, row_scales(slopes, scales, system.errors.near(t, q, scales)))
         way = turning_of(self.assembly, "regular").difference(t, start.rough, q) / scales
-        weights = np.linalg.lstsq(slopes.T, way, rcond=1e-9)[0]
+        weights = least_norm(slopes.T, way)
         names = [one.key[0] for one in self.equations.constraints if one.value is not None]
         names += [target.path for target in level.fixed]
         ways: dict[str, FloatArray] = {}

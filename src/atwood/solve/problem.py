@@ -15,13 +15,14 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.dae import keep_constraints
 from atwood.forms.program import FormProgram
 from atwood.kernels import BoundKernel
-from atwood.solve.balance import Balance, balance_of, least_norm, row_scales, solve_balance
+from atwood.solve.balance import Balance, balance_of, solve_balance
 from atwood.solve.columns import columns_of
 from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.solve.matrices import to_array
-from atwood.solve.rank import RankFinding, find_rank
+from atwood.solve.rank import least_norm
 from atwood.solve.read_reactions import check_read_reactions
+from atwood.solve.redundancy import RankFinding, find_rank, review_kept
 from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_scales
 from atwood.solve.uncompiled import announce, find_uncompiled
 from atwood.solve.without_inertia import check_inertia
@@ -130,6 +131,19 @@ class Plan:
         self.switches += 1
         return True
 
+    def better_kept(self, t: float, q: FloatArray) -> RankFinding | None:
+        """Return which constraints are better kept at a place; None if those that are will do."""
+        finding = review_kept(self.finding, self.balance, t, q, self.sizes)
+        return None if finding is self.finding else finding
+
+    def keep(self, finding: RankFinding, t: float, q: FloatArray) -> None:
+        """Keep other constraints from a place on; programs and sessions for those before have had their day."""
+        self.finding, self._kernels, self._loops = finding, None, None
+        if self.dependent_speeds:
+            slope = to_array(self.balance.held(t, q, np.zeros_like(self.sizes)).slope)
+            self.dependent, self.dependent_speeds = _dependent(self.balance, finding, slope, self.sizes)
+        self.program = self.assembly.form_program(finding.kept, self.dependent, self.dependent_speeds)
+
     def review_output(self, t: float, q: FloatArray) -> bool:
         """Do the same at an output, unless compiled functions tell by themselves when it is time to.
 
@@ -146,7 +160,7 @@ class Plan:
             If it does; it names the constraint that is missed most.
         """
         now = self.balance.at(t, q, u)
-        rows = row_scales(now.slope, self.sizes)
+        rows = self.balance.row_scales(now, t, q, self.sizes)
         misses = np.maximum(np.abs(now.value / rows), np.abs(now.rate / rows) * self.scales.time)
         if not np.all(misses <= _HELD):
             worst = int(np.argmax(np.where(np.isfinite(misses), misses, np.inf)))
@@ -324,9 +338,7 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
         raise _singular_start(assembly, finding)
     dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
     if assembly.form == "reduced" and finding.kept:
-        every = to_array(now.slope)
-        chosen = (choose_dependent(every[list(one)], sizes) for one in (balance.holding(finding.kept), finding.kept))
-        dependent = next(chosen), next(chosen)
+        dependent = _dependent(balance, finding, to_array(now.slope), sizes)
     program = assembly.form_program(_kept_or_none(finding), *dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = solve_balance(now, kept, t)
@@ -335,6 +347,16 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     if uncompiled:
         announce(assembly, uncompiled)
     return Plan(assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent, uncompiled=uncompiled)
+
+
+def _dependent(
+    balance: Balance, finding: RankFinding, slope: FloatArray, sizes: FloatArray
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the speeds whose displacements follow from constraints on positions, and those that follow from all."""
+    places, speeds = (
+        choose_dependent(slope[list(one)], sizes) for one in (balance.holding(finding.kept), finding.kept)
+    )
+    return places, speeds
 
 
 def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from atwood.solve.driver import FloatArray
 from atwood.solve.matrices import is_best_full
 from atwood.solve.problem import Plan
+from atwood.solve.rank import trusted_sizes
 
 if TYPE_CHECKING:
     from atwood.solve.sparse_batch import Normal
@@ -235,17 +236,17 @@ def constraints_at(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> C
     else:
         value, slope, drift = plan.assembly.kernel(program, vectorized=True)(t[None, :], q, u)
     kept, normal = list(plan.finding.kept), _normal(plan)
+    farthest = int(np.argmax(np.max(np.abs(q), axis=0, initial=0.0)))
+    errors = plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)
     if normal is not None:
         pattern = normal.whole
         slope = slope * plan.sizes[pattern.columns, None]
-        rows = pattern.largest(slope).T
-        rows[rows == 0.0] = 1.0
+        rows = trusted_sizes(pattern.largest(slope).T, errors)
         return ConstraintsAt(value.T / rows, slope / rows.T[pattern.rows], drift.T / rows, kept, normal, rows)
     full = np.zeros((count, p.constraints, p.speeds))
     full[:, p.slope_rows, p.slope_columns] = slope.T
     full *= plan.sizes
-    rows = np.max(np.abs(full), axis=2)
-    rows[rows == 0.0] = 1.0
+    rows = trusted_sizes(np.max(np.abs(full), axis=2), errors)
     return ConstraintsAt(value.T / rows, full / rows[:, :, None], drift.T / rows, kept, None, rows)
 
 

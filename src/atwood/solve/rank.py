@@ -1,114 +1,252 @@
-"""Which constraints are independent: a numeric question, asked at the start and at admissible positions nearby.
+"""Which rows of a Jacobian are independent, decided by what rounding could have made of them.
 
-A rank that drops everywhere means a redundant design; one that drops at the start alone means a singular position,
-which must not be taken for additional freedom.
+The tolerances of rank are here, with their reasons. Nothing is compared with a number that would depend on where a
+scene stands, how it is turned, or in what units it is: each row comes with its error, which is how far rounding can
+take it (`atwood.solve.rounding`), and a row is independent of others if more is left of it than the errors of all
+together account for. So a row that is nothing but rounding counts as zero, whatever its size, and a row that is small
+but known well does not.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.solve.balance import Balance, independent_rows, row_scales
-from atwood.solve.matrices import Matrix, to_array
-from atwood.solve.matrices import scaled as scale
+from atwood.kernels.rough import ROUGHNESS
+from atwood.solve.matrices import Matrix, is_full, scaled, to_array
 
-__all__ = ["RankFinding", "find_rank"]
+__all__ = [
+    "CLEAR",
+    "FREE",
+    "RANK",
+    "SINGULAR",
+    "certain",
+    "independent_rows",
+    "least_norm",
+    "open_directions",
+    "review_rows",
+    "row_scales",
+    "row_sizes",
+    "trusted_sizes",
+]
 
 FloatArray = NDArray[np.float64]
 
-_ADMISSIBLE = 1e-9
-"""How well a position near the start must fulfil the constraints to be asked for their rank."""
+CERTAIN = 30.0
+"""Times its error: what is left of a row by more is not rounding.
+
+Errors are found from some ways of rounding 16 times as rough as the machine's; so 500 roundings in a row that all go
+the same way are still told from what is there.
+"""
+
+RANK = 1e-9
+"""Relative size below which a direction is not followed when a linear system is solved.
+
+It must lie well above what is left of rounding in rows that are scaled by `row_scales`, and below what a mechanism
+shows near a singular position.
+"""
+
+TRUSTED = 1e11
+"""Times its error: a row is measured by its own size if it is larger, and else by this.
+
+What rounding leaves in a row that is scaled so is below 1e-11, a hundredth of `RANK`.
+"""
+
+SINGULAR = 1e-5
+"""Relative to a little away from it: at a singular position the smallest singular value is less.
+
+A little away is 1e-2 of a radian, so that a start within 1e-7 of a singular position, of which Newton's method knows no
+more than that, is one.
+"""
+
+CLEAR = 1e-6
+"""Smallest singular value, rows and columns scaled, above which no position near by is asked: rank is full."""
+
+FREE = 1e-6
+"""Share in a direction of size one above which a coordinate or speed counts as moving along it."""
+
+_LEVEL = 0.03
+"""Of rows that are independent of those chosen, the first is chosen of which this share of the largest is left.
+
+In declared order those that are dropped come last, as one expects; but a row that hardly changes would make the
+multipliers of all that follow inaccurate.
+"""
+
+_POOR, _SETTLED = 3.0, 1.5
+"""A choice of rows is poor where another takes one of it more often; exchanges go on until none does by so much."""
+
+_LOOK = 1e-4
+"""While more than this share of the largest row is left, errors of the chosen rows cannot matter."""
 
 
-_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
-"""The angle whose multiples are spread most evenly."""
+def row_sizes(slope: Matrix, scales: FloatArray) -> FloatArray:
+    """Return the largest entry of each row after its columns are scaled, shape (rows,)."""
+    if is_full(slope):
+        return np.asarray(np.max(np.abs(slope * scales), axis=1, initial=0.0))
+    from atwood.solve.sparse import csr_row_sizes
+
+    return csr_row_sizes(slope, scales)
 
 
-@dataclass(frozen=True)
-class RankFinding:
-    """What the constraints of a form determine.
-
-    Attributes
-    ----------
-    kept
-        Numbers of constraints that are independent.
-    redundant
-        Numbers of constraints that follow from the others, everywhere.
-    rank
-        Number of independent constraints.
-    rank_at_start
-        The same at the start position alone.
-    lost_at_start
-        Numbers of independent constraints that follow from the others at the start position.
-    """
-
-    kept: tuple[int, ...]
-    redundant: tuple[int, ...]
-    rank: int
-    rank_at_start: int
-    lost_at_start: tuple[int, ...] = ()
-
-    @property
-    def starts_singular(self) -> bool:
-        """Whether the start is a singular position."""
-        return self.rank_at_start < self.rank
-
-
-def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> RankFinding:
-    """Find the rank of the constraints.
+def row_scales(slope: Matrix, scales: FloatArray, errors: FloatArray) -> FloatArray:
+    """Return the size of each row: how much it changes when a coordinate changes by its scale, if that is known.
 
     Parameters
     ----------
-    balance
-        The balance of forces of the form.
-    t, q
-        Time and position of the start.
+    slope
+        The rows.
     scales
-        Size of a displacement along each speed.
+        Size of each coordinate.
+    errors
+        How far rounding can take each row, in the same scales.
     """
-    count = balance.constraints
-    if count == 0:
-        return RankFinding((), (), 0, 0)
-    still = np.zeros_like(scales)
+    return trusted_sizes(row_sizes(slope, scales), errors)
 
-    def scaled(position: FloatArray) -> Matrix:
-        slope = balance.held(t, position, still).slope
-        return scale(slope, scales, row_scales(slope, scales))
 
-    whole = scaled(q)
-    at_start = independent_rows(whole)
-    if len(at_start) == count:  # no position has more
-        return RankFinding(tuple(at_start), (), count, count)
-    best = at_start
-    # Constraints on velocities alone keep nothing from being reached.
-    matrix = to_array(whole)[balance.holonomic]
-    _, sizes, directions = np.linalg.svd(matrix)
-    rank = int(np.sum(sizes > 1e-7 * np.max(sizes, initial=0.0)))
-    admissible = directions[rank:]
-    asked = 0
-    for attempt, step in enumerate((1e-2, 3e-2, 3e-2), 1):
-        if not len(admissible):
+def trusted_sizes(sizes: FloatArray, errors: FloatArray) -> FloatArray:
+    """Return the size of each row from its largest entry, of shape (..., rows); see `row_scales`."""
+    rows = np.maximum(sizes, TRUSTED * errors)
+    return np.where(rows > 0.0, rows, 1.0)
+
+
+def certain(errors: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return what is not rounding alone if it is exceeded.
+
+    Parameters
+    ----------
+    errors, sizes
+        How far rounding can take each row, and its largest entry.
+    """
+    return CERTAIN * _at_least(errors, sizes)
+
+
+def _at_least(errors: FloatArray, sizes: FloatArray) -> FloatArray:
+    return np.maximum(errors, ROUGHNESS * sizes)  # what is exact now is not known to be so
+
+
+def independent_rows(matrix: Matrix, errors: FloatArray, most: int | None = None, before: int = 0) -> list[int]:
+    """Return the numbers of independent rows, as many as there are, and rather the first than the last ones.
+
+    Parameters
+    ----------
+    matrix
+        The rows, with columns of like scale; rows may have any size.
+    errors
+        How far rounding can take each row, in the same units.
+    most
+        How many to return at most.
+    before
+        So many rows come before all others, even if these would make a better choice.
+    """
+    errors = _at_least(errors, row_sizes(matrix, np.ones(matrix.shape[1])))
+    if not is_full(matrix):
+        if most is None and _is_clear(matrix, errors):
+            return list(range(matrix.shape[0]))
+        matrix = to_array(matrix)
+    # In these units a row of the size of the terms that it was computed from has size one.
+    units = np.where(errors > 0.0, errors / ROUGHNESS, 1.0)
+    most = min(matrix.shape) if most is None else min(*matrix.shape, most)
+    return _chosen(matrix / units[:, None], errors / units, most, before)
+
+
+def _chosen(rows: FloatArray, errors: FloatArray, most: int, before: int) -> list[int]:
+    """Return the rows that Gram and Schmidt's method keeps, each time one of those of which most is left."""
+    left = rows.copy()
+    sizes = np.linalg.norm(left, axis=1)
+    chosen: list[int] = []
+    basis = np.empty((most, rows.shape[1]))
+    is_open, is_first = np.ones(len(rows), dtype=bool), np.arange(len(rows)) < before
+    while len(chosen) < most:
+        bounds = CERTAIN * errors
+        largest = float(np.max(sizes, where=is_open, initial=0.0))
+        if chosen and largest < _LOOK:
+            weights = np.linalg.lstsq(rows[chosen].T, rows.T, rcond=None)[0]
+            bounds = CERTAIN * np.sqrt(errors**2 + errors[chosen] ** 2 @ weights**2)
+        is_open &= sizes > bounds
+        if not np.any(is_open):
             break
-        # any direction that no symmetry singles out
-        along = np.sin(attempt * _GOLDEN * np.arange(1.0, len(admissible) + 1.0)) @ admissible
-        moved = balance.turning.moved(t, q, step * scales * along / np.linalg.norm(along))
-        nearby, _ = balance.project(t, moved, still, scales)
-        if balance.misses(t, nearby, still, scales)[0] > _ADMISSIBLE:
-            # From a singular position, Newton's method falls back into it unless something holds it away.
-            held = np.where(np.arange(len(scales)) == np.argmax(np.abs(along)), 0.0, scales)
-            nearby, _ = balance.project(t, moved, still, held, iterations=30)
-            if balance.misses(t, nearby, still, scales)[0] > _ADMISSIBLE:
-                continue
-        asked += 1
-        found = independent_rows(scaled(nearby))
-        if len(found) > len(best):
-            best = found
-    if len(admissible) and not asked and len(best) < count:
-        # It looks movable here and is not: a singular position, and no reason to call a constraint redundant.
-        best = list(range(count))
-    redundant = tuple(i for i in range(count) if i not in set(best))
-    lost = tuple(i for i in best if i not in set(at_start)) if len(at_start) < len(best) else ()
-    return RankFinding(tuple(best), redundant, len(best), len(at_start), lost)
+        among = is_open & is_first if np.any(is_open & is_first) else is_open
+        i = int(np.argmax(among & (sizes >= _LEVEL * np.max(sizes, where=among, initial=0.0))))
+        direction = left[i] / sizes[i]
+        known = basis[: len(chosen)]
+        direction = direction - (known @ direction) @ known  # once more, against rounding
+        direction /= np.linalg.norm(direction)
+        basis[len(chosen)] = direction
+        chosen.append(i)
+        is_open[i] = False
+        left -= (left @ direction)[:, None] * direction
+        sizes = np.linalg.norm(left, axis=1)
+    return sorted(chosen)
+
+
+def review_rows(matrix: Matrix, errors: FloatArray, kept: Sequence[int]) -> list[int]:
+    """Return a better choice of independent rows if a choice has become poor, else the same one.
+
+    A choice is good if what the other rows are made of takes no row of it many times, each measured by the terms that
+    it is computed from: exchanging two rows multiplies the volume of the choice by that number.
+
+    Parameters
+    ----------
+    matrix
+        The rows, with columns of like scale.
+    errors
+        How far rounding can take each row; see `independent_rows`.
+    kept
+        The choice.
+    """
+    chosen = list(kept)
+    others = [i for i in range(matrix.shape[0]) if i not in set(chosen)]
+    units = np.where(errors > 0.0, errors / ROUGHNESS, 1.0)
+    rows, bound = scaled(matrix, np.ones(matrix.shape[1]), units), _POOR
+    for _ in range(10 * len(chosen)):
+        weights = np.abs(_made_of(rows[chosen], rows[others]))
+        if not weights.size or not np.all(np.isfinite(weights)):
+            return list(kept) if not weights.size else independent_rows(matrix, errors, len(kept))
+        this, that = np.unravel_index(int(np.argmax(weights)), weights.shape)
+        if weights[this, that] <= bound:
+            break
+        others[int(this)], chosen[int(that)], bound = chosen[int(that)], others[int(this)], _SETTLED
+    return sorted(chosen)
+
+
+def _made_of(kept: Matrix, others: Matrix) -> FloatArray:
+    """Return how often each kept row is in others, shape (others, kept)."""
+    if is_full(kept):
+        return np.asarray(np.linalg.lstsq(kept.T, others.T, rcond=None)[0].T)
+    from atwood.solve.sparse import csr_made_of
+
+    return csr_made_of(kept, others)
+
+
+def _is_clear(matrix: Matrix, errors: FloatArray) -> bool:
+    """Return whether it is certain, for a large matrix, that no row depends on others."""
+    from atwood.solve.sparse import rows_are_independent
+
+    sizes = row_sizes(matrix, np.ones(matrix.shape[1]))
+    return bool(np.all(sizes > errors / _LOOK)) and rows_are_independent(matrix, CLEAR)
+
+
+def open_directions(matrix: FloatArray, least: float = 0.0) -> FloatArray:
+    """Return orthonormal directions, one row each, along which independent rows do not change.
+
+    Parameters
+    ----------
+    matrix
+        The rows, of any size.
+    least
+        Where they nearly depend on each other: what counts as no change, relative to the size of each.
+    """
+    sizes = np.linalg.norm(matrix, axis=1, keepdims=True)
+    _, values, directions = np.linalg.svd(matrix / np.where(sizes > 0.0, sizes, 1.0))
+    return np.asarray(directions[len(matrix) if least == 0.0 else int(np.sum(values > least)) :])
+
+
+def least_norm(matrix: Matrix, right: FloatArray) -> FloatArray:
+    """Return the shortest solution of a linear system, or the best where there is none."""
+    if is_full(matrix):
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=RANK)[0], dtype=float)
+    from atwood.solve.sparse import csr_least_norm
+
+    return csr_least_norm(matrix, right)

@@ -19,8 +19,8 @@ from atwood.mechanics.release import release_program
 from atwood.solve.balance import balance_of
 from atwood.solve.columns import masses_at
 from atwood.solve.matrices import is_best_full
-from atwood.solve.rank import find_rank
-from atwood.solve.scales import motion_scales, scene_length
+from atwood.solve.redundancy import RankFinding, find_rank, kept_along
+from atwood.solve.scales import coordinate_scales, motion_scales, scene_length
 from atwood.solve.sparse_states import States
 from atwood.solve.turning import turning_of
 
@@ -142,9 +142,9 @@ class ReactionSolver:
     def __init__(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> None:
         self.assembly = assembly
         big_q, _ = maximal_state(assembly, np.array([t]), q[:, None], u[:, None])
-        sizes = motion_scales(assembly.maximal, scene_length(assembly))
+        self._length = scene_length(assembly)
+        sizes = motion_scales(assembly.maximal, self._length)
         self.finding = find_rank(balance_of(assembly, "dae"), t, big_q[:, 0], sizes)
-        self.kept = np.asarray(self.finding.kept, dtype=np.intp)
         self._of_constraint = {one.key: i for i, one in enumerate(assembly.maximal.constraints)}
         self._release = assembly.shared.get(
             "release",
@@ -167,7 +167,11 @@ class ReactionSolver:
         """Return all reactions, of shape (number, samples), and the power of constraints that move with time."""
         assembly = self.assembly
         big_q, big_u = maximal_state(assembly, t, q, u)
-        a, multipliers, drift = accelerations_and_multipliers(assembly, "dae", t, big_q, big_u, self.kept)
+        found = [
+            accelerations_and_multipliers(assembly, "dae", t[part], big_q[:, part], big_u[:, part], kept)
+            for part, kept in self._kept_along(self.finding, "dae", t, big_q)
+        ]
+        a, multipliers, drift = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
         values = np.zeros((len(assembly.reactions), len(t)))
         released = None
         if self._release is not None:
@@ -183,11 +187,25 @@ class ReactionSolver:
         power = -np.sum(multipliers * drift, axis=0) if len(multipliers) else np.zeros(len(t))
         return values, power
 
-    def own_accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, kept: NDArray[np.intp]) -> FloatArray:
-        """Return the accelerations of the form's coordinates."""
+    def _kept_along(
+        self, finding: RankFinding, form: FormName, t: FloatArray, q: FloatArray
+    ) -> list[tuple[slice, NDArray[np.intp]]]:
+        if not finding.redundant:
+            return [(slice(None), np.asarray(finding.kept, dtype=np.intp))]
+        equations, balance = self.assembly.in_coordinates(form), balance_of(self.assembly, form)
+        scales, sizes = motion_scales(equations, self._length), coordinate_scales(equations, self._length)
+        return kept_along(finding, balance, t, q, scales, sizes)
+
+    def own_accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, finding: RankFinding) -> FloatArray:
+        """Return the accelerations of the form's coordinates, with what is known of its constraints."""
         if self.assembly.form == "reduced" and self.assembly.balance("reduced").mass_product is not None:
             rates = self.assembly.shared.get("accelerations", lambda: acceleration_program(self.assembly))
             if rates is not None:
                 found: FloatArray = self.assembly.kernel(rates.program, vectorized=True)(t[None, :], q, u)[-1]
                 return found
-        return accelerations_at(self.assembly, self.assembly.form, t, q, u, kept)
+        form = self.assembly.form
+        parts = [
+            accelerations_at(self.assembly, form, t[part], q[:, part], u[:, part], kept)
+            for part, kept in self._kept_along(finding, form, t, q)
+        ]
+        return np.concatenate(parts, axis=1)

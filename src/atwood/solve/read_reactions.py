@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from atwood.errors import UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.solve.balance import balance_of
-from atwood.solve.rank import find_rank
 from atwood.solve.reactions import maximal_state
+from atwood.solve.redundancy import find_rank
 from atwood.solve.scales import motion_scales
 
 __all__ = ["check_read_reactions"]

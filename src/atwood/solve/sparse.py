@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 
 __all__ = [
     "csr_least_norm",
+    "csr_made_of",
     "csr_of",
     "csr_row_sizes",
     "csr_scaled",
@@ -151,6 +152,13 @@ def without_inertia(mass: Any, slope: Any, sizes: FloatArray) -> FloatArray | No
         square = square + held.T @ held
     value, vector = smallest_direction(csr_array(square))
     return np.abs(vector) if value <= 1e-14 else None
+
+
+def csr_made_of(kept: Any, others: Any) -> FloatArray:
+    """Return how often each of some independent rows is in others, shape (others, kept)."""
+    solver = _factorised(csr_array(kept @ kept.T), 1e-15)
+    found: FloatArray = solver.solve((kept @ others.T).toarray()).T
+    return found
 
 
 def free_columns(matrix: Any) -> NDArray[np.bool_]:

@@ -14,7 +14,8 @@ from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Equations
 from atwood.solve.closing import Nearest, closest, closest_of_all, units_of_rows
 from atwood.solve.gaps import Gap, find_gaps
-from atwood.solve.matrices import independent_rows, row_scales, scaled
+from atwood.solve.matrices import scaled
+from atwood.solve.rank import independent_rows
 from atwood.solve.start_system import MET, System
 from atwood.solve.start_targets import Level, Target, as_said
 
@@ -305,11 +306,27 @@ def freedom_at(assembly: Assembly, equations: Equations, scales: FloatArray, t: 
     """
     if not equations.constraints:
         return len(scales)
-    matrix = System(assembly, equations, [], True, of_speeds=True).at(t, q, np.zeros_like(scales))[1]
-    return len(scales) - len(independent_rows(scaled(matrix, scales, row_scales(matrix, scales))))
+    system = System(assembly, equations, [], True, of_speeds=True)
+    matrix = scaled(system.at(t, q, np.zeros_like(scales))[1], scales)
+    return len(scales) - len(independent_rows(matrix, system.errors.of_slopes(t, q, scales)))
 
 
-def contradiction(fixed: Sequence[Target], missing: FloatArray, freedom: int, remark: str = "") -> StartError:
+def contradicted(equations: Equations, missing: FloatArray) -> str:
+    """Return the label of the constraint that is missed most; empty if there is none.
+
+    Parameters
+    ----------
+    equations
+        With the constraints.
+    missing
+        What each misses, scaled.
+    """
+    return equations.constraints[int(np.argmax(np.abs(missing)))].label if len(missing) else ""
+
+
+def contradiction(
+    fixed: Sequence[Target], missing: FloatArray, freedom: int, remark: str = "", held: str = ""
+) -> StartError:
     """Return the error that says which fixed values cannot all hold.
 
     Parameters
@@ -322,13 +339,21 @@ def contradiction(fixed: Sequence[Target], missing: FloatArray, freedom: int, re
         How many coordinates are free.
     remark
         What else there is to say.
+    held
+        The constraint that is missed most.
     """
+    if not fixed:
+        return StartError(
+            f"constraints contradict each other at the start{remark}",
+            where=held,
+            advice="Drives or lengths demand what joints do not allow here; let one of them go.",
+        )
     failing = [target for target, miss in zip(fixed, missing, strict=True) if not abs(miss) <= MET]
     names = as_said(failing or fixed)
     count = f"The mechanism has {freedom} free coordinate{'s' if freedom != 1 else ''}"
     return StartError(
         f"the start values contradict each other or the constraints: {', '.join(names)} cannot all hold{remark}",
-        where=(failing or fixed)[0].where if fixed else "",
+        where=(failing or fixed)[0].where,
         advice=f"{count if freedom else 'Nothing in the mechanism can move'}; "
         "fix fewer values, or give some as guesses (on the command line: --start PATH=free).",
     )

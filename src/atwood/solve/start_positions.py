@@ -81,12 +81,13 @@ def solve_positions(
     if not _is_met(missing) or wrongly_turned(assembly, equations, t, q):
         failed = Failed(assembly, equations, level, scales, length, t, rough, q, missing)
         q, matrix = _elsewhere(failed, system)
+    errors = system.errors.of_slopes(t, q, scales)
     tangent = None if turning.is_plain else turning.tangent(t, q)
     for chart in equations.charts:  # what turns at all has no orientation, whichever coordinate shows it here
         assert tangent is not None
         tangent[list(chart.coordinates)] = np.max(np.abs(tangent[list(chart.coordinates)]), axis=0)
     names = [one.name for one in equations.names]
-    return Positions(q, rough, *counted(names, tangent, level.fixed, system.constraints, matrix))
+    return Positions(q, rough, *counted(names, tangent, level.fixed, system.constraints, matrix, errors))
 
 
 def _is_met(missing: FloatArray) -> bool:

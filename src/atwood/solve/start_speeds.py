@@ -7,15 +7,19 @@ from numpy.typing import NDArray
 
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Equations
-from atwood.solve.matrices import least_norm, row_scales, scaled
+from atwood.solve.matrices import scaled
+from atwood.solve.rank import certain, least_norm, row_scales
 from atwood.solve.scales import motion_names
-from atwood.solve.start_errors import contradiction, freedom_at
+from atwood.solve.start_errors import contradicted, contradiction, freedom_at
 from atwood.solve.start_system import System, counted
 from atwood.solve.start_targets import Level, said
 
 __all__ = ["solve_speeds"]
 
 FloatArray = NDArray[np.float64]
+
+_MET = 1e-8
+"""Relative to its terms: how well each condition must be met."""
 
 
 def solve_speeds(
@@ -45,25 +49,27 @@ def solve_speeds(
         missing, matrix = rough.at(t, q, u)
         u = u - scales * least_norm(scaled(matrix, scales), missing)
     system = System(assembly, equations, level.fixed, True, of_speeds=True)
+    errors = system.errors.of_slopes(t, q, scales)
     for _ in range(3):  # linear: the second pass takes out rounding
         missing, matrix = system.at(t, q, u)
         if not np.any(missing):
             break
-        rows = row_scales(matrix, scales)
+        rows = row_scales(matrix, scales, errors)
         u = u - scales * least_norm(scaled(matrix, scales, rows), missing / rows)
     missing, matrix = system.at(t, q, u)
     if missing.size:
-        rows = row_scales(matrix, scales)
+        rows = row_scales(matrix, scales, errors)
         # Each equation is measured by its own terms, so that what is small beside another speed is not lost.
         own = abs(matrix) @ np.abs(u)
+        own[system.constraints :] += [abs(x.value) for x in level.fixed]
         # What is summed up within an equation rounds, even if all that comes out of it is zero.
         fastest = float(np.max(np.abs(u / scales), initial=0.0))
-        own += 1e-6 * fastest * row_scales(matrix, scales)
-        own[system.constraints :] += [abs(x.value) for x in level.fixed]
+        own += certain(errors, rows) * fastest / _MET
         share = np.abs(missing) / np.where(own > 0.0, own, 1.0)
-        if not float(np.max(share)) <= 1e-8:
+        if not float(np.max(share)) <= _MET:
             freedom = freedom_at(assembly, equations, scales, t, q)
-            raise contradiction(level.fixed, share[system.constraints :], freedom)
-        matrix = scaled(matrix, scales, rows)
+            held = contradicted(equations, share[: system.constraints])
+            raise contradiction(level.fixed, share[system.constraints :], freedom, held=held)
+        matrix = scaled(matrix, scales)
     names = motion_names(equations)
-    return u, *counted(names, None, level.fixed, system.constraints, matrix)
+    return u, *counted(names, None, level.fixed, system.constraints, matrix, errors)

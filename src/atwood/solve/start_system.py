@@ -15,13 +15,12 @@ from atwood.mechanics.equations import Equations
 from atwood.solve.matrices import (
     Matrix,
     from_entries,
-    independent_rows,
     is_full,
-    least_norm,
-    row_scales,
     scaled,
     to_array,
 )
+from atwood.solve.rank import FREE, independent_rows, least_norm, open_directions, row_scales
+from atwood.solve.rounding import RowErrors
 from atwood.solve.start_targets import Target
 from atwood.solve.turning import turning_of
 
@@ -92,10 +91,15 @@ class System:
         of_speeds: bool = False,
     ) -> None:
         made = start_conditions(assembly, equations, targets, constrained, of_speeds)
-        self.turning = None if of_speeds else turning_of(assembly, "regular")
+        turning = turning_of(assembly, "regular")
+        self.turning = None if of_speeds else turning
         self.program = made.program
         self.kernel = assembly.kernel(made.program)
         self.rows, self.columns, self.shape = made.rows, made.columns, made.shape
+        places = made.rows, made.columns
+        held = [one.key[:2] for one in equations.constraints if of_speeds or one.value is not None]
+        laws = [*(held if constrained else []), *(one.path for one in targets)]
+        self.errors = RowErrors(assembly, made.program, ("values", "slopes"), laws, places, turning, not of_speeds)
         self.targets, self.constraints = targets, made.shape[0] - len(targets)
         self.speed_names = tuple(one.name for one in equations.speed_names)
         self.speeds = len(equations.speeds)
@@ -121,7 +125,8 @@ def newton(
     still = np.zeros_like(scales)
     assert system.turning is not None
     missing, matrix = system.at(t, q, still)
-    rows = row_scales(matrix, scales)
+    errors = system.errors.near(t, q, scales)
+    rows = row_scales(matrix, scales, errors)
     for _ in range(iterations):
         size = float(np.max(np.abs(missing / rows), initial=0.0))
         if size < 1e-15:
@@ -138,14 +143,19 @@ def newton(
         if float(np.max(np.abs(new_missing / rows))) >= size and size < MET:
             break
         q, missing, matrix = trial, new_missing, new_matrix
-        rows = row_scales(matrix, scales)
+        rows = row_scales(matrix, scales, errors)
     # What hardly changes with any coordinate, as where links line up, is measured by the scene.
     sizes = np.maximum(rows, 1e-4 * max(np.max(rows, initial=0.0), np.max(scales, initial=0.0)))
-    return q, missing / sizes, scaled(matrix, scales, rows)
+    return q, missing / sizes, scaled(matrix, scales)
 
 
 def counted(
-    names: Sequence[str], tangent: FloatArray | None, fixed: Sequence[Target], constraints: int, matrix: Matrix
+    names: Sequence[str],
+    tangent: FloatArray | None,
+    fixed: Sequence[Target],
+    constraints: int,
+    matrix: Matrix,
+    errors: FloatArray,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return which coordinates or speeds nothing determines, and which fixed values repeat others.
 
@@ -158,22 +168,22 @@ def counted(
     fixed, constraints
         What is fixed, and how many constraints come before that.
     matrix
-        Derivatives of both, scaled.
+        Derivatives of both, columns scaled.
+    errors
+        How far rounding can take each row.
     """
     if 0 in matrix.shape:
         return tuple(names), ()
-    kept = set(independent_rows(matrix))
-    repeated = tuple(t.path for i, t in enumerate(fixed, start=constraints) if i not in kept)
+    kept = independent_rows(matrix, errors, before=constraints)
+    repeated = tuple(t.path for i, t in enumerate(fixed, start=constraints) if i not in set(kept))
     if len(kept) == matrix.shape[1]:
         return (), repeated
     if not is_full(matrix):
         from atwood.solve.sparse import free_columns
 
-        return tuple(n for n, is_free in zip(names, free_columns(matrix), strict=True) if is_free), repeated
-    _, sizes, directions = np.linalg.svd(matrix)
-    rank = int(np.sum(sizes > 1e-9 * max(sizes[0], 1e-300))) if sizes.size else 0
-    open_directions = directions[rank:] if tangent is None else directions[rank:] @ tangent.T
-    free = tuple(
-        n for i, n in enumerate(names) if open_directions.size and np.max(np.abs(open_directions[:, i])) > 1e-6
-    )
-    return free, repeated
+        rows = row_scales(matrix, np.ones(matrix.shape[1]), errors)
+        found = free_columns(scaled(matrix, np.ones(matrix.shape[1]), rows))
+        return tuple(n for n, is_free in zip(names, found, strict=True) if is_free), repeated
+    directions = open_directions(matrix[kept])
+    moved = np.abs(directions if tangent is None else directions @ tangent.T)
+    return tuple(n for i, n in enumerate(names) if np.max(moved[:, i], initial=0.0) > FREE), repeated

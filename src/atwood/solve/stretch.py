@@ -23,6 +23,7 @@ from atwood.solve.passage import Passage, events_on
 from atwood.solve.problem import Plan, pack_state
 from atwood.solve.projection import project_safely
 from atwood.solve.record import Recorder
+from atwood.solve.redundancy import RankFinding
 from atwood.solve.tolerance import too_tight
 
 __all__ = ["Outcome", "Stretch", "run_stretch"]
@@ -165,6 +166,7 @@ class _Runner:
                     done, advance = self._sample(session, done)
                 else:
                     done, advance = self._advance(session, done)
+                    session = self.session or session
                 if advance is not None and advance.status is Status.STIFF:
                     session = self._open(*self._change_solver(advance))
                 elif advance is None or not self._restates(session, advance):
@@ -324,7 +326,9 @@ class _Runner:
             advance = session.advance(target)
             if advance.status is Status.FAILED and self._chose_anew(session, advance):
                 advance = session.advance(target)
-            passage = None if guard is None else guard.look(advance, between, moment >= stretch.end)
+            turned = self._turned(advance) if between or guard is None else None
+            at_end = moment >= stretch.end or turned is not None
+            passage = None if guard is None else guard.look(advance, between, at_end)
             if passage is not None:
                 done, stopped = self._pass_over(session, passage)
                 if stopped is not None:
@@ -338,6 +342,8 @@ class _Runner:
                 guard.agreed.clear()
             if advance.status is not Status.REACHED:
                 return done, advance
+            if turned is not None:
+                session = self._keep(turned, advance)
             if between:
                 continue
             recorder.take(advance.t, advance.y, shown[done])
@@ -380,6 +386,22 @@ class _Runner:
         q, u = plan.balance.project(advance.t, q, u, plan.sizes)
         session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
         return True
+
+    def _turned(self, advance: Advance) -> RankFinding | None:
+        """Return which constraints are better kept from here on, if those that are have become a poor choice."""
+        plan = self.stretch.plan
+        q, _ = plan.program.split(advance.y)
+        return plan.better_kept(advance.t, q) if advance.status is Status.REACHED else None
+
+    def _keep(self, finding: RankFinding, advance: Advance) -> Session:
+        """Go on with other constraints kept, from the same state."""
+        plan = self.stretch.plan
+        q, u = (part.copy() for part in plan.program.split(advance.y))
+        if plan.is_projected:
+            q, u = project_safely(plan, advance.t, q, u)
+        self.before, self.session = self._cost(), None
+        plan.keep(finding, advance.t, q)
+        return self._open(advance.t, *pack_state(plan, advance.t, q, u))
 
     def _repair(self, session: Session, advance: Advance) -> None:
         """Go on from the recorded state where the solver's own has strayed.

@@ -14,9 +14,10 @@ from atwood.errors import SolveError
 from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.equations import Constraint
-from atwood.solve.balance import balance_of, row_scales
-from atwood.solve.matrices import to_array
+from atwood.solve.balance import balance_of
+from atwood.solve.matrices import scaled, to_array
 from atwood.solve.modes import Happening, generalized_speeds, plastic_impact
+from atwood.solve.rank import RANK
 from atwood.solve.reactions import maximal_state
 from atwood.solve.scales import motion_scales
 
@@ -59,7 +60,7 @@ def pass_time_event(
     sizes = motion_scales(after.maximal, length)
     balance = balance_of(after, "dae")
     was, now = balance_of(before, "dae").at(t, big_q, big_u), balance.at(t, big_q, big_u)
-    rows = row_scales(now.slope, sizes)
+    rows = balance.row_scales(now, t, big_q, sizes)
     constraints = after.maximal.constraints
     moved = np.abs(now.value - was.value) / rows
     if np.max(moved, initial=0.0) > _IN_PLACE:
@@ -70,7 +71,8 @@ def pass_time_event(
             where=constraints[worst].label,
             advice="Prescribe a motion that is continuous; its speed may jump, which is an impact.",
         )
-    turned_over = np.flatnonzero(np.sum(to_array(now.slope) * to_array(was.slope), axis=1) < 0.0)
+    slopes = [to_array(scaled(one.slope, sizes, rows)) for one in (was, now)]
+    turned_over = np.flatnonzero(np.sum(slopes[0] * slopes[1], axis=1) < -RANK)
     if len(turned_over):  # as after a jump by half a turn, at which the sine of an angle is zero again
         raise SolveError(
             f"at t = {t:.9g} its prescribed motion jumps by more than a quarter turn",

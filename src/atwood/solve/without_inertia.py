@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from atwood.errors import StartError
 from atwood.forms.assembly import Assembly
-from atwood.solve.matrices import Matrix, is_full, row_scales, scaled
+from atwood.solve.matrices import Matrix, is_full, scaled
+from atwood.solve.rank import open_directions
 from atwood.solve.scales import motion_names
 
 __all__ = ["check_inertia"]
@@ -45,11 +46,7 @@ def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatA
         return
     weighed = mass * sizes[:, None] * sizes[None, :]
     if slope.shape[0]:
-        # Each row by its own size: lengths and angles of constraints are not compared with each other.
-        rows = scaled(slope, sizes, row_scales(slope, sizes))
-        _, values, directions = np.linalg.svd(rows)
-        rank = int(np.sum(values > 1e-9 * values[0]))
-        free = directions[rank:]
+        free = open_directions(scaled(slope, sizes))
     else:
         free = np.eye(n)
     if not len(free):
