@@ -112,6 +112,21 @@ def test_a_torsion_spring_in_space_stops_where_its_angle_is_not_told() -> None:
     assert simulate(planar, t_end=3.0, outputs=4)["spring.angle"][-1] > 10.0
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_a_torsion_spring_in_a_plane_counts_turns(form: str) -> None:
+    """What it watches in space is not watched here; steps are short enough to see it at every half turn."""
+    scene = Scene(gravity=0.0)
+    ground, wheel = scene.add("ground", lib.Ground()), scene.add("wheel", lib.Disc(mass=1.0, radius=1.0))
+    hinge, spring = scene.add("hinge", lib.Pivot()), scene.add("spring", lib.TorsionSpring(stiffness=0.02))
+    for a, b in ((ground.frame, hinge.a), (hinge.b, wheel.frame), (ground.frame, spring.a), (wheel.frame, spring.b)):
+        scene.connect(a, b)
+    rate, frequency = 2.0, math.sqrt(0.02 / 0.5)
+    scene.start.update({"hinge.angle": 0.0, "hinge.angular_velocity": rate})
+    result = simulate(scene, t_end=5.0, form=form, max_step=2e-3, solver="ida-sundae", rtol=1e-9)
+    assert result.status == "finished"
+    assert result.at(-1)["spring.angle"] == pytest.approx(rate / frequency * math.sin(frequency * 5.0), abs=1e-6)
+
+
 # -- applied forces and torques ---------------------------------------------------------------------------------------
 
 

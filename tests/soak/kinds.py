@@ -13,6 +13,7 @@ KINDS = {
     "arguments": "arguments",
     "files": "files",
     "scenes": "scenes",
+    "metamorphic": "metamorphic",
 }
 """Name of a kind and its module, whose `check(seed)` makes a trial."""
 

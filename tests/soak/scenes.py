@@ -115,13 +115,13 @@ def oracle_of(mechanism: Mechanism, result: Result) -> Oracle:
     return oracle
 
 
-def started_as(mechanism: Mechanism, result: Result) -> Mechanism:
-    """Return the mechanism as a run of it started."""
+def started_as(mechanism: Mechanism, result: Result, at: int = 0) -> Mechanism:
+    """Return the mechanism as a run of it started, or as it was at another of its times."""
     bodies, axes = [], moving_axes(mechanism)
     for body in mechanism.bodies:
 
         def read(name: str, of: str = axes, body: Body = body) -> Array:
-            return np.array([result.array(f"{body.name}.{name}.{a}")[0] if a in of else 0.0 for a in "xyz"])
+            return np.array([result.array(f"{body.name}.{name}.{a}")[at] if a in of else 0.0 for a in "xyz"])
 
         turned, spin, center = body.rotation, body.spin * 0.0, read("position")
         if mechanism.space != "space":  # what lies across is where it was
@@ -130,15 +130,15 @@ def started_as(mechanism: Mechanism, result: Result) -> Mechanism:
             turned = np.array([read(name) for name in ("x_axis", "y_axis", "z_axis")]).T
             spin = read("angular_velocity")
         elif not body.is_point and mechanism.space == "plane":
-            turned = rotation(np.array([0.0, -1.0, 0.0]), float(result.array(f"{body.name}.angle")[0]))
-            spin = np.array([0.0, -float(result.array(f"{body.name}.angular_speed")[0]), 0.0])
+            turned = rotation(np.array([0.0, -1.0, 0.0]), float(result.array(f"{body.name}.angle")[at]))
+            spin = np.array([0.0, -float(result.array(f"{body.name}.angular_speed")[at]), 0.0])
         arm = turned @ body.center
         velocity = read("velocity") - np.cross(spin, arm)
         bodies.append(replace(body, position=center - arm, rotation=turned, spin=spin, velocity=velocity))
     return replace(mechanism, bodies=tuple(bodies))
 
 
-def run_scene(mechanism: Mechanism, way: Way) -> Result:
+def run_scene(mechanism: Mechanism, way: Way, t_end: float = T_END) -> Result:
     """Build a mechanism and run it."""
     scene = build_scene(mechanism, "guess" if way.start == "speeds" else "all")
     if way.start == "speeds":
@@ -149,7 +149,7 @@ def run_scene(mechanism: Mechanism, way: Way) -> Result:
         level=way.level,
         orientation=way.orientation,
         solver=way.solver,
-        t_end=T_END,
+        t_end=t_end,
         outputs=4,
         rtol=TOLERANCE,
         max_seconds=30.0,
@@ -192,7 +192,19 @@ def _freedom(result: Result, oracle: Oracle) -> Iterator[tuple[str, float]]:
     rank, rows = plan.finding.rank, len(equations.constraints)
     yield "degrees of freedom", abs(len(equations.speeds) - rank - (oracle.size - oracle.rank))
     if result.form == "dae":
-        yield "redundant constraints", abs(rows - rank - (len(oracle.owners()) - oracle.rank))
+        yield "redundant constraints", abs(rows - rank - (len(oracle.owners()) - _idle(oracle) - oracle.rank))
+
+
+def _idle(oracle: Oracle) -> int:
+    """Return the number of constraints between parts of one rigid body, which Atwood leaves out."""
+    mechanism = oracle.mechanism
+    idle = {
+        tie.name
+        for tie in mechanism.ties
+        if tie.sort != "weld" and tie.mounts
+        if {mount.body for mount in tie.mounts} <= mechanism.rigidly_joined(tie.mounts[0].body)
+    }
+    return sum(owner in idle for owner, _ in oracle.owners())
 
 
 def _motion(result: Result, oracle: Oracle, states: list[tuple[Place, Array]]) -> Iterator[tuple[str, float]]:

@@ -56,7 +56,8 @@ def list_watches(
     for path, local in mechanism.locals_.items():
         component = local.part.component
         mode = modes.get(path, "")
-        laws = [law for law in component.laws("event") if law.acts_in(mode)]
+        space = mechanism.space.name
+        laws = [law for law in component.laws("event") if law.holds_in(space) and law.acts_in(mode)]
         if not laws:
             continue
         bound = bind(component, reader.binding(local))
