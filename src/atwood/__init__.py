@@ -61,6 +61,7 @@ from atwood.model.laws import (
     force,
     inertia,
     joint,
+    lagrangian,
     observable,
     potential,
 )
@@ -153,6 +154,7 @@ __all__ = [
     "inertia",
     "is_zero",
     "joint",
+    "lagrangian",
     "load_result",
     "load_scene",
     "log",

@@ -211,7 +211,7 @@ def read_mechanism(
             locals_ = localize(flat, space, time, table, modes, sides, carried)
         network = build_graph(flat, locals_)
         bodies = find_bodies(network, locals_)
-    mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links, told)
+    mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links, told, t_start=flat.t_start)
     check_closures(mechanism)
     check_tensors(mechanism.locals_, table.values)
     return mechanism

@@ -103,7 +103,11 @@ def _pivot(coefficients: list[Expression], light: list[bool], mechanism: Mechani
 
 def _weightless(mechanism: Mechanism, masses: Masses, forest: Forest) -> set[int]:
     """Return the numbers of the coordinates that only place a body without mass."""
-    massive = {mechanism.bodies.body_of[node] for one in masses.coupled for node in one.nodes} | set(masses.bodies)
+    nodes = {node for one in masses.coupled for node in one.nodes}
+    nodes |= {mechanism.graph.node_of[path, one.frame.name] for path, one in masses.varying}
+    moving = {path: local for path, local in mechanism.locals_.items() if local.lagrangians}
+    nodes |= {mechanism.graph.node_of[path, name] for path, local in moving.items() for name in local.connectors}
+    massive = {mechanism.bodies.body_of[node] for node in nodes} | set(masses.bodies)
     return {number for one in forest.attachments if one.body not in massive for number in one.coordinates}
 
 

@@ -10,11 +10,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
+from atwood.mechanics.arms import arm_of
 from atwood.mechanics.forces import Forces, Site, constraint_forces, local_map, part_forces
-from atwood.mechanics.inertia import Masses
+from atwood.mechanics.inertia import Masses, tensor_of, turned_tensor
 from atwood.mechanics.kinematics import BodyShape, Kinematics
-from atwood.mechanics.orientation import inertial_torque
+from atwood.mechanics.orientation import inertial_torque, torque_components
+from atwood.model.contributions import BodyInertia
 from atwood.model.local import LocalConstraint, LocalPart
+from atwood.model.vector import cross
 from atwood.topology.charts import Chart
 from atwood.topology.forest import Coordinate, Forest
 
@@ -195,7 +198,52 @@ def inertia_forces(
             for j in range(len(spread.nodes)):
                 total = [t + spread.masses[i][j] * a for t, a in zip(total, at_nodes[spread.nodes[j]], strict=True)]
             forces.push(node, [-t for t in total])
+    for path, body in masses.varying:
+        lifted_node = at_nodes[site.node(path, body.frame.name)]
+        push_body(site, kinematics, forces, path, body, (lifted_node, (0.0,) * len(lifted_node)))
     return at_centers
+
+
+def push_body(
+    site: Site,
+    kinematics: Kinematics,
+    forces: Forces,
+    path: str,
+    body: BodyInertia,
+    falling: tuple[Sequence[Scalar], Sequence[Scalar]],
+) -> None:
+    """Add the inertial force of a rigid body, taken to its frame's node.
+
+    Parameters
+    ----------
+    site, kinematics
+        The mechanism.
+    forces
+        Takes up the force, and the torque about the node.
+    path, body
+        The part and its inertia.
+    falling
+        Acceleration of the node, and that of free fall, unless the first is without it.
+    """
+    space = site.space
+    node = site.node(path, body.frame.name)
+    index, turn = site.bodies.body_of[node], site.node_turns[node]
+    arm = arm_of(kinematics, index, turn, body.center_of_mass, space)
+    parts = zip(falling[0], arm.acceleration, falling[1], strict=True)
+    force = [site.graph.convert(-body.mass * (a + swing - g)) for a, swing, g in parts]
+    forces.push(node, force)
+    if not space.has_rotation:
+        return
+    about_node = torque_components(
+        cross(space.vector(arm.position), space.vector(tuple(force))), kinematics.placements.axes.get(index), space
+    )
+    spins = kinematics.angular_velocities.get(index), kinematics.angular_accelerations.get(index)
+    if spins[0] is None or spins[1] is None:
+        forces.twist(index, about_node, node)
+        return
+    moment = turned_tensor(tensor_of(path, body), turn) if space.name == "space" else body.moment
+    turning = inertial_torque(moment, spins[0], spins[1])
+    forces.twist(index, [t - i for t, i in zip(about_node, turning, strict=True)], node)
 
 
 def balance_rows(

@@ -9,13 +9,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from atwood.errors import TopologyError
-from atwood.expr import Expression, Graph, Scalar, depends_on, is_zero, substitute, vjp
+from atwood.expr import Expression, Graph, Scalar, depends_on, is_zero, jvp, substitute, vjp
 from atwood.mechanics.kinematics import Kinematics, Placements
 from atwood.mechanics.orientation import NodeTurn, node_axes, spin_in_world, torque_components
 from atwood.model.local import LocalConstraint, LocalPart
 from atwood.model.rotation import Axes, from_axes
 from atwood.model.space import Space
-from atwood.model.vector import Vector, dot
+from atwood.model.vector import Vector, cross, dot
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
@@ -163,9 +163,11 @@ def in_coordinates(local: LocalPart, one: LocalConstraint, placements: Placement
 def part_forces(
     site: Site, local: LocalPart, kinematics: Kinematics, mapping: Mapping[Expression, Expression], forces: Forces
 ) -> None:
-    """Add the forces of a part's potentials, Rayleigh functions and loads."""
+    """Add the forces of a part's potentials, Rayleigh functions, Lagrangians and loads."""
     _add_gradient(site, local, kinematics, local.potentials, mapping, forces, of_velocities=False)
     _add_gradient(site, local, kinematics, local.dissipations, mapping, forces, of_velocities=True)
+    if local.lagrangians:
+        _add_lagrangians(site, local, kinematics, mapping, forces)
     path = local.part.path
     for load in local.loads:
         force = substitute([site.graph.convert(c) for c in site.space.components(load.force)], mapping)
@@ -197,6 +199,67 @@ def _add_gradient(
                 forces.push_joint(symbol, substitute([slope], mapping)[0])
         for name, slopes, turning in slopes_of(local, function, site.graph.constant(-1.0), of_velocities):
             _push_mapped(site, local, name, slopes, turning, mapping, forces)
+
+
+def _add_lagrangians(
+    site: Site, local: LocalPart, kinematics: Kinematics, mapping: Mapping[Expression, Expression], forces: Forces
+) -> None:
+    """Add the forces ``dL/dq - d/dt dL/dq'`` of Lagrangians.
+
+    In space, where angular velocities are no rates of coordinates, the torque is ``tau + omega x p - p'``, in which tau
+    is that of the derivatives by the axes and p the derivative by the angular velocity (the equations of Poincare).
+    """
+    functions, hung = in_joint_coordinates(local, kinematics, local.lagrangians)
+    graph, one = site.graph, site.graph.constant(1.0)
+    along, placed = _rates_of_symbols(site, local, kinematics, hung)
+    there = {**mapping, **placed}
+    for function in functions:
+        for symbol in hung:
+            slope, momentum = vjp([function], [one], [symbol, rate_symbol(symbol)])
+            force = slope - jvp([momentum], along)[0]
+            if not force.is_zero:
+                forces.push_joint(symbol, substitute([force], there)[0])
+        momenta = iter(vjp([function], [one], local.velocities))
+        for name, slopes, turning in slopes_of(local, function, one):
+            symbols = local.connectors[name]
+            linear, angular = [next(momenta) for _ in symbols.velocity], [next(momenta) for _ in symbols.spin]
+            slopes = [s - r for s, r in zip(slopes, jvp(linear, along), strict=True)]
+            rates = jvp(angular, along) if angular else []
+            if symbols.axes is not None and symbols.angular_velocity is not None:
+                turned = cross(symbols.angular_velocity, Vector(*angular)) - Vector(*rates)
+                rates = [-one for one in _along(symbols.axes, [graph.convert(c) for c in turned])]
+            turning = [s - r for s, r in zip(turning, rates, strict=True)]
+            _push_mapped(site, local, name, slopes, turning, there, forces)
+
+
+def _rates_of_symbols(
+    site: Site, local: LocalPart, kinematics: Kinematics, hung: Sequence[Expression]
+) -> tuple[dict[Expression, Expression | float], dict[Expression, Expression]]:
+    """Return the time derivative of each local symbol, with symbols for accelerations, and what these stand for."""
+    graph, path = site.graph, local.part.path
+    along: dict[Expression, Expression | float] = {graph.convert(local.binding.time): 1.0}
+    placed: dict[Expression, Expression] = {}
+    for name, symbols in local.connectors.items():
+        node = site.node(path, name)
+        body = site.bodies.body_of[node]
+        rates = [graph.symbol(f"{symbol.name}'") for symbol in (*symbols.velocity, *symbols.spin)]
+        spin_rates: Sequence[Scalar] = kinematics.angular_accelerations.get(body, (0.0,) * len(symbols.spin))
+        if symbols.axes is not None and symbols.angular_velocity is not None:
+            if body in kinematics.placements.axes:
+                spin_rates = tuple(spin_in_world(spin_rates, kinematics.placements.axes[body]))
+            for axis in symbols.axes:
+                along.update(zip(axis, cross(symbols.angular_velocity, axis), strict=True))
+        if symbols.angle is not None and symbols.angular_speed is not None:
+            along[symbols.angle] = symbols.angular_speed
+        along.update(zip(symbols.position, symbols.velocity, strict=True))
+        along.update(zip((*symbols.velocity, *symbols.spin), rates, strict=True))
+        found = (*kinematics.accelerations[node], *spin_rates)
+        placed.update((rate, graph.convert(value)) for rate, value in zip(rates, found, strict=False))
+    for symbol in hung:
+        rate, second = rate_symbol(symbol), graph.symbol(f"{symbol.name}''")
+        along[symbol], along[rate] = rate, second
+        placed[second] = kinematics.joint_accelerations[symbol]
+    return along, placed
 
 
 def slopes_of(

@@ -76,11 +76,15 @@ class Masses:
         Masses spread between nodes.
     fixed_parts
         Parts whose inertia cannot move.
+    varying
+        Rigid bodies whose inertia changes with time, with the paths of their parts; single points that do are among
+        the coupled masses.
     """
 
     bodies: Mapping[int, RigidMass]
     coupled: tuple[CoupledMass, ...]
     fixed_parts: tuple[str, ...]
+    varying: tuple[tuple[str, BodyInertia], ...] = ()
 
 
 def add_masses(
@@ -102,6 +106,7 @@ def add_masses(
     shares: dict[int, list[RigidMass]] = {}
     coupled: list[CoupledMass] = []
     fixed: list[str] = []
+    varying: list[tuple[str, BodyInertia]] = []
 
     def share(part: str, node: int, mass: Scalar, center: Vector, moment: Scalar | Axes) -> None:
         body = bodies.body_of[node]
@@ -120,7 +125,7 @@ def add_masses(
     for path, local in locals_.items():
         for point in local.point_inertias:
             nodes = tuple(mechanism.node_of[(path, p.name)] for p in point.points)
-            if len(nodes) == 1:
+            if len(nodes) == 1 and point not in local.varying:
                 share(path, nodes[0], point.masses[0][0], Vector(0.0, 0.0, 0.0), nothing)
             elif not all(is_zero(m) for row in point.masses for m in row):
                 if all(bodies.body_of[node] == 0 for node in nodes):
@@ -128,9 +133,14 @@ def add_masses(
                 else:
                     coupled.append(CoupledMass(path, nodes, tuple(tuple(row) for row in point.masses)))
         for body in local.body_inertias:
+            node = mechanism.node_of[(path, body.frame.name)]
+            if body in local.varying:
+                varying.append((path, body)) if bodies.body_of[node] else fixed.append(path)
+                continue
             moment = tensor_of(path, body) if space.name == "space" else body.moment
-            share(path, mechanism.node_of[(path, body.frame.name)], body.mass, body.center_of_mass, moment)
-    return Masses({index: _merge(found) for index, found in shares.items()}, tuple(coupled), tuple(fixed))
+            share(path, node, body.mass, body.center_of_mass, moment)
+    merged = {index: _merge(found) for index, found in shares.items()}
+    return Masses(merged, tuple(coupled), tuple(fixed), tuple(varying))
 
 
 def tensor_of(path: str, body: BodyInertia) -> Axes:
@@ -162,7 +172,7 @@ def check_tensors(locals_: Mapping[str, LocalPart], values: Mapping[Expression, 
     for path, local in locals_.items():
         for body in local.body_inertias:
             entries = [entry for row in body.tensor or () for entry in row]
-            if not entries or all(is_zero(entry) for entry in entries):
+            if not entries or body in local.varying or all(is_zero(entry) for entry in entries):
                 continue
             graph = next(iter(values)).graph if values else None
             numbers = evaluate([graph.convert(entry) for entry in entries], values) if graph else entries

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Scalar, evaluate
-from atwood.expr.relations import TimeRelations
+from atwood.expr.relations import TimeRelations, values_just_after
 from atwood.mechanics.orientation import NodeTurn, body_offsets, plain, rotate
 from atwood.model.local import LocalPart, ParameterTable
 from atwood.model.rotation import as_rotation, compose
@@ -50,6 +50,8 @@ class Mechanism:
     places
         Where the scene starts, by form and by the symbols of its coordinates; None where nothing depends on it: then
         constraints on velocities stay what they are.
+    t_start
+        When it starts, s.
     """
 
     table: ParameterTable
@@ -63,6 +65,14 @@ class Mechanism:
     sides: Mapping[tuple[str, str, str], float] | None = None
     decisions: list[tuple[Callable[[Mechanism], object], object]] = field(default_factory=list)
     places: Mapping[str, Mapping[Expression, float]] | None = None
+    t_start: float = 0.0
+
+    def known_at_start(self) -> dict[Expression, float]:
+        """Return the values of parameters, of time and of relations of it at the start of a run."""
+        values, relations = self.table.values, self.relations.found
+        after = values_just_after(relations, values, self.t_start)
+        symbols = (one.symbol for one in relations)
+        return {**values, self.time: self.t_start, **dict(zip(symbols, after, strict=True))}
 
     @property
     def relations(self) -> TimeRelations:

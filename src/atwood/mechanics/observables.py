@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from atwood.expr import Expression, Scalar, substitute
+from atwood.expr import Expression, Scalar, substitute, vjp
 from atwood.mechanics.arms import arm_of
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.carried import CarriedInertia
 from atwood.mechanics.equations import Equations
-from atwood.mechanics.forces import in_joint_coordinates, local_map
+from atwood.mechanics.forces import in_joint_coordinates, local_map, rate_symbol
 from atwood.mechanics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics import Kinematics
 from atwood.mechanics.orientation import NodeTurn, node_axes, spin_in_world
@@ -264,6 +264,14 @@ def part_energies(
         kinetic = kinetic + _energy_of_turning(path, body, turn, kinematics.angular_velocities.get(index, ()))
     for value in in_joint_coordinates(local, kinematics, local.potentials)[0]:
         potential = potential + substitute([value], mapping)[0]
+    functions, hung = in_joint_coordinates(local, kinematics, local.lagrangians)
+    for value in functions:
+        rates = [*local.velocities, *(rate_symbol(symbol) for symbol in hung)]
+        momenta = vjp([value], [graph.constant(1.0)], rates)
+        still = substitute([value], dict.fromkeys(rates, graph.zero))[0]
+        energy = sum((p * v for p, v in zip(momenta, rates, strict=True)), still - value)
+        kinetic = kinetic + substitute([energy], mapping)[0]
+        potential = potential - substitute([still], mapping)[0]
     return graph.convert(kinetic), graph.convert(potential)
 
 

@@ -8,12 +8,15 @@ from atwood.expr import Expression, jvp, substitute
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.forces import Forces, in_joint_coordinates, local_map, part_forces
+from atwood.model.moving_mass import inertial_energy
 
 __all__ = ["applied_power", "switched_energy"]
 
 
 def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
-    """Return the power, W, that loads, dampers and time-dependent potentials put into the scene.
+    """Return the power, W, that loads, dampers and what changes with time put into the scene.
+
+    What changes with time: potentials, Lagrangians, and mass, which takes its energy along.
 
     Constraints that move with time (drives) are left out: their power is minus their multiplier times the explicit
     time derivative of the constraint.
@@ -31,9 +34,13 @@ def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
     total = graph.constant(0.0)
     for local in mechanism.locals_.values():
         mapping = {**local_map(equations.site, local, kinematics), **signals}
-        part_forces(equations.site, replace(local, potentials=()), kinematics, mapping, forces)
-        potentials, _ = in_joint_coordinates(local, kinematics, local.potentials)
-        for slope in jvp(potentials, {mechanism.time: 1.0}) if potentials else ():
+        alone = replace(local, potentials=(), lagrangians=())
+        part_forces(equations.site, alone, kinematics, mapping, forces)
+        changing = [*local.potentials, *(-value for value in local.lagrangians)]
+        space = mechanism.space.name
+        changing += [graph.convert(inertial_energy(one, mechanism.gravity, space)) for one in local.varying]
+        placed, _ = in_joint_coordinates(local, kinematics, changing)
+        for slope in jvp(placed, {mechanism.time: 1.0}) if placed else ():
             total = total + substitute([slope], mapping)[0]
     for node, force in forces.on_nodes.items():
         for f, v in zip(force, kinematics.velocities[node], strict=True):

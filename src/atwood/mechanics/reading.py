@@ -113,7 +113,7 @@ def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, 
         options = law.options
         rate = f"{path}.{options.rate}" if options.rate else ""
         take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic, rate)
-    has_inertia = bool(local.part.component.laws("inertia"))
+    has_inertia = any(local.part.component.laws(kind) for kind in ("inertia", "lagrangian"))
     if has_inertia or local.potentials:
         kinetic, potential = reader.energies(path)
         if has_inertia:

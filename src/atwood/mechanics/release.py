@@ -10,14 +10,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar
-from atwood.mechanics.arms import arm_of
 from atwood.mechanics.build import Mechanism, resolve_signals
-from atwood.mechanics.equations import Equations
+from atwood.mechanics.equations import Equations, push_body
 from atwood.mechanics.forces import Forces, constraint_forces, in_coordinates, local_map, part_forces
-from atwood.mechanics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.observables import Reaction
-from atwood.mechanics.orientation import inertial_torque, spin_in_world, torque_components
-from atwood.model.contributions import BodyInertia
+from atwood.mechanics.orientation import spin_in_world
 from atwood.model.space import Space
 from atwood.model.vector import Vector, cross
 from atwood.topology.bodies import Body
@@ -107,32 +104,9 @@ def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:
                     push = [p - inertia.masses[i][j] * (a - g) for p, (a, g) in zip(push, lifted, strict=True)]
                 forces.push(node, push)
         for body in local.body_inertias:
-            _push_body(mechanism, equations, forces, path, body)
+            node = equations.site.node(path, body.frame.name)
+            push_body(equations.site, kinematics, forces, path, body, (kinematics.accelerations[node], pull))
     return forces
-
-
-def _push_body(mechanism: Mechanism, equations: Equations, forces: Forces, path: str, body: BodyInertia) -> None:
-    """Add the inertial force of a rigid body, taken to its frame's node."""
-    kinematics, space, site = equations.kinematics, mechanism.space, equations.site
-    node = site.node(path, body.frame.name)
-    index, turn = site.bodies.body_of[node], site.node_turns[node]
-    arm = arm_of(kinematics, index, turn, body.center_of_mass, space)
-    pull = space.components(mechanism.gravity)
-    accelerations = zip(kinematics.accelerations[node], arm.acceleration, pull, strict=True)
-    force = [-body.mass * (a + swing - g) for a, swing, g in accelerations]
-    forces.push(node, force)
-    if not space.has_rotation:
-        return
-    about_node = torque_components(
-        cross(space.vector(arm.position), space.vector(tuple(force))), kinematics.placements.axes.get(index), space
-    )
-    spins = kinematics.angular_velocities.get(index), kinematics.angular_accelerations.get(index)
-    if spins[0] is None or spins[1] is None:
-        forces.twist(index, about_node, node)
-        return
-    moment = turned_tensor(tensor_of(path, body), turn) if space.name == "space" else body.moment
-    turning = inertial_torque(moment, spins[0], spins[1])
-    forces.twist(index, [t - i for t, i in zip(about_node, turning, strict=True)], node)
 
 
 def _through(

@@ -25,11 +25,14 @@ __all__ = [
     "force",
     "inertia",
     "joint",
+    "lagrangian",
     "observable",
     "potential",
 ]
 
-Kind = Literal["potential", "dissipation", "force", "inertia", "constraint", "joint", "observable", "event"]
+Kind = Literal[
+    "potential", "dissipation", "force", "inertia", "lagrangian", "constraint", "joint", "observable", "event"
+]
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
@@ -176,8 +179,24 @@ def force(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Call
 
 
 def inertia(function: _F) -> _F:
-    """Mark a method that returns an iterable of `PointInertia` and `BodyInertia`; it reads parameters only."""
+    """Mark a method that returns an iterable of `PointInertia` and `BodyInertia`; it reads parameters and time.
+
+    Mass that changes with time comes, or goes, with the velocity that the body has where it is: it exerts no force, and
+    ``m(t) a = F`` holds for what is there (a leaking bucket). The thrust of mass that leaves with another velocity is a
+    `force` of its own. What depends on positions or joint coordinates is a `lagrangian`.
+    """
     return _mark(function, Law("inertia", function.__name__))
+
+
+def lagrangian(function: _F) -> _F:
+    """Mark a method that returns a Lagrangian, J, from positions, velocities, orientations, their rates and time.
+
+    It acts by ``dL/dq - d/dt dL/dq'`` on whatever its connectors are joined to (Goldstein, section 1.4), so that
+    inertia may depend on coordinates, and terms may be linear in velocities. It has to be smooth. It has no weight
+    besides the potential energy that is in it. Its energy is ``p q' - L`` (Goldstein, section 2.7): potential energy is
+    minus its value without velocities, kinetic energy the rest.
+    """
+    return _mark(function, Law("lagrangian", function.__name__, ActingOptions(())))
 
 
 def constraint(

@@ -22,6 +22,7 @@ from atwood.model.flatten import FlatScene, Part
 from atwood.model.grips import counting_constraints, find_grips, formulas_of
 from atwood.model.laws import Law, scalars
 from atwood.model.local_parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart, multiplier_symbol
+from atwood.model.moving_mass import check_lagrangians, find_varying
 from atwood.model.shafts import Held, find_held
 from atwood.model.space import FIXED_AXES, Space, planar_axes
 from atwood.model.vector import Vector
@@ -162,6 +163,8 @@ def _localize_part(
     potentials, switched = scalar_laws("potential"), scalar_laws("potential", only_in_modes=True)
     constraints = [one for law in laws("constraint") for one in _local_constraints(part, law, acting, graph)]
     inertias = listed_laws("inertia", bound)
+    lagrangians, symbols = scalar_laws("lagrangian"), [*connectors.values()]
+    check_lagrangians(part.path, lagrangians, symbols, signal_symbols.values())
     joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws("joint"))
     own = [symbol for joint in joints for symbol in joint.coordinates]
     formulas = formulas_of(part, bound, own, graph) if space.name == "space" else {}
@@ -186,6 +189,8 @@ def _localize_part(
         formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in grips}},
         borrowed={full: end for one in grips for full, end in one.borrowed.items()},
         switched=switched,
+        lagrangians=lagrangians,
+        varying=find_varying(part.path, inertias, symbols, signal_symbols.values(), graph),
         reads=_multipliers_read(part, constraints, forces, graph),
     )
 

@@ -106,6 +106,10 @@ class LocalPart:
         Connectors of joints that it takes hold of, which are among its own under their full paths.
     reads
         The multipliers that its laws of force read.
+    lagrangians
+        What its laws of that kind returned.
+    varying
+        Those of its inertias that change with time.
     switched
         Those of its potentials that act in some of its modes only.
     """
@@ -125,6 +129,8 @@ class LocalPart:
     borrowed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     switched: tuple[Expression, ...] = ()
     reads: tuple[Expression, ...] = ()
+    lagrangians: tuple[Expression, ...] = ()
+    varying: tuple[PointInertia | BodyInertia, ...] = ()
 
     @property
     def asks(self) -> list[str]:
@@ -142,5 +148,5 @@ class LocalPart:
         return (
             bool(keys)
             and all(key in solved for key in keys)
-            and not (self.potentials or self.dissipations or self.loads)
+            and not (self.potentials or self.dissipations or self.loads or self.lagrangians)
         )

@@ -121,7 +121,7 @@ def _other_moment(assembly: Assembly) -> str:
         for one in local.body_inertias:
             if one.tensor is not None:
                 pair = [table.graph.convert(value) for value in (one.moment, one.tensor[1][1])]
-                plane, space = evaluate(pair, table.values)
+                plane, space = evaluate(pair, assembly.mechanism.known_at_start())
                 if not math.isclose(plane, space, rel_tol=1e-12):
                     return path
     return ""

@@ -108,6 +108,9 @@ def list_bodies(assembly: Assembly) -> tuple[tuple[BodyEntry, ...], tuple[str, .
     mechanism, masses = assembly.mechanism, assembly.maximal.masses
     body_of = mechanism.bodies.body_of
     spread = {body_of[node] for one in masses.coupled for node in one.nodes}
+    own = {(path, name) for path, one in mechanism.locals_.items() if one.lagrangians for name in one.connectors}
+    own |= {(path, one.frame.name) for path, one in masses.varying}
+    spread |= {body_of[mechanism.graph.node_of[end]] for end in own}
     found: list[BodyEntry] = []
     massless: list[str] = []
     for body in mechanism.bodies.bodies:
@@ -122,13 +125,14 @@ def list_bodies(assembly: Assembly) -> tuple[tuple[BodyEntry, ...], tuple[str, .
         entries = [m for one in masses.coupled if one.part == part for row in one.masses for m in row]
         total = sum(_number(mechanism, entry) for entry in entries)
         found.append(BodyEntry(part, total, (part,)))
+    found += [BodyEntry(path, _number(mechanism, one.mass), (path,)) for path, one in masses.varying]
     order = {path: i for i, path in enumerate(assembly.flat.parts)}
     found.sort(key=lambda one: order.get(one.path, len(order)))
     return tuple(found), tuple(massless)
 
 
 def _number(mechanism: Mechanism, value: Scalar) -> float:
-    return float(evaluate([mechanism.table.graph.convert(value)], mechanism.table.values)[0])
+    return float(evaluate([mechanism.table.graph.convert(value)], mechanism.known_at_start())[0])
 
 
 def list_joints(assembly: Assembly) -> tuple[JointEntry, ...]:
@@ -254,7 +258,7 @@ def _why_nothing(mechanism: Mechanism, local: LocalPart) -> str:
     """Return why a part without joints and constraints leaves nothing in the equations; empty if it does."""
     inertias = [m for one in local.point_inertias for row in one.masses for m in row]
     inertias += [m for one in local.body_inertias for m in (one.mass, one.moment)]
-    forces: list[Scalar] = [*local.potentials, *local.dissipations]
+    forces: list[Scalar] = [*local.potentials, *local.dissipations, *local.lagrangians]
     forces += [c for one in local.loads for c in (*one.force, *one.torque)]
     acts = any(local.part.component.laws(kind) for kind in ("potential", "dissipation", "force"))
     if not inertias and not forces and not acts:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.expr import OutputGroup, Program
+from atwood.expr import InputGroup, OutputGroup, Program
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.build import extent
 from atwood.mechanics.equations import Equations
@@ -113,12 +113,14 @@ def find_scales(
 
 
 def total_mass(assembly: Assembly) -> float:
-    """Return the mass of all that moves, kg."""
+    """Return the mass of all that moves, at the start, kg."""
 
     def make() -> Program:
         masses, graph = assembly.equations.masses, assembly.mechanism.table.graph
         found = [graph.convert(one.mass) for one in masses.bodies.values()]
         found += [graph.convert(m) for one in masses.coupled for row in one.masses for m in row]
-        return Program("masses", (), assembly.parameters, (OutputGroup("masses", tuple(found)),))
+        found += [graph.convert(one.mass) for _, one in masses.varying]
+        time = InputGroup("t", (assembly.mechanism.time,))
+        return Program("masses", (time,), assembly.parameters, (OutputGroup("masses", tuple(found)),))
 
-    return float(sum(assembly.kernel(assembly.shared.get("masses", make))()[0]))
+    return float(sum(assembly.kernel(assembly.shared.get("masses", make))([assembly.flat.t_start])[0]))

@@ -20,7 +20,7 @@ from atwood.model.vector import Vector
 
 __all__ = ["announce", "find_uncompiled"]
 
-_PLAIN = ("potential", "dissipation", "force", "inertia")
+_PLAIN = ("potential", "dissipation", "force", "inertia", "lagrangian")
 
 
 def find_uncompiled(assembly: Assembly, program: Program) -> str:

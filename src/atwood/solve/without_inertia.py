@@ -100,6 +100,6 @@ def _acting_on(assembly: Assembly, where: str) -> list[str]:
     found: dict[str, None] = {}
     for (path, _), node in graph.node_of.items():
         local = assembly.mechanism.locals_[path]
-        if bodies.body_of[node] in own and (local.loads or local.potentials or local.dissipations):
+        if bodies.body_of[node] in own and (local.loads or local.potentials or local.dissipations or local.lagrangians):
             found[path] = None
     return list(found)

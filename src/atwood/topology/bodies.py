@@ -138,7 +138,7 @@ def _orientations(
             tensor = [one.moment] if one.tensor is None else [entry for row in one.tensor for entry in row]
             if not all(is_zero(c) for c in (*tensor, *one.center_of_mass)):
                 needed.add(body(one.frame.name))
-        plain: list[Scalar] = [*local.potentials, *local.dissipations]
+        plain: list[Scalar] = [*local.potentials, *local.dissipations, *local.lagrangians]
         for load in local.loads:
             plain += [*load.force, *load.torque]
             if any(not is_zero(c) for c in load.torque):
@@ -179,7 +179,16 @@ def _peel(needed: set[int], locks: list[tuple[list[Key], set[int]]]) -> tuple[fr
 
 def _measured(local: LocalPart) -> list[str]:
     """Return, in space, the frames of a part that only measures: what it is to measure must be known."""
-    kinds: tuple[Kind, ...] = ("potential", "dissipation", "force", "inertia", "constraint", "joint", "event")
+    kinds: tuple[Kind, ...] = (
+        "potential",
+        "dissipation",
+        "force",
+        "inertia",
+        "lagrangian",
+        "constraint",
+        "joint",
+        "event",
+    )
     component = local.part.component
     if any(component.laws(kind) for kind in kinds):
         return []

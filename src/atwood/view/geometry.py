@@ -298,4 +298,4 @@ def _between(
 
 
 def _value(mechanism: Mechanism, value: Scalar) -> float:
-    return float(evaluate([mechanism.table.graph.convert(value)], mechanism.table.values)[0])
+    return float(evaluate([mechanism.table.graph.convert(value)], mechanism.known_at_start())[0])

@@ -23,7 +23,7 @@ def numbers(
 ) -> FloatArray:
     """Return the values of expressions of parameters, and of further symbols with the values given."""
     graph = mechanism.table.graph
-    values = {**mechanism.table.values, **(also or {})}
+    values = {**mechanism.known_at_start(), **(also or {})}
     return np.array(evaluate([graph.convert(one) for one in given], values), dtype=float)
 
 
