@@ -10,7 +10,7 @@ from atwood import Scene
 from atwood.errors import ParameterError, StartError, UsageError
 from atwood.pipeline import assemble, simulate
 from atwood.solve.start import Start, find_start
-from atwood_library import PositionSensor
+from atwood_library import Ground, Pivot, PositionSensor, RigidBody, Weld
 from atwood_library.scenes import DoublePendulum, DrivenPendulum, FourBar, SimplePendulum, SliderCrank
 
 from ..helpers.mechanisms import pendulum
@@ -242,3 +242,50 @@ def test_accelerations_and_multipliers_fit_before_the_first_step() -> None:
     result = simulate(SimplePendulum(), form="dae", rtol=1e-6, t_end=1e-6, outputs=2)
     assert result.array("rod.tension")[0] == pytest.approx(9.81 * math.cos(1.0), rel=1e-12)
     assert result.array("bob.acceleration.x")[0] == pytest.approx(-9.81 * math.sin(1.0) * math.cos(1.0), rel=1e-12)
+
+
+# -- whole turns -------------------------------------------------------------------------------------------------------
+
+
+def sprung_pair() -> Scene:
+    """Return two bodies on hinges with springs, welded on at angles, so that no coordinate is a hinge's angle."""
+    scene = Scene(gravity=0.0)
+    ground = scene.add("ground", Ground())
+    foot = scene.add("foot", Weld(angle=3.0))
+    hinge = scene.add("hinge", Pivot(stiffness=1.0))
+    arm = scene.add("arm", Weld(angle=2.0))
+    body = scene.add("body", RigidBody(mass=1.0, moments=(1.0, 1.0, 1.0)))
+    second = scene.add("second", Pivot(stiffness=1.0))
+    end = scene.add("end", RigidBody(mass=1.0, moments=(1.0, 1.0, 1.0)))
+    scene.connect(ground.frame, foot.a)
+    scene.connect(foot.b, hinge.a)
+    scene.connect(hinge.b, arm.a)
+    scene.connect(arm.b, body.frame)
+    scene.connect(arm.b, second.a)
+    scene.connect(second.b, end.frame)
+    return scene
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize(("first", "second"), [(7.0, -8.0), (-20.0, 0.3), (1.0, 13.0)])
+def test_angles_start_with_the_whole_turns_that_are_said(form: str, first: float, second: float) -> None:
+    scene = sprung_pair()
+    scene.start.update({"hinge.angle": first, "second.angle": second})
+    result = simulate(scene, form=form, t_end=0.1, outputs=3)
+    assert result["hinge.angle"][0] == pytest.approx(first, abs=1e-9)
+    assert result["hinge.potential_energy"][0] == pytest.approx(0.5 * first**2, rel=1e-9)
+    assert result["second.potential_energy"][0] == pytest.approx(0.5 * second**2, rel=1e-9, abs=1e-12)
+
+
+def test_angles_that_agree_but_for_a_turn_contradict_each_other_and_as_guesses_do_not() -> None:
+    said = {"hinge.angle": -0.25, "body.angle": -0.25 + 5.0 - 2.0 * np.pi}
+    scene = sprung_pair()
+    scene.start.update(said)
+    with pytest.raises(StartError, match="contradict each other"):
+        simulate(scene, t_end=0.1)
+    scene = sprung_pair()
+    scene.guess.update(said)
+    result = simulate(scene, t_end=0.1, outputs=3)
+    turned = (result["hinge.angle"][0] + 0.25) / (2.0 * np.pi)
+    assert turned == pytest.approx(round(turned), abs=1e-9)
+    assert result["hinge.potential_energy"][0] == pytest.approx(0.5 * result["hinge.angle"][0] ** 2, rel=1e-9)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from atwood.expr import Expression, Scalar, substitute, vjp
+from atwood.expr import Expression, Scalar, live, substitute, vjp
 from atwood.mechanics.arms import arm_of
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.carried import CarriedInertia
@@ -138,8 +138,15 @@ def take(
             found[name] = Observable(name, unit, doc, periodic, graph.convert(value[axis]))
     else:
         expression = graph.convert(value)
-        # A joint coordinate needs no unwrapping: it counts its turns by itself.
-        found[path] = Observable(path, unit, doc, periodic and not expression.is_symbol, expression, rate)
+        found[path] = Observable(path, unit, doc, periodic and not _counts_turns(expression), expression, rate)
+
+
+def _counts_turns(angle: Expression) -> bool:
+    """Return whether an angle counts its turns by itself: it is a sum of coordinates, each with its own turns."""
+    return all(node.is_parametric or node.is_symbol or node.operation in _SUMS for node in live([angle]))
+
+
+_SUMS = frozenset(("add", "sub", "neg"))
 
 
 def make_binding(

@@ -74,7 +74,13 @@ def solve_positions(
     q, is_direct = said(equations.coordinates, every, resting_place(equations))
     q = _turned(equations, turning, q)
     if not is_direct:
-        q = _brought_near(System(assembly, equations, every, False), equations, scales, t, q)
+        system = System(assembly, equations, every, False)
+        near = _brought_near(system, equations, scales, t, q)
+        if _far_off(system, t, near) > 1.0:  # what is said may fit together but for whole turns
+            system = System(assembly, equations, every, False, whole_turns=True)
+            other = _brought_near(system, equations, scales, t, q)
+            near = other if _far_off(system, t, other) < 1e-3 else near
+        q = near
     rough = q
     system = System(assembly, equations, level.fixed, True)
     q, missing, matrix = newton(system, scales, t, q)

@@ -80,7 +80,15 @@ def start_conditions(
 
 
 class System:
-    """Values and derivatives of targets and constraints along the speeds: of places, or of speeds themselves."""
+    """Values and derivatives of targets and constraints along the speeds: of places, or of speeds themselves.
+
+    Parameters
+    ----------
+    assembly, equations, targets, constrained, of_speeds
+        See `start_conditions`.
+    whole_turns
+        Whether angles are met that differ by whole turns from what is said, also where they count their turns.
+    """
 
     def __init__(
         self,
@@ -89,6 +97,7 @@ class System:
         targets: Sequence[Target],
         constrained: bool,
         of_speeds: bool = False,
+        whole_turns: bool = False,
     ) -> None:
         made = start_conditions(assembly, equations, targets, constrained, of_speeds)
         turning = turning_of(assembly, "regular")
@@ -101,6 +110,7 @@ class System:
         laws = [*(held if constrained else []), *(one.path for one in targets)]
         self.errors = RowErrors(assembly, made.program, ("values", "slopes"), laws, places, turning, not of_speeds)
         self.targets, self.constraints = targets, made.shape[0] - len(targets)
+        self.wrapped = [one.observable.periodic or (whole_turns and one.observable.unit == "rad") for one in targets]
         self.speed_names = tuple(one.name for one in equations.speed_names)
         self.speeds = len(equations.speeds)
 
@@ -113,7 +123,7 @@ class System:
         missing = np.asarray(values, dtype=float)
         for i, target in enumerate(self.targets, start=self.constraints):
             missing[i] -= target.value
-            if target.observable.periodic:
+            if self.wrapped[i - self.constraints]:
                 missing[i] = np.remainder(missing[i] + np.pi, 2.0 * np.pi) - np.pi
         return missing, matrix
 
