@@ -21,6 +21,7 @@ from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
 
 __all__ = [
     "ANYTHING",
+    "BY_PATH",
     "CALLBACK",
     "FILE",
     "FLAG",
@@ -305,6 +306,13 @@ def _mapping(value: Any) -> Mapping[Any, Any]:
     return value
 
 
+def _by_path(value: Any) -> Mapping[str, Any]:
+    for key in _mapping(value):
+        if not isinstance(key, str) or not key.strip():
+            raise Refused(f"{show(key)} is no path.")
+    return _mapping(value)
+
+
 ANYTHING = Kind("anything", lambda value: value)
 """For what the function itself looks at."""
 
@@ -314,3 +322,4 @@ FILE = Kind("the path of a file, as text or a Path", _file)
 CALLBACK = Kind("a function", _callback)
 FLAG = Kind("True or False", _flag)
 MAPPING = Kind("a dictionary", _mapping)
+BY_PATH = Kind("a dictionary by path, such as {'rod.length': 1.0}", _by_path)

@@ -55,7 +55,7 @@ BAD: dict[str, list[Any]] = {
     "needed text": [*NOTHING_SOUND, 3, 2.5, [], [1.0], True, None],
     "word": [*NOTHING_SOUND, "wrod", "", 3, None, [], True],
     "texts": [3, 2.5, b"x", 1j, object(), Odd(), [3], [None], {"x": 1}, ["no.such.thing"], True],
-    "file": [*NOTHING_SOUND, 3, "", " ", "a\0b.npz", None, "no/such/directory/x.npz", ".", "name-without-suffix"],
+    "file": [*NOTHING_SOUND, 3, "", " ", "a\0b.npz", None, "no/such/directory/x.npz", "."],
     "picture": [b"x", 1j, object(), Odd(), 3, "", "a\0b.png", "no/such/directory/x.png", ".", "x.unknown"],
     "callback": [3, "x", 2.5, [], {}, 1j, b"x"],
     "flag": [*NOTHING_SOUND, "yes", 2, None, 0.5, []],
@@ -109,7 +109,7 @@ def attempts() -> Iterator[Attempt]:
     for call in calls():
         for argument, kind in call.kinds.items():
             yield from (Attempt(call, argument, value) for value in (*BAD[kind], *call.also.get(argument, ())))
-        if call.has_names:
+        if call.has_names and len(call.kinds) > 1:
             yield Attempt(call, "argumnet", 1.0)
 
 

@@ -219,7 +219,7 @@ def _pictures() -> Iterator[Call]:
     also = {"times": ([], ["x"], [None], [1e9], [np.nan], "x"), "trace": (["x"],), "view": ("3", (1.0,), (0.0, 100.0))}
     said = {**_SAID, "times": ("t =",), "seconds": ("frames",)}
     yield Call("plot", atwood.plot, shown, {"result": "object", "paths": "texts", "file": "picture"}, said_as=said)
-    yield Call("Result.plot", result().plot, {}, {"paths": "texts", "file": "picture"}, said_as=said)
+    yield Call("Result.plot", result().plot, {}, {"paths": "texts", "file": "picture"}, said_as=said, has_names=False)
     yield Call(
         "plot_mechanism",
         atwood.plot_mechanism,

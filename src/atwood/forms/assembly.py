@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arguments import MAPPING, optional, takes
+from atwood.arguments import BY_PATH, optional, takes
 from atwood.errors import ParameterError, UsageError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.collect import collect
@@ -173,7 +173,7 @@ class Assembly:
         """The values of the parameters."""
         return np.array([*self.mechanism.table.values.values(), *self.relation_values], dtype=float)
 
-    @takes(values=optional(MAPPING), start=optional(MAPPING), guess=optional(MAPPING))
+    @takes(values=optional(BY_PATH), start=optional(BY_PATH), guess=optional(BY_PATH))
     def with_values(
         self,
         values: Mapping[str, Any] | None = None,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arguments import show
 from atwood.errors import UsageError
 from atwood.forms.source import change_scene
 from atwood.model.composite import Model
@@ -121,12 +122,14 @@ def make_cases(scene: Model, vary: Mapping[str, Any] | None, start: Mapping[str,
 
 def _axis(trial: Model, path: str, values: Any, is_start: bool) -> Axis:
     if isinstance(values, str) or not isinstance(values, (Sequence, np.ndarray)):
-        raise UsageError("give a list of values, or an array", where=str(path))
+        raise UsageError(
+            f"{show(values)} is no list of values", where=path, advice="Give a list of values, or an array."
+        )
     if isinstance(values, np.ndarray) and values.ndim != 1:
         raise UsageError(f"its values have the shape {values.shape} and not one dimension", where=str(path))
     given = tuple(values.tolist() if isinstance(values, np.ndarray) else values)
     if not given:
-        raise UsageError("it has no values", where=str(path))
+        raise UsageError("it has no values", where=path, advice="Give a list of values, or an array.")
     if is_start and isinstance(values, np.ndarray) and values.dtype.kind == "f" and np.all(np.isfinite(values)):
         return Axis(path, True, given, values.astype(float))
     read = [_start_value(trial, path, one) if is_start else _parameter_value(trial, path, one) for one in given]
@@ -145,6 +148,8 @@ def _parameter_value(trial: Model, path: str, value: Any) -> Any:
 
 
 def _start_value(trial: Model, path: str, value: Any) -> float:
+    if value is None:
+        raise UsageError("it has no value in one of the runs", where=path, advice="Give a number, or text with a unit.")
     if isinstance(trial, Scene) and isinstance(value, (int, float)):
         trial.start[path] = value
         return float(value)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from atwood.arguments import MAPPING, instance, one_of, optional, takes, whole
+from atwood.arguments import BY_PATH, instance, one_of, optional, takes, whole
 from atwood.errors import AtwoodError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.model.composite import Model
@@ -45,8 +45,8 @@ _TRIALS = 20
 
 @takes(
     scene=SCENE,
-    vary=optional(MAPPING),
-    start=optional(MAPPING),
+    vary=optional(BY_PATH),
+    start=optional(BY_PATH),
     combine=one_of(COMBINATIONS),
     quantities=PATHS,
     t_end=T_END,
@@ -55,7 +55,7 @@ _TRIALS = 20
     level=LEVEL,
     rtol=RTOL,
     solver=SOLVER,
-    threads=optional(whole("a whole number of threads, at least 1", 1)),
+    threads=optional(whole("a whole number of threads, 1 to 1024", 1, 1024)),
     executor=optional(instance("an executor of concurrent.futures", Executor)),
     progress=PROGRESS,
     name=NAME,
