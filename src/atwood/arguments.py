@@ -23,9 +23,11 @@ __all__ = [
     "ANYTHING",
     "BY_PATH",
     "CALLBACK",
+    "DOC",
     "FILE",
     "FLAG",
     "MAPPING",
+    "NAME",
     "TEXT",
     "TEXTS",
     "Kind",
@@ -38,12 +40,15 @@ __all__ = [
     "number",
     "one_of",
     "optional",
+    "real",
     "show",
     "takes",
+    "takes_names",
     "whole",
 ]
 
 _F = TypeVar("_F", bound=Callable[..., Any])
+_T = TypeVar("_T")
 
 
 class Refused(Exception):
@@ -89,7 +94,7 @@ def takes(error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> Callable[[
             raise TypeError(f"{function.__qualname__} takes {names}, and {list(kinds)} are said of it")
         positional = tuple(one.name for one in declared if one.kind is one.POSITIONAL_OR_KEYWORD)
         rest = next((one.name for one in declared if one.kind is one.VAR_POSITIONAL), "")
-        where = function.__qualname__.lstrip("_")
+        where = function.__qualname__.removesuffix(".__init__")
 
         @functools.wraps(function)
         def checked(*args: Any, **given: Any) -> Any:
@@ -111,6 +116,17 @@ def takes(error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> Callable[[
         return checked  # type: ignore[return-value]
 
     return decorate
+
+
+def takes_names(target: _T) -> _T:
+    """Check the names of the arguments of a function, or of a class, that looks at their values itself."""
+    function: Any = target.__init__ if isinstance(target, type) else target  # type: ignore[misc]
+    names = [name for name in inspect.signature(function).parameters if name not in ("self", "cls")]
+    checked = takes(UsageError, **dict.fromkeys(names, ANYTHING))(function)
+    if not isinstance(target, type):
+        return checked  # type: ignore[no-any-return]
+    target.__init__ = checked  # type: ignore[misc]
+    return target
 
 
 def check(kind: Kind, value: Any, name: str, where: str = "", error: type[AtwoodError] = UsageError) -> Any:
@@ -136,6 +152,8 @@ def check(kind: Kind, value: Any, name: str, where: str = "", error: type[Atwood
     """
     try:
         return kind.read(value)
+    except AtwoodError:  # the value itself says more
+        raise
     except Exception as problem:  # to look at a value of any class can raise anything
         more = str(problem) if isinstance(problem, Refused) else ""
     said = show(value)
@@ -186,7 +204,7 @@ def number(
     """
 
     def read(value: Any) -> float:
-        found = value if type(value) is float else _as_float(value)
+        found = value if type(value) is float else real(value)
         if not (above < found < below and least <= found <= most and math.isfinite(found)):
             raise Refused
         return found
@@ -194,8 +212,8 @@ def number(
     return Kind(what, read)
 
 
-def _as_float(value: Any) -> float:
-    """Return what is one real number as a float; truth values and text are none."""
+def real(value: Any) -> float:
+    """Return what is one real number as a float, or raise any error; truth values and text are none."""
     if isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ in ("bool", "bool_"):
         raise Refused
     if getattr(value, "ndim", 0):
@@ -207,7 +225,7 @@ def whole(what: str, least: int, most: int | None = None) -> Kind:
     """Return the kind of whole numbers between bounds, which become ints; ``1e6`` is one."""
 
     def read(value: Any) -> int:
-        found = value if type(value) is int else int(_as_float(value))
+        found = value if type(value) is int else int(real(value))
         if found != value or found < least or (most is not None and found > most):
             raise Refused
         return found
@@ -261,13 +279,25 @@ def either(*kinds: Kind) -> Kind:
     return Kind(" or ".join(kind.what for kind in kinds), read)
 
 
-def each(kind: Kind, what: str, least: int = 0) -> Kind:
-    """Return the kind of several values of a kind, which become a tuple; a single text is one of them."""
+def each(kind: Kind, what: str, least: int = 0, single: bool = True) -> Kind:
+    """Return the kind of several values of a kind, which become a tuple.
+
+    Parameters
+    ----------
+    kind
+        What each may be.
+    what
+        In words.
+    least
+        The least number of them.
+    single
+        Whether one text may stand for a list of one.
+    """
 
     def read(value: Any) -> tuple[Any, ...]:
-        if isinstance(value, (bytes, bytearray)):
+        if isinstance(value, (bytes, bytearray)) or (isinstance(value, str) and not single):
             raise Refused
-        found = tuple(kind.read(one) for one in ((value,) if isinstance(value, str) else value))
+        found = tuple([kind.read(one) for one in ((value,) if isinstance(value, str) and single else value)])
         if len(found) < least:
             raise Refused
         return found
@@ -279,6 +309,12 @@ def _text(value: Any) -> str:
     if not isinstance(value, str):
         raise Refused
     return value
+
+
+def _not_blank(value: Any) -> str:
+    if not _text(value).strip():
+        raise Refused
+    return str(value)
 
 
 def _file(value: Any) -> Path:
@@ -317,6 +353,8 @@ ANYTHING = Kind("anything", lambda value: value)
 """For what the function itself looks at."""
 
 TEXT = Kind("text", _text)
+NAME = Kind("a name, as text", _not_blank)
+DOC = Kind("one line of meaning", _not_blank)
 TEXTS = each(TEXT, "a list of texts")
 FILE = Kind("the path of a file, as text or a Path", _file)
 CALLBACK = Kind("a function", _callback)

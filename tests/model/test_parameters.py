@@ -75,7 +75,7 @@ def test_every_kind_of_number_becomes_a_float(good):
     assert length == 2.0
 
 
-@given(st.floats(min_value=1e-300, max_value=1e300))
+@given(st.floats(min_value=1e-99, max_value=1e99))
 def test_numbers_are_kept_exactly(number):
     assert Bar(length=number).length == number
     assert Bar(length=str(number)).length == number
@@ -192,7 +192,7 @@ def test_declarations_that_cannot_mean_anything():
         aw.parameter(1.0, doc=" ")
     with pytest.raises(aw.DeclarationError, match="meaning"):
         aw.signal(doc="")
-    with pytest.raises(aw.DeclarationError, match="where it is"):
+    with pytest.raises(aw.DeclarationError, match="doc cannot be"):
         aw.connector(aw.Point, "")
     with pytest.raises(aw.DeclarationError, match="SI unit"):
         aw.parameter(1.0, unit="mm", doc="x")

@@ -140,6 +140,7 @@ def _runs() -> Iterator[Call]:
             "start": "mapping",
             "combine": "word",
             "quantities": "texts",
+            "outputs": "optional times",
             "threads": "optional whole",
             "executor": "optional object",
             "name": "text",
@@ -328,7 +329,7 @@ def _scenes() -> Iterator[Call]:
         )
     for name in ("gravity", "t_end", "t_start"):
         yield Call(f"Scene({name})", atwood.Scene, {}, {name: "number"})
-    yield Call("Scene", atwood.Scene, {}, {"space": "word", "line_axis": "vector"}, {"line_axis": ((0.0, 0.0, 0.0),)})
+    yield Call("Scene", atwood.Scene, {}, {"space": "word", "line_axis": "vector"})
 
 
 def _declaring() -> Iterator[Call]:
@@ -539,7 +540,9 @@ def _mathematics() -> Iterator[Call]:
             False,
         )
     yield Call("norm", atwood.norm, {}, {"a": "vector"}, {}, {"a": ("vector",)}, False)
-    yield Call("as_vector", atwood.as_vector, {}, {"value": "vector"}, has_names=False)
+    yield Call(
+        "as_vector", atwood.as_vector, {}, {"value": "vector"}, said_as={"value": ("vector", "Vector")}, has_names=False
+    )
     yield Call("Vector", atwood.Vector, {}, {"x": "scalar", "y": "scalar", "z": "scalar"}, has_names=False)
     for name, method in (("+", "__add__"), ("-", "__sub__")):
         yield Call(
@@ -578,7 +581,11 @@ def _bodies() -> Iterator[Call]:
         if not set(sizes) <= set(inspect.signature(function).parameters):
             continue
         also = {"axis": ("w", 3, None, [])} if "axis" in inspect.signature(function).parameters else {}
-        kinds = {**dict.fromkeys(sizes, "positive"), "mass": "optional positive", **({"axis": "word"} if also else {})}
+        kinds = {
+            **{size: "size" if "inner" in size else "positive" for size in sizes},
+            "mass": "optional positive",
+            **({"axis": "word"} if also else {}),
+        }
         yield Call(f"solids.{name}", function, good, kinds, also, words)
     box = solids.box(1.0, 1.0, 1.0, mass=1.0)
     yield Call("solids.combine", lambda part: solids.combine(box, part), {}, {"part": "object"}, has_names=False)
@@ -641,7 +648,7 @@ def _parts() -> Iterator[Call]:
             elif spec.text:
                 kind = "needed text"
             elif spec.size is not None or spec.direction:
-                kind = "vector"
+                kind = "axis" if spec.direction else "vector"
             else:
-                kind = "number"
+                kind = "number" if spec.default is not None else "optional number"
             yield Call(name, part, good, {parameter: kind})

@@ -175,13 +175,13 @@ def test_an_empty_solid_and_a_bad_scale_are_refused(tmp_path):
     (tmp_path / "empty.stl").write_text("solid nothing\nendsolid nothing\n")
     with pytest.raises(ParameterError, match="no triangles"):
         stl_solid(tmp_path / "empty.stl", mass=1)
-    with pytest.raises(ParameterError, match="scale is 0"):
+    with pytest.raises(ParameterError, match="scale cannot be 0"):
         stl_solid(tmp_path / "empty.stl", mass=1, scale=0)
 
 
 def test_a_mesh_needs_one_of_density_and_mass():
     mesh = closed_mesh(meshes.box_mesh(1, 1, 1))
-    for options, text in (({}, "neither"), ({"mass": 1, "density": 1}, "both"), ({"mass": -1}, "mass is -1")):
+    for options, text in (({}, "neither"), ({"mass": 1, "density": 1}, "both"), ({"mass": -1}, "mass cannot be -1")):
         with pytest.raises(ParameterError, match=text):
             mesh_solid(mesh, **options)
 

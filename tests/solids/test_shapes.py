@@ -116,7 +116,7 @@ def test_the_axis_turns_the_shape():
         along_z = name(*arguments, mass=2)
         assert name(*arguments, mass=2, axis="x").is_close(along_z.placed(turn), 1e-15)
         assert name(*arguments, mass=2, axis="y").is_close(along_z.placed(turn @ turn), 1e-15)
-    with pytest.raises(ParameterError, match="axis is 'w'"):
+    with pytest.raises(ParameterError, match="axis cannot be 'w'"):
         rod(1, mass=1, axis="w")
 
 

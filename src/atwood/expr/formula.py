@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from atwood.arguments import check, each, instance, takes_names
 from atwood.errors import AtwoodError
 from atwood.expr import algebra
 from atwood.expr.analysis import evaluate, live
@@ -22,7 +23,11 @@ class Formula:
     """
 
     def __init__(self, expression: Any, arguments: Sequence[Any]) -> None:
-        self.expression, self.arguments = expression, tuple(arguments)
+        import sympy
+
+        self.expression = check(instance("an expression of sympy", sympy.Expr), expression, "expression", "formula")
+        symbols = each(instance("a symbol", sympy.Symbol), "the symbols of the formula, each a sympy.Symbol")
+        self.arguments = check(symbols, arguments, "arguments", "formula")
         graph = Graph()
         self._symbols = [graph.symbol(str(argument)) for argument in self.arguments]
         self._value = graph.convert(
@@ -63,6 +68,7 @@ class Formula:
         return made[self._value]
 
 
+@takes_names
 def formula(expression: Any, arguments: Sequence[Any]) -> Formula:
     """Turn a sympy expression into a function that works in a law.
 

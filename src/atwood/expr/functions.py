@@ -7,13 +7,15 @@ A law written with these works on floats (for a quick look), on numpy arrays (el
 from __future__ import annotations
 
 import math
+import numbers
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from atwood.errors import AtwoodError
+from atwood.arguments import Kind, Refused, check, each, show, takes
+from atwood.errors import AtwoodError, KernelEvaluationError, UsageError
 from atwood.expr import algebra
 from atwood.expr.graph import Expression, Graph
 from atwood.expr.operations import ExternalFunction, solve_floats
@@ -29,6 +31,30 @@ def _is_sympy(value: object) -> bool:
     return sympy is not None and isinstance(value, (sympy.Basic, sympy.MatrixBase))
 
 
+def is_scalar(value: object) -> bool:
+    """Return whether laws compute with a value: a number, an expression, a sympy term, an array of these."""
+    if isinstance(value, (Expression, float, int, np.floating, np.integer)):
+        return not isinstance(value, bool)
+    if hasattr(type(value), "__array__"):
+        value = np.asarray(value)
+    if isinstance(value, np.ndarray):
+        return value.dtype.kind in "fiu" or (value.dtype == object and all(map(is_scalar, value.flat)))
+    return _is_sympy(value) or isinstance(value, numbers.Real)
+
+
+SCALAR = Kind("a number, or an expression", lambda value: value if is_scalar(value) else _refuse())
+
+
+def _refuse() -> Any:
+    raise Refused
+
+
+def _checked(function: str, **values: Scalar) -> None:
+    """Refuse what a function has no value of at all; values that are plain numbers need not come here."""
+    for name, value in values.items():
+        check(SCALAR, value, name, function)
+
+
 def graph_of(*values: object) -> Graph | None:
     """Return the graph of the first expression among the values, if there is one."""
     for value in values:
@@ -41,7 +67,13 @@ def _unary(operation: str, x: Scalar, on_float: Callable[[float], float], numpy_
     if isinstance(x, Expression):
         return algebra.unary(operation, x)
     if isinstance(x, (float, int)):
-        return on_float(x)
+        try:
+            return on_float(x)
+        except (ValueError, OverflowError):
+            raise KernelEvaluationError(
+                f"it has no value at x = {x!r}", where=operation, advice="Give a number in its domain."
+            ) from None
+    _checked(operation, x=x)
     if _is_sympy(x):
         import sympy
 
@@ -147,6 +179,7 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
         return sympy.atan2(y, x)
     if isinstance(y, (float, int)) and isinstance(x, (float, int)):
         return math.atan2(y, x)
+    _checked("atan2", y=y, x=x)
     return _elementwise(atan2, y, x) if _holds_objects(y, x) else np.arctan2(y, x)
 
 
@@ -170,6 +203,7 @@ def _extremum(operation: str, sympy_name: str, a: Scalar, b: Scalar) -> Scalar:
         return getattr(sympy, sympy_name)(a, b)
     if isinstance(a, (float, int)) and isinstance(b, (float, int)):
         return min(a, b) if operation == "minimum" else max(a, b)
+    _checked(operation, a=a, b=b)
     if _holds_objects(a, b):
         return _elementwise(lambda p, q: _extremum(operation, sympy_name, p, q), a, b)
     return getattr(np, operation)(a, b)
@@ -195,6 +229,10 @@ def select(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
         return sympy.Piecewise((a, condition), (b, True))
     if isinstance(condition, (float, int, np.bool_)):
         return a if condition else b
+    if not is_scalar(condition) and not (isinstance(condition, np.ndarray) and condition.dtype.kind == "b"):
+        advice = "Give a comparison, such as x < 0."
+        raise UsageError(f"condition cannot be {show(condition)}", where="select", advice=advice)
+    _checked("select", a=a, b=b)
     return _elementwise(select, condition, a, b) if _holds_objects(condition, a, b) else np.where(condition, a, b)
 
 
@@ -210,10 +248,16 @@ def hypot(*values: Scalar) -> Scalar:
     """Return the square root of the sum of the squares: a length from its components."""
     total: Scalar = 0.0
     for value in values:
+        if not is_scalar(value):
+            _checked("hypot", x=value)
         total = total + value * value
     return sqrt(total)
 
 
+_ROW = each(SCALAR, "numbers or expressions")
+
+
+@takes(matrix=each(_ROW, "the rows of a matrix, of numbers or expressions"), right=_ROW)
 def solve(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) -> list[Scalar]:
     """Solve a square linear system.
 
@@ -232,7 +276,10 @@ def solve(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) -> list[S
     """
     size = len(right)
     if len(matrix) != size or any(len(row) != size for row in matrix):
-        raise AtwoodError(f"a linear system needs a square matrix and a right-hand side of the same size, here {size}")
+        raise AtwoodError(
+            f"a linear system needs a square matrix and a right-hand side of the same size, here {size}",
+            advice="Give as many rows, each with as many numbers, as there are unknowns.",
+        )
     values = [value for row in matrix for value in row]
     graph = graph_of(*values, *right)
     if graph is not None:
@@ -245,8 +292,15 @@ def solve(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) -> list[S
         try:
             return [*solve_floats(size, values, list(right))] if size == 1 else _solve_numbers(matrix, right)
         except (ZeroDivisionError, np.linalg.LinAlgError):
-            raise AtwoodError("the matrix of a linear system is singular") from None
-    return _solve_numbers(matrix, right)
+            raise AtwoodError(_SINGULAR, advice=_INDEPENDENT) from None
+    try:
+        return _solve_numbers(matrix, right)
+    except np.linalg.LinAlgError:
+        raise AtwoodError(_SINGULAR, advice=_INDEPENDENT) from None
+
+
+_SINGULAR = "the matrix of a linear system is singular"
+_INDEPENDENT = "Give rows of which none follows from the others."
 
 
 def _solve_numbers(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) -> list[Scalar]:
@@ -272,6 +326,8 @@ def external(function: ExternalFunction, *arguments: Scalar) -> Scalar:
     *arguments
         As many values as the function takes.
     """
+    if not isinstance(function, ExternalFunction):
+        raise UsageError(f"function cannot be {show(function)}", where="external", advice="Give an ExternalFunction.")
     if not arguments:
         raise AtwoodError("an external function needs at least one argument", where=function.name)
     graph = graph_of(*arguments)

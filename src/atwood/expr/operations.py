@@ -11,10 +11,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from atwood.arguments import CALLBACK, NAME, check_fields, each, instance, optional, takes_names
+
 INF = math.inf
 NAN = math.nan
 
 
+@takes_names
 @dataclass(frozen=True)
 class ExternalFunction:
     """A named function of floats that the graph calls but does not look into.
@@ -34,6 +37,13 @@ class ExternalFunction:
     name: str
     function: Callable[..., float]
     derivatives: tuple[ExternalFunction | None, ...] | None = None
+
+    def __post_init__(self) -> None:
+        check_fields(self, name=NAME, function=CALLBACK)
+        derivatives = each(
+            optional(instance("a function", ExternalFunction)), "an ExternalFunction for each argument", 1
+        )
+        check_fields(self, derivatives=optional(derivatives))
 
 
 def divide(a: float, b: float) -> float:

@@ -6,6 +6,7 @@ import copy
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
+from atwood.arguments import NAME, check
 from atwood.errors import DeclarationError, ParameterError, UsageError, suggestion
 from atwood.expr import Scalar
 from atwood.model.binding import Binding
@@ -345,12 +346,14 @@ class Component:
 
     def input(self, name: str) -> InputRef:
         """Return an input, to be connected to an output of another component."""
+        check(NAME, name, "name", f"{self.path or type(self).__name__}.input", DeclarationError)
         if name not in self._signals:
             raise DeclarationError(f"it has no input {name!r}", where=self.path, advice=suggestion(name, self._signals))
         return InputRef(self, name)
 
     def output(self, name: str) -> OutputRef:
         """Return a scalar observable, or a reaction, to be connected to an input of another component."""
+        check(NAME, name, "name", f"{self.path or type(self).__name__}.output", DeclarationError)
         names = self.output_names()
         if name.split(".")[0] not in names:
             raise DeclarationError(f"it has no output {name!r}", where=self.path, advice=suggestion(name, names))

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, overload
 
+from atwood.arguments import NAME, Kind, check, show, takes_names
 from atwood.errors import DeclarationError, ParameterError, UsageError, suggestion
 from atwood.model.component import Component
 from atwood.model.deferred import Deferred
@@ -31,6 +32,8 @@ from atwood.model.joining import (
     named_parts,
     relative_path,
 )
+
+PATH = Kind("a dotted path, such as 'left.rod'", NAME.read)
 
 __all__ = ["Connection", "Model", "connect"]
 
@@ -163,6 +166,7 @@ class Model(_State, Component):
     def add(self, name: str, part: _P) -> _P: ...
     @overload
     def add(self, name: str, part: list[_P]) -> list[_P]: ...
+    @takes_names
     def add(self, name: str, part: Any) -> Any:
         """Add a part, or an array of parts, under a name, and return it.
 
@@ -172,7 +176,8 @@ class Model(_State, Component):
             If the name is taken or no identifier, or the part belongs to a model already.
         """
         where = self.path or type(self).__name__
-        if not _NAME.match(str(name)):
+        check(NAME, name, "name", f"{where}.add", DeclarationError)
+        if not _NAME.match(name):
             raise DeclarationError(
                 f"{name!r} cannot be the name of a part",
                 where=where,
@@ -189,6 +194,8 @@ class Model(_State, Component):
                 advice="Choose another name.",
             )
         parts: list[Any] = part if isinstance(part, list) else [part]
+        if not parts:
+            raise DeclarationError(f"the array {name!r} has no parts", where=where, advice="Give at least one.")
         for one in parts:
             self._check_is_free(name, one)
         if len({id(one) for one in parts}) < len(parts):
@@ -206,8 +213,11 @@ class Model(_State, Component):
     def _check_is_free(self, name: str, part: Any) -> None:
         where = self.path or type(self).__name__
         if not isinstance(part, Component):
-            advice = f"Call the class: {part.__name__}() and not {part.__name__}." if isinstance(part, type) else ""
-            raise DeclarationError(f"{name!r} is given {part!r}, which is no component", where=where, advice=advice)
+            advice = "Give a part, such as Rod(), or a list of parts."
+            if isinstance(part, type):
+                advice = f"Call the class: {part.__name__}() and not {part.__name__}."
+            problem = f"the part {name!r} cannot be {show(part)}, which is no component"
+            raise DeclarationError(problem, where=where, advice=advice)
         if part._declared or part._parent is not None:
             there = part._declared or part.path
             raise DeclarationError(
@@ -221,6 +231,7 @@ class Model(_State, Component):
                 raise DeclarationError(f"a model cannot be a part of itself, as {name!r}", where=where)
             around = around._parent
 
+    @takes_names
     def connect(self, a: Any, b: Any) -> None:
         """Join two connectors, or an output with an input.
 
@@ -233,6 +244,7 @@ class Model(_State, Component):
         check_ends(a, b, path_a, path_b)
         self._connections.append((path_a, path_b))
 
+    @takes_names
     def replace(self, name: str, part: _P) -> _P:
         """Put a copy of another part with the same connectors in the place of one, and return it.
 
@@ -248,8 +260,9 @@ class Model(_State, Component):
         DeclarationError
             If there is no such part, or the new one lacks one of its connectors.
         """
+        where = self.path or type(self).__name__
+        check(NAME, name, "name", f"{where}.replace", DeclarationError)
         if name not in self._parts:
-            where = self.path or type(self).__name__
             raise DeclarationError(f"it has no part {name!r}", where=where, advice=suggestion(name, self._parts))
         old = self._parts[name]
         check_same_connectors(old, part, f"{self.path or type(self).__name__}.{name}")
@@ -280,7 +293,7 @@ class Model(_State, Component):
     def __getitem__(self, path: str) -> Any:
         """Return the part at a dotted path, such as ``"left.rod"`` or ``"rod[2]"``."""
         component: Component = self
-        for step in str(path).split("."):
+        for step in check(PATH, path, "path", self.path or type(self).__name__).split("."):
             parts = component._children()
             if step not in parts:
                 where = component.path or type(component).__name__
@@ -299,6 +312,7 @@ class Model(_State, Component):
         """Iterate over the names of the parts."""
         return iter(self._parts)
 
+    @takes_names
     def set(self, path: str, value: Any) -> None:
         """Set a parameter by its dotted path; nothing changes if the value is refused.
 
@@ -309,7 +323,7 @@ class Model(_State, Component):
         value
             A number in SI units, or text with a unit (``"30 cm"``).
         """
-        *steps, name = str(path).split(".")
+        *steps, name = check(PATH, path, "path", f"{self.path or type(self).__name__}.set").split(".")
         setattr(self[".".join(steps)] if steps else self, name, value)
 
     def _unknown(self, name: str) -> ParameterError:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
+from atwood.arguments import ANYTHING, BY_PATH, DOC, NAME, TEXT, Kind, Refused, optional, takes
 from atwood.errors import DeclarationError, UsageError
 from atwood.expr import Scalar
 from atwood.model.vector import Vector, dot
@@ -306,9 +307,24 @@ class ConnectorSpec:
         )
 
 
+def _connector_class(value: Any) -> Any:
+    if not (isinstance(value, type) and issubclass(value, Connector) and value is not Connector):
+        raise Refused
+    return value
+
+
 _C = TypeVar("_C", bound=Connector)
 
 
+@takes(
+    DeclarationError,
+    kind=Kind("one of Point, Frame, Groove, Shaft and Slide, or a class derived from one", _connector_class),
+    doc=DOC,
+    count=optional(NAME),
+    when=optional(BY_PATH),
+    of=TEXT,
+    init=ANYTHING,
+)
 def connector(
     kind: type[_C],
     doc: str,
@@ -333,8 +349,6 @@ def connector(
     of
         For a `Shaft` or a `Slide` that a joint offers: name of the joint coordinate that it is.
     """
-    if not doc.strip():
-        raise DeclarationError("a connector needs one line that says where it is")
     return ConnectorSpec(kind, doc, count, when, of)
 
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import copy
 import math
-import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
+from atwood.arguments import ANYTHING, DOC, FLAG, NAME, TEXT, each, number, optional, real, show, takes, whole
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, near_matches, suggestion
 from atwood.model.deferred import Deferred
 from atwood.model.timefunction import check_function
@@ -96,6 +97,21 @@ class Field(FieldReference):
         return value
 
 
+LARGEST_ANGLE = 1e9
+"""rad. Floating-point numbers near it are 1e-7 rad apart; far beyond it a sine has no digit left."""
+
+_LARGEST = 1e100
+
+
+def too_large_an_angle(angle: float, where: str, error: type[AtwoodError] = ParameterError) -> AtwoodError:
+    """Return the error that says that an angle, rad, has lost too many of its digits."""
+    return error(
+        f"an angle of {angle:g} rad is known to {math.ulp(angle):.0g} rad only",
+        where=where,
+        advice=f"Give at most {LARGEST_ANGLE:g} rad, or what whole turns leave of it.",
+    )
+
+
 _AXES = {
     sign + name: tuple(size if name == axis else 0.0 for axis in "xyz")
     for sign, size in (("", 1.0), ("+", 1.0), ("-", -1.0))
@@ -151,7 +167,7 @@ class ParameterSpec(Field):
                 advice = f"Choose from {', '.join(self.choices)}."
                 if isinstance(value, str) and near_matches(value, self.choices):
                     advice = f"{suggestion(value, self.choices)} {advice}"
-                raise ParameterError(f"{value!r} is not one of its values", where=where, advice=advice)
+                raise ParameterError(f"{show(value)} is not one of its values", where=where, advice=advice)
             return value
         if self.text:
             return _check_text(value, where)
@@ -163,30 +179,41 @@ class ParameterSpec(Field):
         given = _AXES.get(value.strip(), value) if self.direction and isinstance(value, str) else value
         if isinstance(given, str):
             given = [part for part in given.strip("()[] ").split(",") if part.strip()]
-        parts = list(given) if isinstance(given, Iterable) and not isinstance(given, (bytes, set, dict)) else []
+        try:
+            parts = [] if isinstance(given, (bytes, set, dict)) else list(given)
+        except Exception:  # it is no sequence, or one of somebody else's class
+            parts = []
         if len(parts) != self.size:
             or_word = ", or one of x, y, z, -x, -y, -z" if self.direction else ""
             advice = f"Give {self.size} numbers in brackets{or_word}."
-            raise ParameterError(f"{value!r} is not {self.size} numbers", where=where, advice=advice)
+            raise ParameterError(f"{show(value)} is not {self.size} numbers", where=where, advice=advice)
         numbers = tuple(self._check_number(part, where) for part in parts)
         if not self.direction:
             return numbers
         length = math.hypot(*numbers)
         if length == 0.0:
-            raise ParameterError("a direction cannot be zero", where=where)
+            raise ParameterError(
+                "a direction cannot be zero", where=where, advice="Give three numbers, or an axis as 'z'."
+            )
         return tuple(number / length for number in numbers)
 
     def _check_number(self, value: Any, where: str) -> float | int:
         number = parse_quantity(value, self.unit, where) if isinstance(value, str) else _plain_number(value)
         if number is None:
-            kind = "nothing" if value is None else repr(value)
+            kind = "nothing" if value is None else show(value)
             raise ParameterError(f"it needs a number, not {kind}", where=where, advice=f"Give one in {self.unit.text}.")
         if not math.isfinite(number):
             raise ParameterError(
                 f"{number} is not a finite number", where=where, advice=f"Give one in {self.unit.text}."
             )
+        if abs(number) > _LARGEST or 0.0 < abs(number) < 1.0 / _LARGEST:
+            size = "large" if abs(number) > 1.0 else "small"
+            advice = f"Give zero, or a size from {1.0 / _LARGEST:g} to {_LARGEST:g}: squares must still be numbers."
+            raise ParameterError(f"{number:g} is too {size} to be computed with", where=where, advice=advice)
+        if self.unit.text == "rad" and abs(number) > LARGEST_ANGLE:
+            raise too_large_an_angle(number, where)
         if self.integer and number != int(number):
-            raise ParameterError(f"{number:g} is not a whole number", where=where)
+            raise ParameterError(f"{number:g} is not a whole number", where=where, advice="Give a whole number.")
         self._check_bounds(number, where)
         return int(number) if self.integer else number
 
@@ -229,24 +256,39 @@ class SignalSpec(Field):
 
 
 def _check_text(value: Any, where: str) -> str:
-    text = os.fspath(value) if isinstance(value, os.PathLike) else value
-    if not isinstance(text, str) or not text.strip():
-        raise ParameterError(f"{value!r} is no text", where=where, advice="Give a word or a path in quotes.")
+    text = str(value) if isinstance(value, Path) else value
+    if not isinstance(text, str) or not text.strip() or "\0" in text:
+        raise ParameterError(f"{show(value)} is no text", where=where, advice="Give a word or a path in quotes.")
     return text
 
 
 def _plain_number(value: Any) -> float | None:
     """Return anything that is one real number as a float; None for truth values and everything else."""
-    if isinstance(value, (bool, bytes, bytearray)) or type(value).__name__ in ("bool", "bool_"):
-        return None
     try:
-        if getattr(value, "ndim", 0):
-            return None
-        return float(value)
-    except (TypeError, ValueError, OverflowError, AtwoodError):
+        return real(value)
+    except Exception:  # a value of somebody else's class may raise anything
         return None
 
 
+_BOUND = optional(number())
+
+
+@takes(
+    DeclarationError,
+    default=ANYTHING,
+    unit=TEXT,
+    doc=DOC,
+    minimum=_BOUND,
+    above=_BOUND,
+    maximum=_BOUND,
+    size=optional(whole("a whole number of components, at least 1", 1, 1000)),
+    integer=FLAG,
+    choices=each(NAME, "a list of words", single=False),
+    structural=FLAG,
+    direction=FLAG,
+    turning=FLAG,
+    text=FLAG,
+)
 def parameter(
     default: Any = MISSING,
     *,
@@ -300,8 +342,6 @@ def parameter(
     DeclarationError
         If there is no line of meaning, or the unit is no SI unit.
     """
-    if not doc.strip():
-        raise DeclarationError("a parameter needs one line of meaning", advice="Give doc='...'.")
     return ParameterSpec(
         default,
         unit,
@@ -319,6 +359,7 @@ def parameter(
     )
 
 
+@takes(DeclarationError, default=ANYTHING, unit=TEXT, doc=DOC, init=ANYTHING)
 def signal(default: Any = 0.0, *, unit: str = "1", doc: str, init: Literal[True] = True) -> Any:
     """Declare an input in the class body of a component.
 
@@ -340,6 +381,4 @@ def signal(default: Any = 0.0, *, unit: str = "1", doc: str, init: Literal[True]
     DeclarationError
         If there is no line of meaning, or the unit is no SI unit.
     """
-    if not doc.strip():
-        raise DeclarationError("an input needs one line of meaning", advice="Give doc='...'.")
     return SignalSpec(default, unit, doc)

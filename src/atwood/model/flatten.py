@@ -11,7 +11,7 @@ from atwood.errors import AtwoodError, DeclarationError, ParameterError, StartEr
 from atwood.model.component import Component
 from atwood.model.composite import Model
 from atwood.model.connectors import InputRef, OutputRef
-from atwood.model.fields import Deferred, FieldReference
+from atwood.model.fields import LARGEST_ANGLE, Deferred, FieldReference, too_large_an_angle
 from atwood.model.joining import find_end
 from atwood.model.scene import Scene
 from atwood.model.units import Unit, parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
@@ -169,7 +169,9 @@ def _number(value: Any, model: Model, key: str, prefix: str) -> float:
     except (TypeError, ValueError, AtwoodError):
         raise StartError(f"{value!r} is not a number", where=path) from None
     if not math.isfinite(number):
-        raise StartError(f"{number} is not a finite number", where=path)
+        raise StartError(f"{number} is not a finite number", where=path, advice="Give a finite number.")
+    if wanted is not None and wanted.text == "rad" and abs(number) > LARGEST_ANGLE:
+        raise too_large_an_angle(number, path, StartError)
     return number
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+from atwood.arguments import show
 from atwood.errors import ConnectError, DeclarationError, UsageError, suggestion
 from atwood.model.component import Component
 from atwood.model.connectors import Connector, ConnectorSpec, InputRef, OutputRef
@@ -118,7 +119,7 @@ def _check_is_end(end: Any, where: str) -> None:
         advice = "Connect things like rod.a or mass.point."
         if isinstance(end, Component):
             advice = f"Name one of its connectors: {', '.join(end.connector_specs())}."
-        raise ConnectError(f"{end!r} is no connector", where=where, advice=advice)
+        raise ConnectError(f"{show(end)} is no connector", where=where, advice=advice)
 
 
 def check_ends(a: Any, b: Any, path_a: str, path_b: str) -> None:
@@ -168,7 +169,7 @@ def check_same_connectors(old: Parts, new: Any, where: str) -> None:
             check_same_connectors(old_one, new_one, f"{where}[{index}]")
         return
     if not isinstance(new, Component):
-        raise DeclarationError(f"{new!r} is no component", where=where)
+        raise DeclarationError(f"{show(new)} is no component", where=where, advice="Give a part, such as Rod().")
     have = new.connectors()
     for name, connector in old.connectors().items():
         if name not in have or have[name].family != connector.family:

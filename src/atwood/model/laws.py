@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar, overload
 
+from atwood.arguments import CALLBACK, DOC, FLAG, NAME, TEXT, check, each, number, one_of, takes, whole
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.model.quantities import ObservableLaw
@@ -118,7 +119,9 @@ def _mark(function: _F, law: Law) -> _F:
 
 def _acting(kind: Kind, function: _F | None, modes: Sequence[str]) -> _F | Callable[[_F], _F]:
     """Mark a method by itself, or return what marks one with options."""
-    options = ActingOptions((modes,) if isinstance(modes, str) else tuple(modes))
+    options = ActingOptions(check(_NAMES, modes, "modes", kind, DeclarationError))
+    if function is not None:
+        check(CALLBACK, function, "function", kind, DeclarationError)
     if function is None:
         return lambda method: _mark(method, Law(kind, method.__name__, options))
     return _mark(function, Law(kind, function.__name__, options))
@@ -185,6 +188,7 @@ def inertia(function: _F) -> _F:
     ``m(t) a = F`` holds for what is there (a leaking bucket). The thrust of mass that leaves with another velocity is a
     `force` of its own. What depends on positions or joint coordinates is a `lagrangian`.
     """
+    check(CALLBACK, function, "function", "inertia", DeclarationError)
     return _mark(function, Law("inertia", function.__name__))
 
 
@@ -196,9 +200,23 @@ def lagrangian(function: _F) -> _F:
     besides the potential energy that is in it. Its energy is ``p q' - L`` (Goldstein, section 2.7): potential energy is
     minus its value without velocities, kinetic energy the rest.
     """
+    check(CALLBACK, function, "function", "lagrangian", DeclarationError)
     return _mark(function, Law("lagrangian", function.__name__, ActingOptions(())))
 
 
+_SPACES = each(one_of(("line", "plane", "space")), "some of 'line', 'plane' and 'space'", 1)
+_NAMES = each(NAME, "names, as texts")
+
+
+@takes(
+    DeclarationError,
+    reaction=each(NAME, "a name, or several", 1),
+    unit=TEXT,
+    doc=DOC,
+    sign=number(),
+    modes=_NAMES,
+    spaces=_SPACES,
+)
 def constraint(
     *,
     reaction: str | Sequence[str],
@@ -232,6 +250,17 @@ def constraint(
     return lambda function: _mark(function, Law("constraint", function.__name__, options))
 
 
+@takes(
+    DeclarationError,
+    a=NAME,
+    b=NAME,
+    coordinates=_NAMES,
+    solves=_NAMES,
+    spaces=_SPACES,
+    rigid=FLAG,
+    reaction=TEXT,
+    modes=_NAMES,
+)
 def joint(
     a: str,
     b: str,
@@ -269,6 +298,7 @@ def joint(
     return lambda function: _mark(function, Law("joint", function.__name__, options))
 
 
+@takes(DeclarationError, unit=TEXT, doc=DOC, periodic=FLAG, rate=TEXT, spaces=_SPACES)
 def observable(
     *,
     unit: str,
@@ -293,8 +323,6 @@ def observable(
         The spaces in which it has a meaning.
     """
     parse_si_unit(unit)
-    if not doc.strip():
-        raise DeclarationError("an observable needs one line of meaning", advice="Give doc='...'.")
 
     def decorate(function: _F) -> _F:
         name = function.__name__
@@ -310,6 +338,16 @@ def observable(
     return decorate
 
 
+@takes(
+    DeclarationError,
+    target=NAME,
+    message=DOC,
+    unit=TEXT,
+    modes=_NAMES,
+    direction=whole("-1, 0 or +1", -1, 1),
+    impact=FLAG,
+    spaces=_SPACES,
+)
 def event(
     *,
     target: str,
@@ -339,6 +377,7 @@ def event(
     spaces
         The spaces in which it is watched.
     """
+    parse_si_unit(unit)
     options = EventOptions(tuple(modes), direction, target, message, unit, impact, tuple(spaces))
     return lambda function: _mark(function, Law("event", function.__name__, options))
 

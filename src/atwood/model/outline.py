@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from atwood.errors import DeclarationError
+import numpy as np
+
+from atwood.arguments import FLAG, Kind, Refused, check, number, one_of, real, show, takes_names
+from atwood.errors import DeclarationError, UsageError
 
 __all__ = ["Outline"]
 
@@ -41,19 +45,51 @@ class Outline:
     triangles: Any = None
 
     @classmethod
+    @takes_names
     def box(cls, length_x: float, length_y: float, length_z: float) -> Outline:
         """Return a box about the origin with its edges along the axes, lengths in m."""
-        return cls("box", sides=(float(length_x), float(length_y), float(length_z)))
+        named = {"length_x": length_x, "length_y": length_y, "length_z": length_z}
+        x, y, z = (float(check(_LENGTH, size, name, "Outline.box")) for name, size in named.items())
+        return cls("box", sides=(x, y, z))
 
     @classmethod
+    @takes_names
     def revolved(cls, profile: Iterable[Sequence[float]], axis: str = "z", is_ring: bool = False) -> Outline:
         """Return a surface of revolution about an axis of the frame, ``"x"``, ``"y"`` or ``"z"``; see `profile`."""
-        line = tuple((float(distance), float(height)) for distance, height in profile)
-        if len(line) < 2:
-            raise DeclarationError("an outline needs points (distance from the axis, height)", advice="Give two.")
+        line = check(_PROFILE, profile, "profile", "Outline.revolved", DeclarationError)
+        check(one_of(("x", "y", "z")), axis, "axis", "Outline.revolved")
+        check(FLAG, is_ring, "is_ring", "Outline.revolved")
         return cls("revolved", profile=line, axis="xyz".index(axis), is_ring=is_ring)
 
     @classmethod
+    @takes_names
     def mesh(cls, vertices: Any, triangles: Any) -> Outline:
         """Return a closed triangle mesh; see `vertices` and `triangles`."""
+        corners = check(Kind("numbers of shape (vertices, 3), m", _table), vertices, "vertices", "Outline.mesh")
+        kind = Kind(f"the numbers of vertices, 0 to {len(corners) - 1}, of shape (triangles, 3)", _table)
+        faces = check(kind, triangles, "triangles", "Outline.mesh")
+        if np.any(faces < 0) or np.any(faces >= len(corners)) or np.any(faces != np.round(faces)):
+            raise UsageError(
+                f"triangles cannot be {show(triangles)}", where="Outline.mesh", advice=f"Give {kind.what}."
+            )
         return cls("mesh", vertices=vertices, triangles=triangles)
+
+
+_LENGTH = number("a length above 0, m", above=0.0)
+
+
+def _points(value: Any) -> tuple[tuple[float, float], ...]:
+    line = tuple((real(distance), real(height)) for distance, height in value)
+    if len(line) < 2 or not all(math.isfinite(one) for point in line for one in point):
+        raise Refused
+    return line
+
+
+_PROFILE = Kind("at least two points, each (distance from the axis, height along it), m", _points)
+
+
+def _table(value: Any) -> Any:
+    table = np.asarray(value, dtype=float)
+    if table.ndim != 2 or table.shape[1] != 3 or not len(table) or not np.all(np.isfinite(table)):
+        raise Refused
+    return table

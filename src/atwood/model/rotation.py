@@ -10,8 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from atwood.errors import UsageError
+from atwood.arguments import check, check_fields, each, instance, show
+from atwood.errors import DeclarationError, UsageError
 from atwood.expr import Expression, Scalar, cos, sin
+from atwood.expr.functions import SCALAR
 from atwood.model.vector import Vector, as_vector, cross
 
 __all__ = ["FREE", "IDENTITY", "Axes", "Rotation", "Turn", "as_rotation", "compose", "from_axes", "to_axes", "turn"]
@@ -66,6 +68,9 @@ class Turn:
         return Turn(self.axis, -self.angle)
 
 
+_TURNS = each(instance("a turn", Turn), "turns, as turn() makes them")
+
+
 @dataclass(frozen=True)
 class Rotation:
     """One turn after another, each about an axis of the frame that those before it have made.
@@ -78,9 +83,12 @@ class Rotation:
 
     turns: tuple[Turn, ...] = ()
 
+    def __post_init__(self) -> None:
+        check_fields(self, DeclarationError, turns=_TURNS)
+
     def then(self, axis: Vector | tuple[Scalar, Scalar, Scalar], angle: Scalar) -> Rotation:
         """Return this rotation followed by a turn about an axis of the turned frame."""
-        return Rotation((*self.turns, Turn(as_vector(axis), angle)))
+        return Rotation((*self.turns, Turn(as_vector(axis), check(SCALAR, angle, "angle", "turn", DeclarationError))))
 
     def inverse(self) -> Rotation:
         """Return the rotation that undoes this one."""
@@ -115,7 +123,11 @@ def turn(axis: Vector | tuple[Scalar, Scalar, Scalar], angle: Scalar) -> Rotatio
     angle
         rad.
     """
-    return Rotation().then(axis, angle)
+    try:
+        vector = as_vector(axis)
+    except DeclarationError as error:
+        raise DeclarationError(f"axis: {error.message}", where="turn", advice=error.advice) from None
+    return Rotation().then(vector, angle)
 
 
 def as_rotation(value: Scalar | Rotation | None) -> Rotation:
@@ -215,7 +227,11 @@ def normals(axis: Vector) -> tuple[Vector, Vector]:
     For an axis along x, y or z they are along the next two; else n1 is square to the axis of the frame that the axis is
     farthest from.
     """
+    if not isinstance(axis, Vector):
+        raise UsageError(f"axis cannot be {show(axis)}", where="normals", advice="Give a Vector.")
     numbers = [_number(component) for component in axis]
+    if not any(numbers):
+        raise UsageError(f"axis cannot be {show(axis)}, which has no direction", advice="Give one that is not zero.")
     if None in numbers:
         raise UsageError("the direction of this axis must be known", advice="Declare it as a direction.")
     sizes = [abs(number or 0.0) for number in numbers]

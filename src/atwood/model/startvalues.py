@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, MutableMapping
 from typing import Any
 
+from atwood.arguments import show
 from atwood.errors import AtwoodError, StartError
 from atwood.model.deferred import Deferred
 from atwood.model.fields import ParameterSpec
@@ -36,7 +37,9 @@ class StartValues(MutableMapping[str, Any]):
     def __init__(self, values: Mapping[str, Any] | None = None, where: str = "") -> None:
         given = {} if values is None else values
         if not isinstance(given, Mapping):
-            raise StartError(f"{given!r} does not say values by path", where=where, advice="Write {'rod.angle': 0.5}.")
+            raise StartError(
+                f"{show(given)} does not say values by path", where=where, advice="Write {'rod.angle': 0.5}."
+            )
         self._values: dict[str, Any] = {key: _checked(key, value, where) for key, value in given.items()}
 
     def __getitem__(self, path: str) -> Any:
@@ -61,7 +64,7 @@ class StartValues(MutableMapping[str, Any]):
 def _checked(path: Any, value: Any, where: str) -> Any:
     """Return a start value as it is kept: a float, text that reads as a quantity, or a deferred value."""
     if not isinstance(path, str) or not path.strip():
-        raise StartError(f"{path!r} is no path", where=where, advice="Write paths like 'rod.angle'.")
+        raise StartError(f"{show(path)} is no path", where=where, advice="Write paths like 'rod.angle'.")
     full = f"{where}.{path}" if where else path
     if isinstance(value, Deferred):
         return value

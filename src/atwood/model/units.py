@@ -104,7 +104,8 @@ def parse_unit(text: str) -> Unit:
         operator, name, power_text = match.groups()
         if name not in _BASE:
             inside = f", in {text!r}" if name != stripped else ""
-            raise DeclarationError(f"{name!r} is not a unit{inside}", advice=suggestion(name, _BASE))
+            advice = suggestion(name, _BASE) or "Write it like 'kg*m^2' or 'N/m'."
+            raise DeclarationError(f"{name!r} is not a unit{inside}", advice=advice)
         power = int(power_text or 1) * (-1 if operator == "/" else 1)
         size, powers = _BASE[name]
         factor *= size**power

@@ -9,7 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from atwood.expr import Scalar, sqrt
+from atwood.arguments import show
+from atwood.errors import DeclarationError
+from atwood.expr import Expression, Scalar, sqrt
+from atwood.expr.functions import is_scalar
 
 __all__ = ["ZERO", "Vector", "as_vector", "cross", "dot", "norm"]
 
@@ -29,6 +32,9 @@ class Vector:
         self.x = x
         self.y = y
         self.z = z
+        for name, one in (("x", x), ("y", y), ("z", z)):
+            if type(one) not in _PLAIN and not is_scalar(one):
+                raise DeclarationError(f"{name} cannot be {show(one)}", where="Vector", advice=_COMPONENT)
 
     def __iter__(self) -> Iterator[Scalar]:
         return iter((self.x, self.y, self.z))
@@ -37,9 +43,13 @@ class Vector:
         return (self.x, self.y, self.z)[axis]
 
     def __add__(self, other: Vector) -> Vector:
+        if not isinstance(other, Vector):
+            raise _not_a_vector(other)
         return Vector(self.x + other.x, self.y + other.y, self.z + other.z)
 
     def __sub__(self, other: Vector) -> Vector:
+        if not isinstance(other, Vector):
+            raise _not_a_vector(other)
         return Vector(self.x - other.x, self.y - other.y, self.z - other.z)
 
     def __neg__(self) -> Vector:
@@ -57,6 +67,19 @@ class Vector:
         return f"Vector({self.x!r}, {self.y!r}, {self.z!r})"
 
 
+_PLAIN = frozenset((float, int, Expression))
+
+
+_COMPONENT = "Give a number, or an expression."
+
+
+def _not_a_vector(value: object) -> DeclarationError:
+    """Return the error that says that something else is in the place of a vector."""
+    return DeclarationError(
+        f"a vector cannot be {show(value)}", advice="Give a Vector, or three numbers or expressions."
+    )
+
+
 ZERO = Vector(0.0, 0.0, 0.0)
 
 
@@ -64,17 +87,26 @@ def as_vector(value: Vector | Sequence[Any]) -> Vector:
     """Return a vector from a vector or from three components."""
     if isinstance(value, Vector):
         return value
-    x, y, z = value
+    try:
+        x, y, z = value
+    except Exception:  # whatever it is, it has no three components
+        raise _not_a_vector(value) from None
     return Vector(x, y, z)
 
 
 def dot(a: Vector, b: Vector) -> Scalar:
     """Return the scalar product of two vectors."""
+    for one in (a, b):
+        if not isinstance(one, Vector):
+            raise _not_a_vector(one)
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
 def cross(a: Vector, b: Vector) -> Vector:
     """Return the vector product of two vectors."""
+    for one in (a, b):
+        if not isinstance(one, Vector):
+            raise _not_a_vector(one)
     return Vector(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 

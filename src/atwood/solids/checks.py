@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from atwood.arguments import real, show
 from atwood.errors import ParameterError
 
 __all__ = ["checked_array", "checked_number", "checked_rotation", "symmetric_part", "verify_moments"]
@@ -94,9 +95,9 @@ def checked_rotation(value: ArrayLike) -> FloatArray:
 def checked_number(value: float, name: str, unit: str) -> float:
     """Return a finite number."""
     try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise ParameterError(f"the {name} is {value!r}", advice=f"Give a number in {unit}.") from None
+        number = real(value)
+    except Exception:  # a value of somebody else's class may raise anything
+        raise ParameterError(f"the {name} is {show(value)}", advice=f"Give a number in {unit}.") from None
     if not math.isfinite(number):
         raise ParameterError(f"the {name} is {number}", advice=f"Give a finite number in {unit}.")
     return number
@@ -106,8 +107,8 @@ def checked_array(value: ArrayLike, shape: tuple[int, ...], name: str, unit: str
     """Return an own copy of an array of finite numbers of a given shape."""
     try:
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ParameterError(f"the {name} is {value!r}", advice=f"Give numbers of shape {shape}.") from None
+    except Exception:  # a value of somebody else's class may raise anything
+        raise ParameterError(f"the {name} is {show(value)}", advice=f"Give numbers of shape {shape}.") from None
     if array.shape != shape:
         raise ParameterError(f"the {name} has shape {array.shape}", advice=f"Give numbers of shape {shape}.")
     if not np.all(np.isfinite(array)):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from atwood.arguments import FILE, instance, number, optional, takes
 from atwood.errors import ParameterError
 from atwood.solids.mesh import TriangleMesh, closed_mesh
 from atwood.solids.properties import MassProperties
@@ -14,6 +15,11 @@ from atwood.solids.stl import read_stl
 __all__ = ["mesh_solid", "stl_solid"]
 
 
+_SIZE = optional(number("a positive number", above=0.0))
+_MESH = instance("a mesh, as closed_mesh makes it", TriangleMesh)
+
+
+@takes(ParameterError, mesh=_MESH, density=_SIZE, mass=_SIZE)
 def mesh_solid(mesh: TriangleMesh, *, density: float | None = None, mass: float | None = None) -> MassProperties:
     """Return the mass properties of the homogeneous body that a closed mesh bounds, in the frame of its vertices.
 
@@ -53,6 +59,14 @@ def mesh_solid(mesh: TriangleMesh, *, density: float | None = None, mass: float 
     return MassProperties(scale * volume, middle + centre, scale * (inertia + inertia.T) / 2)
 
 
+@takes(
+    ParameterError,
+    path=FILE,
+    density=_SIZE,
+    mass=_SIZE,
+    scale=number("a positive number", above=0.0),
+    tolerance=number("a number from 0 to 1", least=0.0, most=1.0),
+)
 def stl_solid(
     path: str | Path,
     *,

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from atwood.arguments import show
 from atwood.errors import ParameterError
 from atwood.solids.shells import check_overlap, check_shells, signed_volume, split_shells
 from atwood.solids.welding import weld
@@ -115,7 +116,11 @@ def closed_mesh(corners: ArrayLike, *, tolerance: float = _WELD, where: str = ""
 
 def _soup(corners: ArrayLike, where: str) -> FloatArray:
     """Return loose triangles as an array of finite numbers."""
-    soup = np.asarray(corners, dtype=float)
+    try:
+        soup = np.asarray(corners, dtype=float)
+    except Exception:  # whatever it is, it is no table of numbers
+        advice = "Give triangle, corner, coordinate: (m, 3, 3)."
+        raise ParameterError(f"the corners of the mesh are {show(corners)}", where=where, advice=advice) from None
     if soup.ndim != 3 or soup.shape[1:] != (3, 3):
         raise ParameterError(
             f"the triangles have shape {soup.shape}",

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from atwood.arguments import check, instance, number, takes
 from atwood.errors import ParameterError
 from atwood.solids.checks import checked_array, checked_number, checked_rotation, symmetric_part, verify_moments
 
@@ -184,6 +185,8 @@ class MassProperties:
         Lengths are compared relative to the size of the bodies (radius of gyration and distance of the centres from
         the origin), the other quantities relative to themselves.
         """
+        check(BODY, other, "other", "MassProperties.is_close")
+        relative = check(number("a number above 0", above=0.0), relative, "relative", "MassProperties.is_close")
         mass = max(self.mass, other.mass)
         inertia = max(float(np.max(np.abs(body.inertia))) for body in (self, other))
         length = max(float(np.linalg.norm(self.centre)), float(np.linalg.norm(other.centre)))
@@ -196,11 +199,15 @@ class MassProperties:
         )
 
 
+BODY = instance("the mass properties of a body, such as solids.box(1, 1, 1, mass=1)", MassProperties)
+
+
 def point_mass(mass: float, position: ArrayLike = (0.0, 0.0, 0.0)) -> MassProperties:
     """Return the mass properties of a point mass (kg) at a position (m)."""
     return MassProperties(mass, checked_array(position, (3,), "position", "m"), np.zeros((3, 3)))
 
 
+@takes(ParameterError, parts=BODY)
 def combine(*parts: MassProperties) -> MassProperties:
     """Return the mass properties of parts that are rigidly joined, all seen from the same frame.
 
@@ -219,6 +226,7 @@ def combine(*parts: MassProperties) -> MassProperties:
     return _total(parts, [1.0] * len(parts))
 
 
+@takes(ParameterError, whole=BODY, holes=BODY)
 def subtract(whole: MassProperties, *holes: MassProperties) -> MassProperties:
     """Return the mass properties of a body out of which pieces are cut.
 
@@ -294,9 +302,9 @@ def _along_frame(vectors: FloatArray) -> list[FloatArray]:
     left = vectors @ vectors.T
     lengths = np.sqrt(np.maximum(np.diag(left), 0.0))
     # The frame's axes that reach furthest into the span, in the order x, y, z.
-    best = sorted(range(3), key=lambda number: (-round(float(lengths[number]), 9), number))[: vectors.shape[1]]
-    for number in sorted(best):
-        axis = left[:, number].copy()
+    best = sorted(range(3), key=lambda axis: (-round(float(lengths[axis]), 9), axis))[: vectors.shape[1]]
+    for place in sorted(best):
+        axis = left[:, place].copy()
         for other in basis:
             axis -= np.dot(axis, other) * other
         basis.append(axis / np.linalg.norm(axis))

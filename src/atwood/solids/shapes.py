@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arguments import check, one_of, real, show, takes_names
 from atwood.errors import ParameterError
 from atwood.solids.properties import MassProperties
 
@@ -32,6 +33,7 @@ FloatArray = NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
 
 
+@takes_names
 def box(
     length_x: float, length_y: float, length_z: float, *, density: float | None = None, mass: float | None = None
 ) -> MassProperties:
@@ -57,6 +59,7 @@ def box(
     return _centred(m, (m * (b * b + c * c) / 12, m * (c * c + a * a) / 12, m * (a * a + b * b) / 12))
 
 
+@takes_names
 def cylinder(
     radius: float, length: float, *, density: float | None = None, mass: float | None = None, axis: Axis = "z"
 ) -> MassProperties:
@@ -80,6 +83,7 @@ def cylinder(
     return _revolved(m, m * r * r / 2, m * (3 * r * r + l * l) / 12, 0.0, axis)
 
 
+@takes_names
 def tube(
     outer_radius: float,
     inner_radius: float,
@@ -111,6 +115,7 @@ def tube(
     return _revolved(m, m * squares / 2, m * (3 * squares + l * l) / 12, 0.0, axis)
 
 
+@takes_names
 def sphere(
     radius: float, *, inner_radius: float = 0.0, density: float | None = None, mass: float | None = None
 ) -> MassProperties:
@@ -138,6 +143,7 @@ def sphere(
     return _centred(m, (moment, moment, moment))
 
 
+@takes_names
 def spherical_shell(radius: float, *, area_density: float | None = None, mass: float | None = None) -> MassProperties:
     """Return a thin spherical shell; the origin is its centre.
 
@@ -158,6 +164,7 @@ def spherical_shell(radius: float, *, area_density: float | None = None, mass: f
     return _centred(m, (moment, moment, moment))
 
 
+@takes_names
 def disc(
     radius: float,
     *,
@@ -189,6 +196,7 @@ def disc(
     return _revolved(m, m * squares / 2, m * squares / 4, 0.0, axis)
 
 
+@takes_names
 def rod(
     length: float, *, line_density: float | None = None, mass: float | None = None, axis: Axis = "z"
 ) -> MassProperties:
@@ -212,6 +220,7 @@ def rod(
     return _revolved(m, 0.0, m * l * l / 12, 0.0, axis)
 
 
+@takes_names
 def cone(
     radius: float, height: float, *, density: float | None = None, mass: float | None = None, axis: Axis = "z"
 ) -> MassProperties:
@@ -237,6 +246,7 @@ def cone(
     return _revolved(m, 3 * m * r * r / 10, 3 * m * (4 * r * r + h * h) / 80, h / 4, axis)
 
 
+@takes_names
 def ellipsoid(
     semi_axis_x: float,
     semi_axis_y: float,
@@ -274,8 +284,7 @@ def _centred(mass: float, moments: tuple[float, float, float]) -> MassProperties
 
 def _revolved(mass: float, about: float, across: float, height: float, axis: Axis) -> MassProperties:
     """Return a body of revolution from its moments about its axis and across it, and the height of its centre."""
-    if axis not in ("x", "y", "z"):
-        raise ParameterError(f"the axis is {axis!r}", advice="It is 'x', 'y' or 'z'.")
+    check(one_of(("x", "y", "z")), axis, "axis", error=ParameterError)
     number = "xyz".index(axis)
     moments, centre = np.full(3, across), np.zeros(3)
     moments[number], centre[number] = about, height
@@ -296,7 +305,7 @@ def _mass(measure: float, density: float | None, mass: float | None, name: str, 
 
 def _inner(inner: float, outer: float) -> float:
     """Return an inner radius that is not negative and at most the outer one."""
-    value = 0.0 if inner == 0 else _positive(inner, "inner radius")
+    value = 0.0 if type(inner) in (int, float) and inner == 0 else _positive(inner, "inner radius")
     if value > outer:
         raise ParameterError(
             f"the inner radius, {value:.6g} m, is greater than the outer one, {outer:.6g} m",
@@ -308,9 +317,9 @@ def _inner(inner: float, outer: float) -> float:
 def _positive(value: float | None, name: str, unit: str = "m") -> float:
     """Return a positive finite number."""
     try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise ParameterError(f"the {name} is {value!r}", advice=f"Give a number in {unit}.") from None
+        number = real(value)
+    except Exception:  # a value of somebody else's class may raise anything
+        raise ParameterError(f"the {name} is {show(value)}", advice=f"Give a number in {unit}.") from None
     if not (math.isfinite(number) and number > 0):
         raise ParameterError(f"the {name} is {number:.6g} {unit}", advice="It must be positive and finite.")
     return number

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arguments import FILE, takes
 from atwood.errors import ParameterError
 
 __all__ = ["read_stl"]
@@ -26,6 +27,7 @@ _FACET = re.compile(r"^\s*facet\b", re.IGNORECASE | re.MULTILINE)
 _END = re.compile(r"^\s*endsolid\b", re.IGNORECASE | re.MULTILINE)
 
 
+@takes(ParameterError, path=FILE)
 def read_stl(path: str | Path) -> FloatArray:
     """Read the triangles of an STL file.
 
