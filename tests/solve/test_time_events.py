@@ -31,6 +31,7 @@ from atwood import (
     sign,
     simulate,
     sin,
+    sqrt,
     sweep,
     tan,
 )
@@ -87,6 +88,18 @@ def square_wave(t: np.ndarray, period: float) -> np.ndarray:
     return done * half * half + np.where(past < half, 0.5 * past * past, back)
 
 
+def roots(t: np.ndarray) -> np.ndarray:
+    """The place of a mass that is pushed with the root of 0.6 - t."""
+    return 2.0 / 3.0 * (0.6**1.5 * t - 0.4 * (0.6**2.5 - (0.6 - t) ** 2.5))
+
+
+def later_roots(past: np.ndarray) -> np.ndarray:
+    """How far it goes on with the root of t - 0.4 from t = 0.5 on."""
+    before = 2.0 / 3.0 * (0.6**1.5 - 0.1**1.5)
+    past = np.maximum(past, 0.0)
+    return before * past + 2.0 / 3.0 * (0.4 * ((past + 0.1) ** 2.5 - 0.1**2.5) - 0.1**1.5 * past)
+
+
 FORCES: dict[str, tuple[Function, Callable[[np.ndarray], np.ndarray]]] = {
     "one moment at the start": (lambda t: select(t <= 0, 1e9, 0.0), lambda t: 0.0 * t),
     "square wave": (lambda t: select(sin(100.0 * math.pi * t) > 0, 1.0, -1.0), lambda t: square_wave(t, 0.02)),
@@ -130,6 +143,10 @@ FORCES: dict[str, tuple[Function, Callable[[np.ndarray], np.ndarray]]] = {
             math.pi * t**3 / 3.0,
             math.pi / 24.0 + 0.25 * math.pi * (t - 0.5) + math.pi * ((t - 0.5) ** 3 / 3.0 - 0.5 * (t - 0.5) ** 2),
         ),
+    ),
+    "branches without a value elsewhere": (
+        lambda t: select(t < 0.5, sqrt(0.6 - t), sqrt(t - 0.4)),
+        lambda t: roots(np.minimum(t, 0.5)) + np.where(t < 0.5, 0.0, later_roots(t - 0.5)),
     ),
     "at the very end": (lambda t: select(t < 1.0, 1.0, 1e9), lambda t: 0.5 * t * t),
 }
@@ -269,8 +286,7 @@ def two_links(space: str, rotation: Function, size: float = 1.0, mass: float = 1
     return scene
 
 
-@pytest.mark.parametrize("space", ["plane", "space"])
-@pytest.mark.parametrize(("size", "mass"), [(1.0, 1.0), (1e-3, 1e-6), (1e3, 1e6)])
+@pytest.mark.parametrize(("space", "size", "mass"), [("plane", 1.0, 1.0), ("plane", 1e-3, 1e-6), ("space", 1e3, 1e6)])
 def test_a_motor_that_stops_at_once_is_the_same_impact_in_every_form_and_size(
     space: str, size: float, mass: float
 ) -> None:
@@ -380,6 +396,31 @@ def test_energy_that_an_input_puts_into_a_spring_at_once_is_work(form: str) -> N
 def test_a_comparison_goes_through_an_impact() -> None:
     found = compare(driven(lambda t: select(t < 0.5, t, 0.5)), rtols=(1e-8,), outputs=11)
     assert all(row.error < 1e-5 for row in found.rows)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_motion_that_starts_infinitely_fast_is_refused_by_name(form: str) -> None:
+    with pytest.raises(SolveError, match=r"t = 0\.5 .*without a finite") as caught:
+        simulate(driven(lambda t: sqrt(maximum(t - 0.5, 0.0))), form=form)
+    assert caught.value.where == "drive"
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_motion_that_fits_but_for_its_digits_is_continuous(form: str) -> None:
+    result = simulate(driven(lambda t: select(t < 0.5235988, sin(t), 0.5)), form=form, rtol=1e-10)
+    assert len(result.happenings) == 1
+    assert result.energy.max_drift < 1e-6
+
+
+def test_each_part_whose_speed_jumps_is_told() -> None:
+    scene = Scene(t_end=1.0)
+    ground, rod, bob = scene.add("ground", Ground()), scene.add("rod", Rod()), scene.add("bob", PointMass())
+    drive = scene.add("drive", Drive(motion=lambda t: select(t < 0.5, t, 0.5)))
+    lift = scene.add("lift", Drive(axis=(0.0, 0.0, 1.0), motion=lambda t: select(t < 5 * 0.1, 2.0 * t, 1.0)))
+    for a, b in ((ground.frame, drive.a), (drive.b, lift.a), (lift.b, rod.a), (rod.b, bob.point)):
+        scene.connect(a, b)
+    scene.start.update({"rod.angle": 0.3, "rod.angular_velocity": 0.0})
+    assert [(one.time, one.part) for one in simulate(scene).happenings] == [(0.5, "drive"), (0.5, "lift")]
 
 
 def test_switching_without_end_is_refused_by_name() -> None:

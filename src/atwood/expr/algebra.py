@@ -323,6 +323,9 @@ def power(a: Expression, b: Expression) -> Expression:
         if exponent.is_integer() and abs(exponent) <= 1024:
             whole = _whole_power(a, abs(int(exponent)))
             return whole if exponent >= 0.0 else divide(graph.one, whole)
+        pieces = _in_pieces(a, lambda part: power(part, b))
+        if pieces is not None:
+            return pieces
     return graph.node("pow", (a, b))
 
 
@@ -346,6 +349,9 @@ def unary(operation: str, a: Expression) -> Expression:
         return negate(a)
     if a.operation == "constant":
         return graph.constant(UNARY[operation](a.payload))
+    pieces = _in_pieces(a, lambda part: unary(operation, part))
+    if pieces is not None:
+        return pieces
     if operation in _ODD:
         opposite = _opposite(a)
         if opposite is not None:
@@ -426,6 +432,19 @@ def _time_wave(operation: str, a: Expression) -> Expression | None:
         return None
     angle = a.graph.node("atan2", (first, multiply(side, second)))  # far from where this jumps
     return angle if operation == "asin" else subtract(a.graph.constant(0.5 * math.pi), angle)
+
+
+def _in_pieces(a: Expression, function: Callable[[Expression], Expression]) -> Expression | None:
+    """Return a function of what is constant in a piece of time, such as the root of ``max(t, 0)``, piece by piece.
+
+    So its derivatives are zero there, and not a root's at zero.
+    """
+    if a.operation != "select" or a.graph.relations is None:
+        return None
+    condition, first, second = a.arguments
+    if not (first.is_constant or second.is_constant) or not a.graph.relations.has(condition):
+        return None
+    return select(condition, function(first), function(second))
 
 
 def _time_relation(kind: str, a: Expression, b: Expression | None = None) -> Expression | None:

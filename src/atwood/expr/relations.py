@@ -91,6 +91,10 @@ class TimeRelations:
         """All that makes an expression change with time: time itself, and what stands for relations."""
         return (self.time, *self.symbols)
 
+    def has(self, expression: Expression) -> bool:
+        """Return whether an expression stands for a relation."""
+        return expression.is_symbol and self._kinds.get(expression.index) == _TIMED and expression is not self.time
+
     def are_timed(self, *expressions: Expression | None) -> bool:
         """Return whether expressions depend on time, on nothing that moves, and are being read."""
         return self._is_reading and max(self._kind(one) for one in expressions if one is not None) == _TIMED

@@ -309,10 +309,10 @@ class _Walk:
         self._piece_start, before = self.t, self.assembly
         self.assembly = self._in_piece(before)
         length = self.start.length
-        self.q, self.u, impact = pass_time_event(before, self.assembly, self.t, self.q, self.u, length)
+        self.q, self.u, impacts = pass_time_event(before, self.assembly, self.t, self.q, self.u, length)
         self.show = bool(np.any(self.shown[self.times == self.t]))
-        if impact is not None:  # both states are shown, as at any event
-            self.happenings.append(impact)
+        if impacts:  # both states are shown, as at any event
+            self.happenings += impacts
             self.impact = self.show = True
             self.segments[-1].shown[-1] = True
         if self.plan is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Literal
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from atwood.errors import UsageError
+from atwood.expr import Expression, live, substitute
 from atwood.expr.taylor import TaylorPrograms, taylor_programs
 from atwood.forms.accelerations import AccelerationProgram, acceleration_program
 from atwood.forms.assembly import Assembly
@@ -43,14 +44,39 @@ def recurrences(assembly: Assembly) -> TaylorPrograms:
             where=assembly.flat.name,
             advice="Use the solver 'ida'.",
         )
-    return assembly.shared.get(("recurrences", id(found)), lambda: (found, _make(found)))[1]
+    is_partial = assembly.shared.get(("partial", id(found)), lambda: _has_partial_branch(assembly, found))
+    chosen = assembly.known_relations if is_partial else {}
+    key = ("recurrences", id(found), tuple(chosen.values()))
+    return assembly.shared.get(key, lambda: (found, _make(found, chosen)))[1]
 
 
-def _make(found: AccelerationProgram) -> TaylorPrograms:
+_PARTIAL = frozenset({"sqrt", "log", "pow", "asin", "acos", "tan", "atan2", "div"})
+"""Operations that have no value, or no series, somewhere."""
+
+
+def _has_partial_branch(assembly: Assembly, found: AccelerationProgram) -> bool:
+    """Return whether a branch that a relation of functions of time leaves out could be without a value.
+
+    A series is of all that there is, whatever is chosen of it. Then each piece has recurrences of its own, in which
+    there is only what acts.
+    """
+    symbols = {one.symbol for one in assembly.relations}
+    nodes = found.program.nodes if symbols else ()
+    branches = [
+        one
+        for node in nodes
+        if node.operation == "select" and node.arguments[0] in symbols
+        for one in node.arguments[1:]
+    ]
+    return any(node.operation in _PARTIAL and not node.is_parametric for node in live(branches))
+
+
+def _make(found: AccelerationProgram, chosen: Mapping[Expression, float]) -> TaylorPrograms:
     program = found.program
     (time,), q, u = (group.symbols for group in program.inputs)
+    results = substitute(program.results, chosen)
     rates = u if len(program.outputs) == 1 else ()  # else the program gives them
-    return taylor_programs(program.name, time, [*q, *u], [*rates, *program.results], program.parameters, _LANES)
+    return taylor_programs(program.name, time, [*q, *u], [*rates, *results], program.parameters, _LANES)
 
 
 def taylor_problem(assembly: Assembly, stop_time: float = inf, has_events: bool = False) -> TaylorProblem:
