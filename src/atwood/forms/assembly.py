@@ -123,12 +123,15 @@ class Assembly:
         forest = grow_forest(form, mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space, orientation)
         with mechanism.relations.reading():
             made = build_equations(mechanism, forest)
-        return made if form == "dae" or not mechanism.can_read_multipliers else with_reactions(made, self.maximal)
+        return made if form == "dae" or not made.read else with_reactions(made, self.maximal)
 
     @property
     def rows(self) -> tuple[Expression, ...]:
         """The equations of motion of the reduced form, as short as they come."""
-        return self.shared.get("rows", lambda: tuple(self._tidy(self.reduced, self.reduced.rows)))
+        reduced = self.reduced
+        if reduced.read:  # what reactions are solved for with is nothing that one writes by hand
+            return reduced.rows
+        return self.shared.get("rows", lambda: tuple(self._tidy(reduced, reduced.rows)))
 
     def _tidy(self, equations: Equations, rows: Sequence[Expression]) -> list[Expression]:
         """Write rows as an expert would by hand, for scenes of the size that one would do by hand."""

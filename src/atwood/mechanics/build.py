@@ -98,8 +98,9 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
         solved_speeds=tuple(s.name.removeprefix("u:") for s in taken.speeds),
         integrals=(*taken.integrals, *integrals.values()),
     )
-    is_asked = forest.form == "dae" and mechanism.can_read_multipliers
-    read = _read_multipliers(mechanism, signals) if is_asked else []
+    read = _read_multipliers(mechanism, signals) if mechanism.can_read_multipliers else []
+    if forest.form == "reduced":
+        return replace(made, read=dict(zip(read, read, strict=True)))
     with mechanism.relations.reading(False):
         return with_known(made, known_multipliers(mechanism, made, read)) if read else made
 
