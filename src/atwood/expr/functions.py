@@ -215,7 +215,8 @@ def select(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
     Parameters
     ----------
     condition
-        A comparison such as ``x < 0``.
+        A comparison such as ``x < 0``. One of functions of time alone is a time event: runs stop and go on there, and
+        results at that very time are those after it, whichever side the comparison takes.
     a, b
         The values on either side.  In a program both are computed, and what the other branch gives outside its
         domain does no harm.

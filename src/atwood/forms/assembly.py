@@ -155,7 +155,8 @@ class Assembly:
         """The values of the relations in this piece of a run: until the next time event."""
         if self.given_relations is not None:
             return self.given_relations
-        return values_just_after(self.relations, self.mechanism.table.values, self.flat.t_start)
+        with self.shared.lock:  # derivatives may be new to the graph
+            return values_just_after(self.relations, self.mechanism.table.values, self.flat.t_start)
 
     @property
     def known_relations(self) -> dict[Expression, float]:

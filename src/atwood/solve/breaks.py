@@ -226,7 +226,8 @@ class _Search:
 
     def _isolated(self, boxes: _Boxes) -> _Boxes:
         """Return intervals in which the function may change its sign, once at most as far as rounding tells."""
-        (slope,) = jvp([self._difference], {self._time: 1.0})
+        key = ("rate of relation", self._number)
+        (slope,) = self._assembly.shared.get(key, lambda: jvp([self._difference], {self._time: 1.0}))
         found: list[_Boxes] = []
         doubtful: list[_Boxes] = []
         while len(boxes.low):
