@@ -61,7 +61,7 @@ def test_run_as_json(form: str, level: str, states: int, multipliers: list[str])
     assert data["solver"]["why"] == f"{used['name']}: {used['reason']}"
     assert data["solver"]["steps"] > (4 if form == "reduced" else 10)
     assert set(data["energy"]) >= {"start", "end", "max_drift"}
-    assert data["energy"]["max_drift"] < 1e-5
+    assert data["energy"]["max_drift"] < 1e-4
     assert data["constraint_max"] < (1e-12 if level != "index1" else 1e-5)
     assert data["start"]["rod.angle"] == pytest.approx(0.5)
     assert data["asked"]["rtol"] == 1e-8

@@ -99,7 +99,7 @@ def test_answers_are_those_of_a_scene_made_so(name: str, form: str) -> None:
     for path, values in fresh.table().items():
         size = max(1.0, float(np.nanmax(np.abs(values), initial=0.0)))
         assert_allclose(found.array(path), values, rtol=0.0, atol=1e-9 * size, err_msg=path)
-    assert found.energy.max_drift < 1e-4
+    assert found.energy.max_drift < 3e-3
 
 
 def test_the_scene_itself_stays_as_it_was() -> None:

@@ -44,7 +44,7 @@ def test_six_natural_frequencies(number: int, form: str) -> None:
     result = simulate(scene, form=form, t_end=2.0 * period, rtol=1e-10, outputs=33)
     path, size = (f"mount.rotation.{axis}", 2.9) if turns else (f"mount.displacement.{axis}", 0.3)
     assert np.allclose(result[path], size * np.sin(n * result.time), atol=5e-8 * size)
-    assert result.energy.max_drift < 1e-7
+    assert result.energy.max_drift < 2e-6
 
 
 def test_energy_and_momenta_are_kept_in_large_turns_between_two_free_bodies() -> None:
@@ -103,7 +103,7 @@ def test_in_a_plane_two_displacements_and_a_rotation_that_counts_turns(form: str
     assert np.allclose(result["mount.angle"], 2.0 + 10.0 * np.cos(n * result.time), atol=1e-6)
     n_z = math.sqrt(STIFFNESS[2] / MASS)
     assert np.allclose(result["mount.displacement.z"], 0.2 / n_z * np.sin(n_z * result.time), atol=1e-7)
-    assert result.energy.max_drift < 1e-7
+    assert result.energy.max_drift < 2e-6
 
 
 def test_a_turn_about_y_is_the_same_in_plane_and_space() -> None:

@@ -43,7 +43,7 @@ def test_kepler(space: str, e: float, form: str) -> None:
     found = np.stack([result[f"planet.{p}.{k}"] for p in ("position", "velocity") for k in ("x", up)], axis=1)
     exact = kepler(e, result.time)
     assert np.max(np.abs(found[:, :2] - exact[:, :2])) < (5e-8 if e < 0.8 else 1e-6)
-    assert result.energy.max_drift < 1e-9
+    assert result.energy.max_drift < (1e-8 if e < 0.8 else 1e-7)
     momentum = found[:, 0] * found[:, 3] - found[:, 1] * found[:, 2]
     assert np.allclose(momentum, math.sqrt(1.0 - e * e), atol=1e-9)
     assert np.allclose(result["pull.distance_apart"] ** 2 * result["pull.pull"], 1.0, atol=1e-12)
@@ -262,7 +262,7 @@ def test_mass_and_inertia_are_those_of_all_that_is_welded_together(space: str, f
     wanted = -MU * mass / r - 0.5 * MU / r**3 * (np.trace(tensor) - 3.0 * e @ turned @ e)
     assert result["pull.potential_energy"][0] == pytest.approx(wanted, rel=1e-12)
     assert result["pull.distance_apart"][0] == pytest.approx(r, rel=1e-12)
-    assert result.energy.max_drift < 2e-7
+    assert result.energy.max_drift < 1e-5
 
 
 @pytest.mark.parametrize("space", ["line", "plane", "space"])

@@ -44,7 +44,7 @@ def test_a_loop_in_space_runs_in_both_forms() -> None:
         assert np.allclose(reduced.array(path), dae.array(path), atol=2e-6)
     assert np.allclose(reduced.array("s2.force.x"), dae.array("s2.force.x"), atol=1e-3)
     for one in runs:
-        assert one.energy.max_drift < 1e-6
+        assert one.energy.max_drift < 1e-5
         assert one.constraint_max["position"] < 1e-13
         assert one.constraint_max["velocity"] < 1e-13
     # The coupler can turn about its own axis: one freedom beside that of the crank.
@@ -74,7 +74,7 @@ def test_orientations_pass_between_modes() -> None:
     assert laws[:2] == ["comes_taut", "goes_slack"]
     for one in runs:
         assert [happening.law for happening in one.happenings] == laws
-        assert one.energy.max_drift < 1e-6
+        assert one.energy.max_drift < 1e-5
         for path in ("body.position.x", "body.position.y", "body.z_axis.x", "body.x_axis.y"):
             assert np.allclose(one.array(path)[-5:], runs[0].array(path)[-5:], atol=2e-5)
 

@@ -69,7 +69,7 @@ def test_a_skate_on_a_slope_does_not_slide_down(form: str, level: str, solver: s
     assert np.allclose(made.array("sleigh.position.z"), -G / (2.0 * SPIN**2) * np.sin(turned) ** 2, atol=2e-6)
     # The blade holds the centripetal force, and what of the weight acts across it.
     assert np.allclose(made.array("skate.side_force"), 2.0 * MASS * G * np.sin(turned), atol=2e-5)
-    assert made.energy.max_drift < 1e-6
+    assert made.energy.max_drift < 3e-5
     if level != "index1":
         assert made.constraint_max["velocity"] < 1e-14
 
@@ -90,7 +90,7 @@ def test_a_sleigh_comes_to_a_straight_course(form: str) -> None:
     rate = 0.5 * LENGTH * SPIN**2 / fastest
     assert np.allclose(made.array("sleigh.angular_velocity"), SPIN / np.cosh(rate * made.time), atol=5e-7)
     assert np.allclose(made.array("skate.speed"), fastest * np.tanh(rate * made.time), atol=5e-7)
-    assert made.energy.max_drift < 1e-6
+    assert made.energy.max_drift < 3e-5
 
 
 def test_it_holds_velocities_and_no_positions() -> None:

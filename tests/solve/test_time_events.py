@@ -251,7 +251,7 @@ def test_a_jump_in_a_prescribed_speed_is_an_impact(form: str, solver: str, angle
     np.testing.assert_allclose(speeds[1] @ np.array([along[1], -along[0]]), 0.0, atol=1e-9)
     assert [one.part for one in result.happenings] == ["drive"]
     assert result.happenings[0].impact
-    assert result.energy.max_drift < 1e-7
+    assert result.energy.max_drift < 3e-6
 
 
 @pytest.mark.parametrize(("form", "solver"), SOLVERS)
@@ -390,7 +390,7 @@ def test_energy_that_an_input_puts_into_a_spring_at_once_is_work(form: str) -> N
     end = x * math.cos(0.5 * fast) + v / fast * math.sin(0.5 * fast)
     assert result.array("bob.position.x")[-1] == pytest.approx(end, abs=1e-7)
     assert result.energy.work[-1] == pytest.approx(50.0 * x * x, abs=1e-7)
-    assert result.energy.max_drift < 1e-6
+    assert result.energy.max_drift < 3e-5
 
 
 def test_a_comparison_goes_through_an_impact() -> None:

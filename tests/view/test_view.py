@@ -80,7 +80,7 @@ def test_ropes_hang_straight_down() -> None:
 def test_plot_groups_by_unit_and_shows_the_energy(results: dict[str, Result]) -> None:
     figure = plot(results["double-pendulum"])
     labels = [axes.get_ylabel() for axes in figure.axes]
-    assert labels == ["angle, rad", "tension, N", "energy drift"]
+    assert labels == ["angle, rad", "tension, N", "energy drift / exchanged"]
     assert figure.axes[-1].get_xlabel() == "time, s"
     assert [line.get_label() for line in figure.axes[0].get_lines()] == ["rod1", "rod2"]
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from atwood.study import Comparison, ComparisonRow
+from atwood.study.compare import RELATIVE
 
 __all__ = ["CompareRequest", "compare_scene"]
 
@@ -79,6 +80,7 @@ def _print(found: Comparison) -> None:
         out.print(Text(found.reference.note))
     out.print()
     out.print(_table(found))
+    out.print(RELATIVE, style="dim")
     if any(row.within_reference for row in found.rows):
         out.print("* within ten times the error of the reference itself", style="dim")
     out.print()

@@ -124,7 +124,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         missed = result.constraint_max
         held = max(missed["held_position"], missed["held_velocity"])
         before = f" ({held:.1e} before projection)" if plan.is_projected else ""
-        yield "constraints", f"missed by {max(missed['position'], missed['velocity']):.1e}{before}"
+        yield "constraints", f"missed by {max(missed['position'], missed['velocity']):.1e} of the scene's size{before}"
 
 
 def _passages(result: Result) -> Iterator[tuple[str, str]]:
@@ -142,10 +142,9 @@ def _passages(result: Result) -> Iterator[tuple[str, str]]:
 
 def _energy(result: Result) -> str:
     ledger = result.energy
-    size = float(np.max(np.abs(ledger.kinetic)) + np.ptp(ledger.potential))
-    first, last = (0.0 if abs(e) < 1e-13 * size else e for e in (ledger.total[0], ledger.total[-1]))
+    first, last = (0.0 if abs(e) <= ledger.uncertainty else e for e in (ledger.total[0], ledger.total[-1]))
     work = f", work {ledger.work[-1] - ledger.work[0]:.6g} J" if np.any(ledger.work) else ""
-    return f"{first:.6g} J to {last:.6g} J{work}; the balance drifts by {ledger.max_drift:.1e}"
+    return f"{first:.6g} J to {last:.6g} J{work}; {ledger.describe()}"
 
 
 def duration(seconds: float) -> str:

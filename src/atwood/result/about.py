@@ -82,6 +82,8 @@ def describe_run(result: Result) -> dict[str, Any]:
             "end": float(ledger.total[-1]),
             "work": float(ledger.work[-1] - ledger.work[0]),
             "max_drift": ledger.max_drift,
+            "exchanged": ledger.exchanged,
+            "uncertainty": ledger.uncertainty,
         },
         "constraint_max": max(missed["position"], missed["velocity"]),
         "constraint_held": max(missed["held_position"], missed["held_velocity"]),

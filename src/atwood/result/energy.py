@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["EnergyLedger", "make_ledger"]
+__all__ = ["EnergyLedger", "Piece", "exchange", "make_ledger"]
 
 FloatArray = NDArray[np.float64]
+
+_SHARE = 1e-6
+"""Of the kinetic energy: no less counts as exchanged, since steady motion has errors of rounding, too."""
 
 
 @dataclass(frozen=True, eq=False)
 class EnergyLedger:
-    """Energies at the output times, J.
+    """Energies at the output times, J, and how well they balance.
 
     Attributes
     ----------
@@ -24,76 +27,221 @@ class EnergyLedger:
     work
         Work of drives, inputs and dampers since the start, and what impacts took away.
     max_drift
-        Largest deviation of kinetic plus potential energy less work from its start, relative to the largest kinetic
-        energy plus the range of the potential energy.
+        Largest deviation of kinetic plus potential energy less work from its start, at any sample of the run, as far as
+        it is more than rounding, relative to `exchanged`. It is the error of the energy. Errors that leave the
+        energy as it is, as those along a periodic orbit, are not in it, and grow with the length of the run.
+    exchanged
+        What deviations are compared with, J; the largest of
+
+        - the kinetic energy of the deviations of all velocities, and angular velocities in the axes of the bodies,
+          from their means over the run,
+        - what goes to and fro: the mean absolute deviations from their means of the potential energy, and of the
+          kinetic energy of each part for an observer who moves with the mean velocity of the centre of mass; but no
+          more than the kinetic energy for that observer,
+        - the range of the work,
+        - 1e-6 of the mean kinetic energy.
+
+        Kinetic energies are geometric means over the time in which something moves, so that a short fast part, as the
+        perihelion of a comet, does not hide what the slow part depends on. Nothing depends on the constant of the
+        potential, and only the last two on the frame of reference.
+    uncertainty
+        What the digits of states and parameters leave open, J, and the estimated error of the work as an integral.
     """
 
     kinetic: FloatArray
     potential: FloatArray
     work: FloatArray
     max_drift: float
+    exchanged: float
+    uncertainty: float
 
     @property
     def total(self) -> FloatArray:
         """Kinetic plus potential energy."""
         return self.kinetic + self.potential
 
+    def __repr__(self) -> str:
+        """Say how well it balances, and relative to what."""
+        return f"<{type(self).__name__}: {self.describe()}>"
 
-def make_ledger(
-    times: Sequence[FloatArray],
-    kinetic: Sequence[FloatArray],
-    potential: Sequence[FloatArray],
-    power: Sequence[FloatArray | None],
-    impacts: Sequence[bool],
-    switched: Sequence[FloatArray | None],
-    time_events: Sequence[bool],
-    shown: NDArray[np.bool_],
-) -> EnergyLedger:
-    """Return the ledger of a run from samples of each of its segments.
+    def describe(self) -> str:
+        """Return how well it balances, and relative to what, in words."""
+        told = f"the balance drifts by {self.max_drift:.1e} of the {self.exchanged:.3g} J exchanged"
+        if self.uncertainty > max(self.max_drift, 1e-8) * self.exchanged:
+            told += f", which rounding leaves open by {self.uncertainty:.1e} J"
+        return told
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Velocities that share a matrix of masses; see `atwood.mechanics.moving.MovingMass`.
+
+    Attributes
+    ----------
+    part
+        Whose they are.
+    axis
+        Number of their world axis; -1 for an angular velocity.
+    velocities
+        Shape (number, samples).
+    masses
+        Shape (number, number, samples).
+    """
+
+    part: str
+    axis: int
+    velocities: FloatArray
+    masses: FloatArray
+
+    def energy(self, mean: FloatArray | float = 0.0) -> FloatArray:
+        """Return the kinetic energy of the deviations from mean velocities, at each sample."""
+        w = self.velocities - np.reshape(mean, (-1, 1))
+        found: FloatArray = 0.5 * np.einsum("is,ijs,js->s", w, self.masses, w)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """What a ledger is made of: samples of a stretch in one mode.
+
+    Attributes
+    ----------
+    time
+        Sample times, s.
+    kinetic, potential
+        Energies, J.
+    motions
+        What moves with which velocities.
+    rounding
+        What the digits of states and parameters leave open, J.
+    power
+        Power put in, W; None where there is none.
+    switched
+        Potential energy that is there in some modes only, which counts as work when such a mode is entered or left;
+        None where there is none.
+    is_impact
+        Whether it began with an impact.
+    is_switched
+        Whether it began at a time event.
+    """
+
+    time: FloatArray
+    kinetic: FloatArray
+    potential: FloatArray
+    motions: tuple[Motion, ...]
+    rounding: float
+    power: FloatArray | None
+    switched: FloatArray | None
+    is_impact: bool
+    is_switched: bool
+
+    def gained_since(self, before: Piece) -> float:
+        """Return the work that is done between the end of another piece and the start of this one, J.
+
+        An impact takes kinetic energy away. At a time event, all that jumps is work: of an input that a potential
+        reads, or of drives whose speed jumps. Other jumps of energy are none of work.
+        """
+        kinetic = float(self.kinetic[0] - before.kinetic[-1])
+        if self.is_switched:
+            return kinetic + float(self.potential[0] - before.potential[-1])
+        after, earlier = self.switched, before.switched
+        gained = (0.0 if after is None else float(after[0])) - (0.0 if earlier is None else float(earlier[-1]))
+        return gained + (min(0.0, kinetic) if self.is_impact else 0.0)
+
+
+def exchange(pieces: Sequence[Piece], work: FloatArray) -> float:
+    """Return the energy that a scene exchanges, J; see `EnergyLedger.exchanged`.
 
     Parameters
     ----------
-    times, kinetic, potential
-        Samples.
-    power
-        Power put in, W; None where there is none.
-    impacts
-        For each segment, whether it began with an impact, which takes energy away.
-    switched
-        Samples of the potential energy that is there in some modes only, which counts as work when such a mode is
-        entered or left; None where there is none. If other energy jumps at a change of mode, that is drift.
-    time_events
-        For each segment, whether it began at a time event. Energy that jumps there is work: of an input that a
-        potential reads, or of drives whose speed jumps.
+    pieces
+        All stretches of the run.
+    work
+        Work at all their samples, J.
+    """
+    shares = np.concatenate([_weights(one.time) for one in pieces])
+    if not np.any(shares > 0.0):
+        shares = np.ones_like(shares)
+    shares = shares / np.sum(shares)
+    rounding = max(one.rounding for one in pieces)
+    motions = _joined_motions(pieces)
+    boost = _mean_velocity(motions, shares)
+    seen: dict[str, FloatArray] = {}
+    deviating = np.zeros(len(shares))
+    for one in motions:
+        seen[one.part] = seen.get(one.part, 0.0) + one.energy(boost.get(one.axis, 0.0))
+        deviating = deviating + one.energy(one.velocities @ shares)
+    kinetic, potential = (np.concatenate([getattr(one, name) for one in pieces]) for name in ("kinetic", "potential"))
+    other = np.abs(kinetic - sum(one.energy() for one in motions))  # of Lagrangians, as it is
+    seen[""], deviating = other, deviating + other
+    moving = _typical(np.sum(list(seen.values()), axis=0), shares, rounding)
+    to_and_fro = sum(float(np.abs(one - one @ shares) @ shares) for one in (potential, *seen.values()))
+    own = _typical(deviating, shares, rounding)
+    return max(own, min(to_and_fro, moving), float(np.ptp(work)), _SHARE * float(kinetic @ shares))
+
+
+def _joined_motions(pieces: Sequence[Piece]) -> list[Motion]:
+    """Return the motions of the whole run."""
+    return [
+        Motion(
+            same[0].part,
+            same[0].axis,
+            np.concatenate([one.velocities for one in same], axis=1),
+            np.concatenate([one.masses for one in same], axis=2),
+        )
+        for same in zip(*(piece.motions for piece in pieces), strict=True)
+    ]
+
+
+def _mean_velocity(motions: Sequence[Motion], shares: FloatArray) -> dict[int, float]:
+    """Return the mean velocity of the centre of mass along each axis."""
+    found = {}
+    for axis in {one.axis for one in motions} - {-1}:
+        along = [one for one in motions if one.axis == axis]
+        mass = float(sum(np.sum(one.masses, axis=(0, 1)) @ shares for one in along))
+        momentum = float(sum(np.einsum("ijs,js,s->", one.masses, one.velocities, shares) for one in along))
+        found[axis] = momentum / mass if mass > 0.0 else 0.0
+    return found
+
+
+def _typical(energy: FloatArray, shares: FloatArray, rounding: float) -> float:
+    """Return the geometric mean over the time in which an energy is more than rounding; 0 if it never is."""
+    some = (energy > rounding) & (shares > 0.0)
+    return float(np.exp(np.sum(shares[some] * np.log(energy[some])) / np.sum(shares[some]))) if some.any() else 0.0
+
+
+def _weights(t: FloatArray) -> FloatArray:
+    """Return the time that each sample stands for."""
+    gaps = np.diff(t)
+    shares: FloatArray = 0.5 * (np.append(gaps, 0.0) + np.append(0.0, gaps))
+    return shares
+
+
+def make_ledger(
+    pieces: Sequence[Piece], work: Sequence[FloatArray], unsure: float, shown: NDArray[np.bool_]
+) -> EnergyLedger:
+    """Return the ledger of a run.
+
+    Parameters
+    ----------
+    pieces
+        Samples of each stretch.
+    work
+        Work within each stretch since its start, J.
+    unsure
+        Estimated error of all this work, J.
     shown
         Which of all samples are outputs.
     """
-    work, carried = [], 0.0
-    for i, (t, p) in enumerate(zip(times, power, strict=True)):
-        if time_events[i]:
-            carried += float(kinetic[i][0] + potential[i][0] - kinetic[i - 1][-1] - potential[i - 1][-1])
-        elif impacts[i]:
-            carried += min(0.0, float(kinetic[i][0] - kinetic[i - 1][-1]))
-        if i and not time_events[i]:
-            after, before = switched[i], switched[i - 1]
-            carried += (0.0 if after is None else float(after[0])) - (0.0 if before is None else float(before[-1]))
-        work.append(carried + (np.zeros(len(t)) if p is None else _integral(t, p)))
-        carried = float(work[-1][-1])
-    t_all, v_all, w_all = (np.concatenate(list(x)) for x in (kinetic, potential, work))
-    balance = t_all + v_all - w_all
-    size = float(np.max(np.abs(t_all)) + np.ptp(v_all))
-    drift = float(np.max(np.abs(balance - balance[0])))
-    return EnergyLedger(t_all[shown], v_all[shown], w_all[shown], drift / size if size > 0.0 else drift)
-
-
-def _integral(t: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the integral from the first sample on, of a spline of order up to eight through the samples."""
-    if len(t) < 2:
-        return np.zeros(len(t))
-    from scipy.interpolate import make_interp_spline
-
-    degree = min(7, len(t) - 1)
-    degree -= 1 - degree % 2  # an odd degree needs no choice at the ends
-    spline = make_interp_spline(t, values, k=degree).antiderivative()
-    integral: FloatArray = np.asarray(spline(t) - spline(t[0]), dtype=float)
-    return integral
+    done, carried = [], 0.0
+    for i, (piece, inside) in enumerate(zip(pieces, work, strict=True)):
+        carried += piece.gained_since(pieces[i - 1]) if i else 0.0
+        done.append(carried + inside)
+        carried = float(done[-1][-1])
+    kinetic, potential = (np.concatenate([getattr(one, name) for one in pieces]) for name in ("kinetic", "potential"))
+    all_work = np.concatenate(done)
+    balance = kinetic + potential - all_work
+    exchanged, rounding = exchange(pieces, all_work), 2.0 * max(one.rounding for one in pieces)
+    beyond = max(0.0, float(np.max(np.abs(balance - balance[0]))) - rounding)
+    share = beyond / max(exchanged, rounding) if beyond else 0.0
+    return EnergyLedger(kinetic[shown], potential[shown], all_work[shown], share, exchanged, rounding + unsure)

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from atwood.arguments import FILE, check, instance, takes, whole
 from atwood.errors import ResultError, suggestion_in_parts
-from atwood.expr import depends_on, substitute
+from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
-from atwood.mechanics.equations import Constraint, Equations
-from atwood.mechanics.power import applied_power, switched_energy
 from atwood.model.quantities import PATH, PATHS, Quantity
+from atwood.result.accounts import account
 from atwood.result.angles import unwrap
-from atwood.result.energy import EnergyLedger, make_ledger
+from atwood.result.energy import EnergyLedger
+from atwood.result.work import find_ledger
 from atwood.solve.charts import Restated
 from atwood.solve.driver import Statistics
 from atwood.solve.immobile import Immobile, find_immobile
@@ -47,14 +47,6 @@ def output_number(index: int, count: int) -> int:
     last = count - 1
     kind = whole(f"the number of an output time, 0 to {last}, or -1 to {-count} from the end", -count, last)
     return int(check(kind, index, "index", "at", ResultError))
-
-
-def _moves_by_itself(equations: Equations, constraint: Constraint) -> bool:
-    """Return whether a constraint can put power into a scene: it moves with time."""
-    if constraint.value is not None:
-        relations = equations.graph.relations
-        return depends_on(constraint.value, [equations.time] if relations is None else relations.roots)
-    return not substitute([constraint.rate], dict.fromkeys(equations.speeds, 0.0))[0].is_zero
 
 
 class Result:
@@ -330,26 +322,18 @@ class Result:
     @cached_property
     def energy(self) -> EnergyLedger:
         """Kinetic and potential energy, work, and how well they balance."""
-        kinetic, potential, power, switched = [], [], [], []
-        for segment in self._segments:
-            assembly = segment.assembly
-            state = (segment.time[None, :], segment.coordinates, segment.speeds)
-            idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
-            energies = assembly.kernel(assembly.energy_program, vectorized=True)(*state, *idle)[0]
-            kinetic.append(energies[0])
-            potential.append(energies[1])
-            power.append(self._power(segment, state, idle))
-            switched.append(self._switched(segment, state, idle))
-        if not all(np.all(np.isfinite(one)) for one in (*kinetic, *potential)):
+        pieces = [account(segment, self._power_of_drives) for segment in self._segments]
+        if not all(np.all(np.isfinite(x)) for one in pieces for x in (one.kinetic, one.potential)):
             raise ResultError(
                 "the energy has no value somewhere along the run",
                 where=self._without_energy(),
                 advice="A law is evaluated outside its domain there: look at its formula and at the start.",
             )
-        times = [segment.time for segment in self._segments]
-        impacts = [segment.impact for segment in self._segments]
-        events = [segment.after_time_event for segment in self._segments]
-        return make_ledger(times, kinetic, potential, power, impacts, switched, events, self._shown)
+        return find_ledger(self.run, pieces, self._shown, lambda run: Result(run)._power_of_drives)
+
+    def _power_of_drives(self, segment: Segment) -> FloatArray:
+        """Return the power of constraints that move with time."""
+        return self._reactions(segment)[1]
 
     def _without_energy(self) -> str:
         """Return the part whose energy has no value."""
@@ -357,38 +341,6 @@ class Result:
             if path.endswith("_energy") and not np.all(np.isfinite(self.samples(path))):
                 return path
         return self.assembly.flat.name
-
-    def _switched(
-        self, segment: Segment, state: tuple[FloatArray, ...], idle: tuple[FloatArray, ...]
-    ) -> FloatArray | None:
-        """Return the potential energy that is there in some modes only, or None if there is none."""
-        assembly = segment.assembly
-        program = assembly.known_program(
-            "switched energy", "switched energy", lambda: [switched_energy(assembly.mechanism, assembly.equations)]
-        )
-        if program.results[0].is_zero:
-            return None
-        found: FloatArray = assembly.kernel(program, vectorized=True)(*state, *idle)[0][0]
-        return found
-
-    def _power(
-        self, segment: Segment, state: tuple[FloatArray, ...], idle: tuple[FloatArray, ...]
-    ) -> FloatArray | None:
-        """Return the power that is put into the scene, or None if nothing can."""
-        assembly = segment.assembly
-        program = assembly.known_program(
-            "power", "power", lambda: [applied_power(assembly.mechanism, assembly.equations)]
-        )
-        applied = program.results[0]
-        moving = [one for one in assembly.maximal.constraints if _moves_by_itself(assembly.maximal, one)]
-        if applied.is_zero and not moving:
-            return None
-        total = np.zeros(len(segment.time))
-        if not applied.is_zero:
-            total = total + assembly.kernel(program, vectorized=True)(*state, *idle)[0][0]
-        if moving:
-            total = total + self._reactions(segment)[1]
-        return total
 
     @cached_property
     def constraint_max(self) -> dict[str, float]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from atwood.errors import UsageError
 
-__all__ = ["SOLVERS", "RunOptions", "sample_times"]
+__all__ = ["SOLVERS", "RunOptions", "Samples", "sample_times"]
 
 FloatArray = NDArray[np.float64]
 
@@ -42,12 +42,13 @@ class RunOptions:
     max_order, max_step
         Limits for the method.
     samples
-        A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it; more
-        often if functions of time change faster, unless this is 1.
+        A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it.
     solver
         A key of `SOLVERS`, or ``"auto"``; see `atwood.solve.choice`.
     structure
         Whether it may be that nothing can move.
+    on_step
+        Called with the time before each step of the solver.
     """
 
     t_end: float
@@ -61,6 +62,7 @@ class RunOptions:
     solver: str = "auto"
     samples: int = 400
     structure: bool = False
+    on_step: Callable[[float], object] | None = None
 
     def out_of_time(self, t: float) -> str:
         """Return what is said of a run that its limit of time ended, at a time of its own."""
@@ -71,8 +73,65 @@ class RunOptions:
         return f"the limit of {self.max_steps} steps was used up (at t = {t:.9g})"
 
 
-def sample_times(t: float, options: RunOptions, at_least: int = 0) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return all sample times with the start, and which of them are outputs.
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """When a run is sampled.
+
+    Attributes
+    ----------
+    times
+        Sample times, s.
+    shown
+        Which of them are outputs.
+    between
+        Which of them lie between those that the run was made with, and so change nothing in it.
+    """
+
+    times: FloatArray
+    shown: NDArray[np.bool_]
+    between: NDArray[np.bool_]
+
+    def with_more(self, times: FloatArray) -> Samples:
+        """Return the same with more in between."""
+        more = np.setdiff1d(times, self.times)
+        order = np.argsort(np.concatenate([self.times, more]))
+        no, yes = np.zeros(len(more), dtype=bool), np.ones(len(more), dtype=bool)
+        return Samples(
+            np.concatenate([self.times, more])[order],
+            np.concatenate([self.shown, no])[order],
+            np.concatenate([self.between, yes])[order],
+        )
+
+    def until(self, t: float, limit: float) -> Samples:
+        """Return those after one time up to another, which is among them."""
+        ahead = (self.times > t) & (self.times <= limit)
+        times, shown, between = self.times[ahead], self.shown[ahead], self.between[ahead]
+        if not len(times) or times[-1] != limit:
+            times, shown, between = np.append(times, limit), np.append(shown, False), np.append(between, False)
+        return Samples(times, shown, between)
+
+    def without_last_shown(self) -> Samples:
+        """Return the same, of which the last is no output."""
+        return Samples(self.times, np.append(self.shown[:-1], False), self.between)
+
+    def shows(self, t: float) -> bool:
+        """Return whether a time is that of an output."""
+        return bool(np.any(self.shown[self.times == t]))
+
+    @property
+    def own(self) -> FloatArray:
+        """The times that the run was made with."""
+        return self.times[~self.between]
+
+    def ends_of_blocks(self, count: int) -> NDArray[np.intp]:
+        """Return where to cut them into so many blocks, which are the same whatever lies between."""
+        own = np.flatnonzero(~self.between)
+        size = -(-len(own) // count)
+        return np.append(own[size - 1 : -1 : size] + 1, len(self.times))
+
+
+def sample_times(t: float, options: RunOptions) -> Samples:
+    """Return all samples, the start among them.
 
     Parameters
     ----------
@@ -80,8 +139,6 @@ def sample_times(t: float, options: RunOptions, at_least: int = 0) -> tuple[Floa
         Time of the start, s.
     options
         How the run is made.
-    at_least
-        As many samples are taken anyway.
     """
     if isinstance(options.outputs, (int, np.integer)):
         asked = np.linspace(t, options.t_end, int(options.outputs))
@@ -92,7 +149,7 @@ def sample_times(t: float, options: RunOptions, at_least: int = 0) -> tuple[Floa
                 f"outputs go from {asked[0]:g} to {asked[-1]:g} s",
                 advice=f"Give times between {t:g} and {options.t_end:g}.",
             )
-    filling = np.linspace(t, options.t_end, max(options.samples, at_least) + 1)
+    filling = np.linspace(t, options.t_end, options.samples + 1)
     near = 1e-9 * (options.t_end - t)
     next_asked = np.minimum(np.searchsorted(asked, filling), len(asked) - 1)
     distance = np.minimum(np.abs(asked[next_asked] - filling), np.abs(asked[np.maximum(next_asked - 1, 0)] - filling))
@@ -100,4 +157,4 @@ def sample_times(t: float, options: RunOptions, at_least: int = 0) -> tuple[Floa
     times = np.concatenate([asked, filling])
     shown = np.concatenate([np.ones(len(asked), dtype=bool), np.zeros(len(filling), dtype=bool)])
     order = np.argsort(times)
-    return times[order], shown[order]
+    return Samples(times[order], shown[order], np.zeros(len(times), dtype=bool))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +17,9 @@ from atwood.solve.charts import CHART, Reassemble, Restated, enter_charts, to_re
 from atwood.solve.choice import Choice, check_solver, choose, describe_choices
 from atwood.solve.driver import Statistics
 from atwood.solve.immobile import refuse_immobile
-from atwood.solve.inputs import samples_needed
 from atwood.solve.missing import missing_at
 from atwood.solve.modes import EventProbe, Happening, enter_mode
-from atwood.solve.options import RunOptions, sample_times
+from atwood.solve.options import RunOptions, Samples, sample_times
 from atwood.solve.passage import Passage
 from atwood.solve.problem import Plan, make_plan
 from atwood.solve.record import Recorder, Segment
@@ -67,6 +66,8 @@ class Run:
         What solved it and why, one after the other.
     restated
         When which orientation went on in other coordinates, since these came near to where they are singular.
+    again
+        Makes the same run with other options, and with samples in between that change nothing.
     """
 
     assembly: Assembly
@@ -79,6 +80,7 @@ class Run:
     options: RunOptions
     choices: tuple[Choice, ...]
     restated: tuple[Restated, ...] = ()
+    again: Callable[[RunOptions, FloatArray], Run] | None = None
 
     @property
     def passages(self) -> tuple[Passage, ...]:
@@ -126,14 +128,21 @@ def run(
     check_solver(options.solver)
     options = allowed(options)
     clock = Clock(options.max_seconds) if clock is None else clock
+
+    def prepared(options: RunOptions, between: FloatArray) -> _Walk:
+        samples = sample_times(t, options)
+        schedule = find_schedule(assembly, t, options.t_end).at_samples(samples.times)
+        _check_prescribed(schedule.rows(assembly, samples.times), samples.times)
+        walk = _Walk(assembly, start, options, reassemble, samples.with_more(between), again)
+        walk.prepare()
+        return walk
+
+    def again(options: RunOptions, between: FloatArray) -> Run:
+        return prepared(options, between).go()
+
     try:
         with clock.kept(GRACE):
-            schedule = find_schedule(assembly, t, options.t_end)
-            wanted = samples_needed(assembly, t, options.t_end, schedule) if options.samples > 1 else 0
-            times, shown = sample_times(t, options, wanted)
-            _check_prescribed(schedule.at_samples(times).rows(assembly, times), times)
-            walk = _Walk(assembly, start, options, reassemble, times, shown)
-            walk.prepare()
+            walk = prepared(options, np.zeros(0))
     except TimeIsUp:
         return run_out_of_time(assembly, start, options)
     with clock.kept():
@@ -161,11 +170,11 @@ class _Walk:
         start: Start,
         options: RunOptions,
         reassemble: Reassemble,
-        times: FloatArray,
-        shown: NDArray[np.bool_],
+        samples: Samples,
+        again: Callable[[RunOptions, FloatArray], Run],
     ) -> None:
         self.start, self.options, self._other = start, options, reassemble
-        self.times, self.shown = times, shown
+        self.samples, self.again = samples, again
         self._schedules: dict[int, tuple[Shared, Schedule]] = {}
         self._plans: dict[tuple[float, ...], Plan] = {}
         self._piece_start = start.time
@@ -177,7 +186,7 @@ class _Walk:
         self.assembly, self.q, self.u = settle(assembly, start, reassemble)
         self.assembly = self.first = self._in_piece(self.assembly)
         self.restated: list[Restated] = []
-        self.impact, self.show = False, bool(shown[0])
+        self.impact, self.show = False, bool(samples.shown[0])
         self.plan: Plan | None = None
         self.probe: EventProbe | None = None
         self.choice: Choice
@@ -230,11 +239,10 @@ class _Walk:
         assert self.plan is not None
         assert self.probe is not None
         limit = schedule.next(t, options.t_end)
-        times, shown = _until(self.times, self.shown, t, limit)
+        ahead = self.samples.until(t, limit)
         if limit < options.t_end:  # the state just after it is shown
-            shown = np.append(shown[:-1], False)
-        ahead = times, shown
-        stretch = Stretch(self.plan, self.probe, options, self.choice, *ahead, self.show, self.statistics)
+            ahead = ahead.without_last_shown()
+        stretch = Stretch(self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics)
         recorder = Recorder(self.plan)
         outcome = run_stretch(stretch, recorder, t, q, u)
         if recorder.is_empty and outcome.error is not None:  # not even the start could be projected
@@ -287,7 +295,7 @@ class _Walk:
         """Return the time events of a scene in one mode."""
         key = id(assembly.shared)
         if key not in self._schedules:
-            schedule = find_schedule(assembly, self.start.time, self.options.t_end).at_samples(self.times)
+            schedule = find_schedule(assembly, self.start.time, self.options.t_end).at_samples(self.samples.own)
             self._schedules[key] = assembly.shared, schedule  # kept, so that its identity stays its own
         return self._schedules[key][1]
 
@@ -310,7 +318,7 @@ class _Walk:
         self.assembly = self._in_piece(before)
         length = self.start.length
         self.q, self.u, impacts = pass_time_event(before, self.assembly, self.t, self.q, self.u, length)
-        self.show = bool(np.any(self.shown[self.times == self.t]))
+        self.show = self.samples.shows(self.t)
         if impacts:  # both states are shown, as at any event
             self.happenings += impacts
             self.impact = self.show = True
@@ -352,7 +360,7 @@ class _Walk:
 
     def _run_so_far(self, status: str, message: str) -> Run:
         parts = (self.first, tuple(self.segments), tuple(self.happenings), self.statistics, status, message)
-        return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.restated))
+        return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.restated), self.again)
 
 
 def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
@@ -373,12 +381,3 @@ def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
             where=f"{part}.{law}",
             advice="Two drives, or a drive and a fixed part, say different things about the same motion.",
         )
-
-
-def _until(times: FloatArray, shown: NDArray[np.bool_], t: float, limit: float) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return the samples after one time up to another, which is among them."""
-    ahead = (times > t) & (times <= limit)
-    chosen, seen = times[ahead], shown[ahead]
-    if len(chosen) and chosen[-1] == limit:
-        return chosen, seen
-    return np.append(chosen, limit), np.append(seen, False)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import SolveError
@@ -18,7 +18,7 @@ from atwood.solve.guard import Guard, guard_of
 from atwood.solve.missing import find_missing, states_ahead
 from atwood.solve.modes import EventProbe, Happening
 from atwood.solve.opening import Order, open_explicit_session, open_implicit_session
-from atwood.solve.options import RunOptions
+from atwood.solve.options import RunOptions, Samples
 from atwood.solve.passage import Passage, events_on
 from atwood.solve.problem import Plan, pack_state
 from atwood.solve.projection import project_safely
@@ -44,8 +44,8 @@ class Stretch:
         What the run was asked for.
     choice
         What solves it, at first.
-    times, shown
-        Samples, of which the last is its end, and which of them are outputs.
+    samples
+        Samples, of which the last is its end.
     first_shown
         Whether the start is an output.
     spent
@@ -56,15 +56,14 @@ class Stretch:
     probe: EventProbe
     options: RunOptions
     choice: Choice
-    times: FloatArray
-    shown: NDArray[np.bool_]
+    samples: Samples
     first_shown: bool
     spent: Statistics
 
     @property
     def end(self) -> float:
         """Where it ends if nothing happens before."""
-        return float(self.times[-1])
+        return float(self.samples.times[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +127,7 @@ def _follow(stretch: Stretch, recorder: Recorder, t: float) -> Outcome:
     """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen."""
     nothing, last, options = np.zeros(0), t, stretch.options
     try:
-        for moment, show in zip(stretch.times, stretch.shown, strict=True):
+        for moment, show in zip(stretch.samples.times, stretch.samples.shown, strict=True):
             check_time()
             happening = stretch.probe.between(last, float(moment))
             if happening is not None:
@@ -202,7 +201,9 @@ class _Runner:
                 self.recorder.take(advance.t, advance.y, True)
             elif advance.t > self.recorder.end:
                 stretch = self.stretch
-                self.recorder.take(advance.t, advance.y, bool(np.any(stretch.shown[stretch.times == advance.t])))
+                self.recorder.take(
+                    advance.t, advance.y, bool(np.any(stretch.samples.shown[stretch.samples.times == advance.t]))
+                )
             return replace(self._ended(advance.t, "event", ""), happening=happening)
         if advance.t > self.recorder.end:
             self.recorder.take(advance.t, advance.y, True)
@@ -264,7 +265,7 @@ class _Runner:
             Budget(
                 max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
                 wall_seconds=None if options.max_seconds is None else max(0.0, time_left()),
-                poll=stretch.plan.poll(choice.solver),
+                poll=_both(stretch.plan.poll(choice.solver), options.on_step),
             ),
         )
         if choice.solver.startswith("ida"):
@@ -297,12 +298,13 @@ class _Runner:
         stretch, progress = self.stretch, self.stretch.options.progress
         turning = stretch.plan.balance.turning
         whole = progress is None and not turning.can_stray
-        block = len(stretch.times) if whole else -(-len(stretch.times) // _BLOCKS)
-        while done < len(stretch.times):
-            times = stretch.times[done : done + block]
+        samples = stretch.samples
+        ends = samples.ends_of_blocks(1 if whole else _BLOCKS)
+        while done < len(samples.times):
+            times = samples.times[done : ends[np.searchsorted(ends, done, side="right")]]
             y, _, advance = session.sample(times)
             count = len(y)
-            self.recorder.take_many(times[:count], y, stretch.shown[done : done + count])
+            self.recorder.take_many(times[:count], y, stretch.samples.shown[done : done + count])
             done += count
             if advance.status is not Status.REACHED:
                 return done, advance
@@ -316,7 +318,8 @@ class _Runner:
     def _advance(self, session: Session, done: int) -> tuple[int, Advance | None]:
         """Go from sample to sample; return how many are done, and why it stopped early."""
         stretch, recorder, progress = self.stretch, self.recorder, self.stretch.options.progress
-        times, shown = stretch.times.tolist(), stretch.shown.tolist()
+        samples = stretch.samples
+        times, shown, extra = (x.tolist() for x in (samples.times, samples.shown, samples.between))
         plan, told = stretch.plan, -np.inf
         looks = plan.is_projected or bool(plan.dependent_speeds) or not plan.balance.turning.is_plain
         while done < len(times):
@@ -348,7 +351,7 @@ class _Runner:
                 continue
             recorder.take(advance.t, advance.y, shown[done])
             done += 1
-            if looks:
+            if looks and not extra[done - 1]:
                 plan.review_output(advance.t, advance.y[: plan.program.coordinates])
                 self._repair(session, advance)
             if progress is not None and moment > told:
@@ -360,11 +363,11 @@ class _Runner:
         """Take a passage into the record and go on behind it, unless something happens on its way."""
         stretch, plan, path = self.stretch, self.stretch.plan, passage.path
         assert path is not None
-        times = stretch.times
+        times = stretch.samples.times
         root = events_on(path, plan, stretch.probe)
         end = path.end if root is None else min(path.end, root.state[0])
         first, done = (int(np.searchsorted(times, one, side="right")) for one in (path.start, end))
-        self.recorder.pass_over(passage, times[first:done], stretch.shown[first:done])
+        self.recorder.pass_over(passage, times[first:done], stretch.samples.shown[first:done])
         if root is not None and root.state[0] <= stretch.end:
             return done, Advance(*root.state, Status.EVENT, root.events)
         if done < len(times):
@@ -416,3 +419,17 @@ class _Runner:
         _, q, u, held = self.recorder.last()
         if strays or np.max(held) > 100.0 * self.stretch.options.relative_tolerance:
             session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
+
+
+def _both(
+    one: Callable[[float], object] | None, other: Callable[[float], object] | None
+) -> Callable[[float], object] | None:
+    """Return what calls both functions."""
+    if one is None or other is None:
+        return one or other
+
+    def call(t: float) -> None:
+        one(t)
+        other(t)
+
+    return call

@@ -21,7 +21,12 @@ from atwood.solve.run_arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRES
 from atwood.study.reference import Assembled, Reference, find_reference, run_form, scaled_difference, table_at
 from atwood.study.verdict import judge
 
-__all__ = ["Comparison", "ComparisonRow", "Reference", "compare"]
+__all__ = ["RELATIVE", "Comparison", "ComparisonRow", "Reference", "compare"]
+
+RELATIVE = (
+    "Errors and constraint drifts are relative to the size of the scene, or in rad; energy drifts to what it exchanges."
+)
+"""What the figures of a comparison are relative to."""
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 
@@ -45,7 +50,7 @@ class ComparisonRow:
     steps
         Steps of the solver.
     energy_drift
-        See `atwood.result.energy.EnergyLedger`.
+        Error of the energy, relative to what the scene exchanges; see `atwood.result.energy.EnergyLedger`.
     constraint_drift
         By how much the constraints are missed by what the run gives, relative to the scene's sizes.
     constraint_held
@@ -115,7 +120,7 @@ class Comparison:
             lines.append(
                 f"{row.label:<24}{row.rtol:>8.0e}{error:>9.1e}{mark}{wall:>10.3g}{steps:>8.0f}{energy:>10.1e}{drift:>12.1e}"
             )
-        return "\n".join([*lines, "", self.verdict])
+        return "\n".join([*lines, RELATIVE, "", self.verdict])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the comparison as plain data."""

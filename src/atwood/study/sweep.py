@@ -180,8 +180,8 @@ def _times(assembly: Assembly, end: float, outputs: Any) -> Any:
     check_span(begin, end)
     if outputs is None:
         return np.array([end])
-    times, shown = sample_times(begin, RunOptions(end, outputs=outputs, samples=1))
-    return times[shown]
+    found = sample_times(begin, RunOptions(end, outputs=outputs, samples=1))
+    return found.times[found.shown]
 
 
 def _threads(asked: int | None) -> int:

@@ -168,9 +168,8 @@ def _draw_energy(axes: Axes, result: Result) -> None:
     """Draw by how much energy and work fail to balance."""
     ledger = result.energy
     balance = ledger.total - ledger.work
-    size = float(np.max(np.abs(ledger.kinetic)) + np.ptp(ledger.potential)) or 1.0
-    drift = (balance - balance[0]) / size
-    polish(axes, y_label="energy drift")
+    drift = (balance - balance[0]) / (ledger.exchanged or 1.0)
+    polish(axes, y_label="energy drift / exchanged")
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.plot(result.time, drift, color=INK, linewidth=1.2)
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 2), useMathText=True)

@@ -1,0 +1,129 @@
+"""What the energy of a run is made of, sample by sample: energies, momentum, power, and how far digits reach."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.expr import Program, depends_on, substitute
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.equations import Constraint, Equations
+from atwood.mechanics.moving import MovingMass, moving_masses
+from atwood.mechanics.power import applied_power, switched_energy
+from atwood.result.energy import Motion, Piece
+from atwood.solve.record import Segment
+
+__all__ = ["DrivePower", "account", "power_into"]
+
+FloatArray = NDArray[np.float64]
+
+DrivePower = Callable[[Segment], FloatArray]
+"""Gives the power of constraints that move with time."""
+
+_DRAWS = 3
+"""States near by that tell how far digits reach."""
+
+_DIGIT = 4.0 * np.finfo(float).eps
+"""Of each number in a state, relative to itself or to its size in the scene."""
+
+
+def account(segment: Segment, drives: DrivePower) -> Piece:
+    """Return the samples that a ledger is made of.
+
+    Parameters
+    ----------
+    segment
+        A stretch in one mode.
+    drives
+        Gives the power of constraints that move with time.
+    """
+    assembly, state = segment.assembly, (segment.coordinates, segment.speeds)
+    mechanism, equations = assembly.mechanism, assembly.equations
+    switching = assembly.known_program(
+        "switched energy", "switched energy", lambda: [switched_energy(mechanism, equations)]
+    )
+    kinetic, potential = _values(assembly, assembly.energy_program, segment.time, *state)
+    is_fixed = switching.results[0].is_zero
+    return Piece(
+        time=segment.time,
+        kinetic=kinetic,
+        potential=potential,
+        motions=_motions(segment),
+        rounding=_rounding(segment, kinetic + potential),
+        power=power_into(segment, drives),
+        switched=None if is_fixed else _values(assembly, switching, segment.time, *state)[0],
+        is_impact=segment.impact,
+        is_switched=segment.after_time_event,
+    )
+
+
+def _motions(segment: Segment) -> tuple[Motion, ...]:
+    """Return what moves with which velocities."""
+    assembly = segment.assembly
+    masses: list[MovingMass] = assembly.shared.get(
+        "moving masses", lambda: moving_masses(assembly.mechanism, assembly.equations)
+    )
+    program = assembly.known_program(
+        "moving masses",
+        "velocities",
+        lambda: [x for one in masses for row in (one.velocities, *one.masses) for x in row],
+    )
+    values = _values(assembly, program, segment.time, segment.coordinates, segment.speeds)
+    found, done = [], 0
+    for one in masses:
+        count = len(one.velocities)
+        velocities, matrix = values[done : done + count], values[done + count : done + count + count * count]
+        done += count + count * count
+        found.append(Motion(one.part, one.axis, velocities, matrix.reshape(count, count, -1)))
+    return tuple(found)
+
+
+def power_into(segment: Segment, drives: DrivePower) -> FloatArray | None:
+    """Return the power that is put into the scene at each sample, or None if nothing can."""
+    assembly = segment.assembly
+    program = assembly.known_program("power", "power", lambda: [applied_power(assembly.mechanism, assembly.equations)])
+    moving = any(_moves_by_itself(assembly.maximal, one) for one in assembly.maximal.constraints)
+    if program.results[0].is_zero and not moving:
+        return None
+    total: FloatArray = _values(assembly, program, segment.time, segment.coordinates, segment.speeds)[0]
+    return total + drives(segment) if moving else total
+
+
+def _moves_by_itself(equations: Equations, constraint: Constraint) -> bool:
+    """Return whether a constraint can put power into a scene: it moves with time."""
+    if constraint.value is not None:
+        relations = equations.graph.relations
+        return depends_on(constraint.value, [equations.time] if relations is None else relations.roots)
+    return not substitute([constraint.rate], dict.fromkeys(equations.speeds, 0.0))[0].is_zero
+
+
+def _values(assembly: Assembly, program: Program, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
+    """Return what a program of the state gives, shape (values, samples)."""
+    idle = (np.zeros_like(u), np.zeros((len(assembly.reactions), len(t))))
+    found = assembly.kernel(program, vectorized=True)(t[None, :], q, u, *idle)[0]
+    return np.array([np.broadcast_to(row, t.shape) for row in found])
+
+
+def _rounding(segment: Segment, energy: FloatArray) -> float:
+    """Return by how much the energy changes at most, J, where all that it is computed from changes in its last digits.
+
+    States are known to some units of rounding of themselves, or of the size that such coordinates have in the scene.
+    """
+    assembly, plan, samples = segment.assembly, segment.plan, len(segment.time)
+    sizes = (plan.coordinate_sizes, plan.sizes / plan.scales.time)
+    values, random = assembly.parameter_values, np.random.default_rng(0)
+
+    def near(numbers: FloatArray, size: FloatArray | float) -> FloatArray:
+        signs = random.choice((-1.0, 1.0), size=(len(numbers), samples))
+        return numbers + _DIGIT * signs * (np.abs(numbers) + size)
+
+    largest = 0.0
+    for _ in range(_DRAWS):
+        turned = assembly.with_rows(near(np.repeat(values[:, None], samples, axis=1), 0.0))
+        states = (near(x, size[:, None]) for x, size in zip((segment.coordinates, segment.speeds), sizes, strict=True))
+        time = near(segment.time[None, :], 0.0)[0]
+        apart = np.abs(np.sum(_values(turned, assembly.energy_program, time, *states), axis=0) - energy)
+        largest = max(largest, float(np.max(apart, initial=0.0, where=np.isfinite(apart))))
+    return largest

@@ -1,0 +1,161 @@
+"""Work as the integral of power: through the samples of a run, or within each step of the solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from atwood.result.accounts import DrivePower, power_into
+from atwood.result.energy import EnergyLedger, Piece, make_ledger
+from atwood.solve.retrace import run_again, times_of_steps
+from atwood.solve.run import Run
+
+__all__ = ["find_ledger", "integral_in_steps", "integral_of_samples", "nodes_between"]
+
+FloatArray = NDArray[np.float64]
+
+_CLEAR, _PART = 0.01, 0.1
+"""Of the tolerance, and of the drift: an error of the work that is smaller than either of them hides nothing."""
+
+_SUSPECT = 100.0
+"""So many tolerances of drift, where samples may be too few to see what the power does, are looked at more closely."""
+
+_NODES = {"ida": 3, "ida-sundae": 3, "explicit": 7, "taylor": 12}
+"""Points of Gauss and Legendre in a step, by the order of what makes the step."""
+
+_SEEN = {"ida": 2.0, "ida-sundae": 2.0, "explicit": 0.3, "taylor": 0.1}
+"""So many steps from sample to sample leave nothing unseen between the two."""
+
+
+def integral_of_samples(t: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
+    """Return the integral from the first sample on, of a spline of order up to eight, and its estimated error.
+
+    The error follows from what every second and every fourth sample give.
+    """
+    whole, half, quarter = _spline(t, values), *(_spline(*_thinned(t, values, stride)) for stride in (2, 4))
+    if len(t) < 9:
+        return whole, float((t[-1] - t[0]) * np.ptp(values)) if len(t) > 1 else 0.0
+    last, before = (_apart(_thinned(t, whole, 2)[1], half), _apart(_thinned(*_thinned(t, whole, 2), 2)[1], quarter))
+    return whole, last * min(1.0, last / before) if before > 0.0 else last
+
+
+def _thinned(t: FloatArray, values: FloatArray, stride: int) -> tuple[FloatArray, FloatArray]:
+    """Return every so many samples, and the last."""
+    kept = np.unique(np.append(np.arange(0, len(t), stride), len(t) - 1))
+    return t[kept], values[kept]
+
+
+def _apart(one: FloatArray, other: FloatArray) -> float:
+    return float(np.max(np.abs(one - other), initial=0.0))
+
+
+def _spline(t: FloatArray, values: FloatArray) -> FloatArray:
+    if len(t) < 2:
+        return np.zeros(len(t))
+    from scipy.interpolate import make_interp_spline
+
+    degree = min(7, len(t) - 1)
+    degree -= 1 - degree % 2  # an odd degree needs no choice at the ends
+    spline = make_interp_spline(t, values, k=degree).antiderivative()
+    return np.asarray(spline(t) - spline(t[0]), dtype=float)
+
+
+def nodes_between(times: FloatArray, count: int) -> FloatArray:
+    """Return so many points between each two of the times, in order."""
+    middle, half = 0.5 * (times[1:] + times[:-1]), 0.5 * np.diff(times)
+    nodes: FloatArray = (middle[:, None] + half[:, None] * legendre.leggauss(count)[0]).ravel()
+    return nodes
+
+
+def integral_in_steps(times: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
+    """Return the integral from the first time on, and its estimated error.
+
+    Parameters
+    ----------
+    times
+        Times between which values are smooth.
+    values
+        At the points that `nodes_between` gives, shape (times - 1, points).
+    """
+    count, half = values.shape[1], 0.5 * np.diff(times)
+    points, weights = legendre.leggauss(count)
+    to_coefficients = (np.arange(count) + 0.5)[:, None] * (legendre.legvander(points, count - 1) * weights[:, None]).T
+    coefficients = np.abs(values @ to_coefficients.T)
+    sizes, last = np.max(coefficients, axis=1, initial=0.0), coefficients[:, -1]
+    # Gauss' rule errs by the term of twice the order, which follows if the coefficients fall evenly.
+    fall = np.divide(last, sizes, out=np.zeros_like(last), where=sizes > 0.0) ** (2.0 * count / (count - 1.0))
+    return np.concatenate([[0.0], np.cumsum(half * (values @ weights))]), float(half @ (sizes * fall))
+
+
+def find_ledger(
+    run: Run,
+    pieces: Sequence[Piece],
+    shown: NDArray[np.bool_],
+    drives_of: Callable[[Run], DrivePower],
+) -> EnergyLedger:
+    """Return the ledger of a run.
+
+    Work is integrated through the samples where that is accurate enough to tell the drift, which is mostly so. Where it
+    is not, the run is made again to see what it did within its steps, since integrals that follow the steps are as
+    accurate as the solver itself.
+
+    Parameters
+    ----------
+    run
+        The run.
+    pieces
+        Its samples.
+    shown
+        Which of all samples are outputs.
+    drives_of
+        Gives, for a run, what gives the power of constraints that move with time.
+    """
+    known = [
+        (np.zeros(len(one.time)), 0.0) if one.power is None else integral_of_samples(one.time, one.power)
+        for one in pieces
+    ]
+    work, unsure = [one for one, _ in known], sum(error for _, error in known)
+    ledger = make_ledger(pieces, work, unsure, shown)
+    if all(one.power is None for one in pieces):
+        return ledger
+    rtol, solvers = run.options.relative_tolerance, [one.solver for one in run.choices]
+    hidden = unsure > max(_CLEAR * rtol, _PART * ledger.max_drift) * ledger.exchanged
+    few = run.statistics.steps > min(_SEEN[one] for one in solvers) * sum(len(one.time) for one in pieces)
+    if not (hidden or (few and ledger.max_drift > _SUSPECT * rtol)):
+        return ledger
+    found = _work_in_steps(run, pieces, max(_NODES[one] for one in solvers), drives_of)
+    return ledger if found is None else make_ledger(pieces, *found, shown)
+
+
+def _work_in_steps(
+    run: Run, pieces: Sequence[Piece], count: int, drives_of: Callable[[Run], DrivePower]
+) -> tuple[list[FloatArray], float] | None:
+    """Return the work at all samples, integrated within each step of the solver, and its estimated error."""
+    steps = times_of_steps(run)
+    grids = [_joined(one.time, steps) for one in pieces]
+    nodes = [nodes_between(grid, count) for grid in grids]
+    again = run_again(run, np.concatenate(nodes))
+    if again is None:
+        return None
+    drives, work, unsure = drives_of(again), [], 0.0
+    for segment, piece, grid, wanted in zip(again.segments, pieces, grids, nodes, strict=True):
+        places = np.searchsorted(segment.time, wanted)
+        if not np.array_equal(segment.time[np.minimum(places, len(segment.time) - 1)], wanted):
+            return None
+        power = power_into(segment, drives)
+        rows = np.zeros((len(grid) - 1, count)) if power is None else power[places].reshape(-1, count)
+        done, error = integral_in_steps(grid, rows)
+        work.append(done[np.searchsorted(grid, piece.time)])
+        unsure += error
+    return work, unsure
+
+
+def _joined(t: FloatArray, steps: FloatArray) -> FloatArray:
+    """Return sample times together with the times of steps between them, as far as these are told from each other."""
+    inside = steps[(steps > t[0]) & (steps < t[-1])]
+    places = np.searchsorted(t, inside)
+    near = np.minimum(inside - t[places - 1], t[places] - inside)
+    return np.union1d(t, inside[near > 1e3 * np.spacing(np.max(np.abs(t)))])
