@@ -402,3 +402,31 @@ def test_a_start_value_that_the_scene_fixes_can_be_let_go() -> None:
     )
     assert end["start"]["bob.position.x"] == pytest.approx(0.5)
     assert end["start"]["rod.angle"] == pytest.approx(np.arcsin(0.5))
+
+
+@pytest.mark.parametrize("option", ["--start", "--set"])
+def test_an_angle_beyond_a_turn_without_a_unit_is_warned_of(option: str) -> None:
+    path = "rod.angle" if option == "--start" else "release_angle"
+    done = run("run", "simple-pendulum", "--t-end", "0.01", option, f"{path}=90")
+    assert f"Warning: {option} {path}: it is taken as 90 rad, which is 5156.62 degrees" in done.stderr
+    assert "write '90 deg'" in done.stderr
+    for value in ("90 deg", "3.1", "90 rad"):
+        assert "Warning" not in run("run", "simple-pendulum", "--t-end", "0.01", option, f"{path}={value}").stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no such device")
+@pytest.mark.parametrize("command", [["list"], ["--help"], ["list", "--json"]])
+def test_standard_output_that_is_full_is_said_without_a_traceback(command: list[str]) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "atwood", *command],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment(),
+            check=False,
+        )
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: standard output: it cannot be written (No space left on device).")
+    assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr

@@ -94,3 +94,23 @@ def test_hertz_do_not_say_whether_they_count_turns():
         parse_quantity("50 Hz", parse_unit("rad/s"), "body.spin.z")
     assert parse_quantity("50 Hz", parse_unit("1/s"), "x") == 50.0
     assert math.isclose(parse_quantity("50 rev/s", parse_unit("rad/s"), "x"), 100.0 * math.pi)
+
+
+@pytest.mark.parametrize(
+    ("text", "exponents"),
+    [
+        ("kg/(m s^2)", (1, -1, -2, 0)),
+        ("Wb", (1, 2, -2, -1)),
+        ("(m/s)^2", (0, 2, -2, 0)),
+        ("kg m/(s^2 (m/s))", (1, 0, -1, 0)),
+        ("1/(m s)", (0, -1, -1, 0)),
+    ],
+)
+def test_units_may_have_brackets(text, exponents):
+    assert parse_unit(text).exponents == exponents
+
+
+@pytest.mark.parametrize("text", ["(m", "m)", "()", "m (", "((m)", "m s)^2", "(m)^", "m1", "m//s", "^2", "m^2^2"])
+def test_units_that_cannot_be_read(text):
+    with pytest.raises(DeclarationError, match="cannot read the unit"):
+        parse_unit(text)

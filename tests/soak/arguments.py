@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import math
 import random
@@ -132,7 +133,7 @@ def check(seed: int) -> Trial:
 def make(attempt: Attempt) -> tuple[str, Finding | None]:
     """Make a bad call, and say what came of it."""
     said = f"{attempt.label} with {_shown(attempt.value)}"
-    with tempfile.TemporaryDirectory() as directory, warnings.catch_warnings():
+    with tempfile.TemporaryDirectory() as directory, contextlib.chdir(directory), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
             attempt.call.make(Path(directory), **{attempt.argument: attempt.value})

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
-from atwood.cli.errors import reporting_errors
+from atwood.cli.errors import FAILED, reporting_errors
 
 __all__ = ["main"]
 
@@ -26,7 +28,27 @@ def _version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
         ctx.exit()
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+class _Commands(click.Group):
+    """Commands whose output may have no place to go to."""
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run; standard output that is full, or closed, ends it with an exit code and no traceback."""
+        try:
+            try:
+                return super().main(*args, **extra)
+            finally:
+                sys.stdout.flush()
+        except OSError as error:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left in its buffer goes nowhere
+            if not isinstance(error, BrokenPipeError):
+                problem = f"it cannot be written ({error.strerror or error})"
+                click.echo(
+                    f"Error: {error.filename or 'standard output'}: {problem}. Write to another place.", err=True
+                )
+            sys.exit(FAILED)
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Show the version.")
 def main() -> None:
     """Mechanics from parts: what moves, how it moves, and with which forces.

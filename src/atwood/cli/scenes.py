@@ -6,6 +6,7 @@ import contextlib
 import importlib
 import importlib.util
 import inspect
+import math
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,12 +15,13 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from atwood.cli.libraries import all_libraries, declared_libraries
+from atwood.cli.output import warn
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
 
 if TYPE_CHECKING:
     from atwood.model.composite import Model
 
-__all__ = ["bundled_scenes", "find_scene", "pairs", "prepare"]
+__all__ = ["bundled_scenes", "find_scene", "pairs", "prepare", "warn_of_radians"]
 
 
 def bundled_scenes() -> dict[str, type[Model]]:
@@ -96,16 +98,51 @@ def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[
     scene, name = find_scene(text)
     for path, value in pairs(settings, "--set"):
         scene.set(path, value)
+        warn_of_radians(scene, path, [value], "--set")
     for path, value in pairs(starts, "--start"):
         if not isinstance(scene, Scene):
             raise UsageError("this is a model and no scene, and has no start of its own", where=name)
         if value.strip() != "free":
             scene.start[path] = value
+            warn_of_radians(scene, path, [value], "--start")
         elif path in scene.start:
             scene.guess[path] = scene.start.pop(path)
         else:
             raise UsageError("the scene fixes no such start value", where=path, advice=suggestion(path, scene.start))
     return scene, name
+
+
+def warn_of_radians(scene: Model, path: str, values: Iterable[object], option: str) -> None:
+    """Say that an angle without a unit is in radians, where it is beyond a turn, as degrees mostly are.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    path
+        Of a parameter, or of a start value.
+    values
+        Numbers, or texts with or without a unit.
+    option
+        Where they were given.
+    """
+    from atwood.model.flatten import unit_at
+    from atwood.model.units import split_quantity
+
+    owner, _, name = path.rpartition(".")
+    if option in ("--set", "--vary"):
+        part = scene[owner] if owner else scene
+        unit = part.parameter_specs()[name].unit if name in part.parameter_specs() else None
+    else:
+        unit = unit_at(scene, path)
+    if unit is None or unit.text != "rad":
+        return
+    for value in values:
+        number, given = (split_quantity(value) or (0.0, "")) if isinstance(value, str) else (value, "")
+        if not given and isinstance(number, (int, float)) and abs(number) > math.tau:
+            turns = f"{number:g} rad, which is {math.degrees(number):g} degrees"
+            warn(f"Warning: {option} {path}: it is taken as {turns}. If degrees are meant, write '{number:g} deg'.")
+            return
 
 
 def pairs(texts: Sequence[str], option: str) -> Iterator[tuple[str, str]]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import console, print_json, warn
-from atwood.cli.scenes import pairs, prepare
+from atwood.cli.scenes import pairs, prepare, warn_of_radians
 from atwood.errors import UsageError
 
 if TYPE_CHECKING:
@@ -72,6 +72,9 @@ def sweep_scene(request: SweepRequest) -> None:
     if not vary and not start:
         raise UsageError("nothing is varied", advice="Write --vary PATH=FROM:TO:COUNT or --vary-start PATH=A,B,C.")
     scene, name = prepare(request.scene, request.settings, request.starts)
+    for option, axes in (("--vary", vary), ("--vary-start", start)):
+        for path, values in axes.items():
+            warn_of_radians(scene, path, values, option)
     from atwood.study import sweep
 
     with _progress(request.progress, name) as progress:

@@ -16,7 +16,7 @@ from atwood.model.joining import find_end
 from atwood.model.scene import Scene
 from atwood.model.units import Unit, parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
 
-__all__ = ["FlatScene", "Part", "flatten"]
+__all__ = ["FlatScene", "Part", "flatten", "unit_at"]
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def _collect(
 def _number(value: Any, model: Model, key: str, prefix: str) -> float:
     """Return a start value in SI units; text must be in a unit of what it is for, where that is known."""
     path = prefix + key
-    wanted = _unit_at(model, key)
+    wanted = unit_at(model, key)
     if isinstance(value, Deferred):
         if wanted is not None and value.unit is not None and not value.unit.has_dimension_of(wanted):
             raise StartError(
@@ -175,8 +175,8 @@ def _number(value: Any, model: Model, key: str, prefix: str) -> float:
     return number
 
 
-def _unit_at(model: Component, key: str) -> Unit | None:
-    """Return the unit of the observable at a path; None if there is no such observable."""
+def unit_at(model: Component, key: str) -> Unit | None:
+    """Return the unit of the observable at a path within a model; None if there is no such observable."""
     component, steps = model, key.split(".")
     while steps[0] in component._children():
         component, steps = component._children()[steps[0]], steps[1:]

@@ -46,9 +46,10 @@ _BASE: dict[str, tuple[float, Exponents]] = {
     "C": (1.0, (0, 0, 1, 1)),
     "V": (1.0, (1, 2, -3, -1)),
     "T": (1.0, (1, 0, -2, -1)),
+    "Wb": (1.0, (1, 2, -2, -1)),
 }
 
-_FACTOR = re.compile(r"\s*([*/·\s]?)\s*([A-Za-z]+|1)(?:\s*(?:\^|\*\*)\s*(-?\d{1,2}))?")
+_TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*(-?\d{1,2})|([*/·()])|([A-Za-z]+|1))")
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
 
@@ -84,7 +85,8 @@ def parse_unit(text: str) -> Unit:
     Parameters
     ----------
     text
-        Unit names joined by ``*``, ``/`` or a space, each with an optional integer power.
+        Unit names, and brackets of them, joined by ``*``, ``/`` or a space, each with an optional integer power. A
+        ``/`` divides by what comes next alone: ``kg/m s^2`` is ``kg*s^2/m``, ``kg/(m s^2)`` a pressure.
 
     Raises
     ------
@@ -93,26 +95,68 @@ def parse_unit(text: str) -> Unit:
     """
     if text == "any":  # of a source, whose value takes the unit of the input that it drives
         return Unit(text, 1.0, (0, 0, 0, 0))
-    factor = 1.0
-    exponents = [0, 0, 0, 0]
-    position, first = 0, True
-    stripped = text.strip()
+    tokens = _tokens(text)
+    factor, exponents = _product(tokens, text)
+    if tokens:
+        raise _unreadable(text)
+    return Unit(text, factor, exponents)
+
+
+def _unreadable(text: str) -> DeclarationError:
+    return DeclarationError(f"cannot read the unit {text!r}", advice="Write it like 'kg*m^2', 'N/m' or 'kg/(m s^2)'.")
+
+
+def _tokens(text: str) -> list[str]:
+    """Return names, operators, brackets and powers (``^2``) in reverse order, so that the next is the last."""
+    found, position, stripped = [], 0, text.strip()
     while position < len(stripped):
-        match = _FACTOR.match(stripped, position)
-        if match is None or (not first and not match.group(1) and not stripped[position].isspace()):
-            raise DeclarationError(f"cannot read the unit {text!r}", advice="Write it like 'kg*m^2' or 'N/m'.")
-        operator, name, power_text = match.groups()
-        if name not in _BASE:
-            inside = f", in {text!r}" if name != stripped else ""
-            advice = suggestion(name, _BASE) or "Write it like 'kg*m^2' or 'N/m'."
-            raise DeclarationError(f"{name!r} is not a unit{inside}", advice=advice)
-        power = int(power_text or 1) * (-1 if operator == "/" else 1)
-        size, powers = _BASE[name]
+        match = _TOKEN.match(stripped, position)
+        if match is None:
+            raise _unreadable(text)
+        _, power, sign, name = match.groups()
+        if name and found and found[-1] not in "*/·(" and not stripped[position].isspace():
+            raise _unreadable(text)
+        found.append(f"^{power}" if power else sign or name)
+        position = match.end()
+    return found[::-1]
+
+
+def _product(tokens: list[str], text: str) -> tuple[float, Exponents]:
+    """Read factors up to the end, or up to a bracket that closes."""
+    factor, exponents = 1.0, (0, 0, 0, 0)
+    divides = needed = False
+    while tokens and (needed or tokens[-1] != ")"):
+        token = tokens.pop()
+        if token in "*/·" and not needed:
+            divides, needed = token == "/", True
+            continue
+        size, powers = _factor(token, tokens, text)
+        power = -1 if divides else 1
+        if tokens and tokens[-1].startswith("^"):
+            power *= int(tokens.pop()[1:])
         factor *= size**power
-        exponents = [e + power * p for e, p in zip(exponents, powers, strict=True)]
-        position, first = match.end(), False
-    a, b, c, d = exponents
-    return Unit(text, factor, (a, b, c, d))
+        a, b, c, d = (e + power * p for e, p in zip(exponents, powers, strict=True))
+        exponents = (a, b, c, d)
+        divides = needed = False
+    if needed:
+        raise _unreadable(text)
+    return factor, exponents
+
+
+def _factor(token: str, tokens: list[str], text: str) -> tuple[float, Exponents]:
+    """Read one name, or what is in brackets."""
+    if token == "(":
+        inside = _product(tokens, text) if tokens and tokens[-1] != ")" else None
+        if inside is None or not tokens or tokens.pop() != ")":
+            raise _unreadable(text)
+        return inside
+    if token in _BASE:
+        return _BASE[token]
+    if not token[0].isalpha():
+        raise _unreadable(text)
+    within = f", in {text!r}" if token != text.strip() else ""
+    advice = suggestion(token, _BASE) or "Write it like 'kg*m^2' or 'N/m'."
+    raise DeclarationError(f"{token!r} is not a unit{within}", advice=advice)
 
 
 def parse_si_unit(text: str) -> Unit:
