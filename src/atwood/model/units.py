@@ -108,7 +108,8 @@ def _unreadable(text: str) -> DeclarationError:
 
 def _tokens(text: str) -> list[str]:
     """Return names, operators, brackets and powers (``^2``) in reverse order, so that the next is the last."""
-    found, position, stripped = [], 0, text.strip()
+    found: list[str] = []
+    position, stripped = 0, text.strip()
     while position < len(stripped):
         match = _TOKEN.match(stripped, position)
         if match is None:
