@@ -12,12 +12,18 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from atwood.expr.analysis import count_operations
 from atwood.expr.emission import Emitter, Term, share_products, sum_terms, terms_of
 from atwood.expr.graph import Expression
-from atwood.expr.polynomial import Expansion, Polynomial, TooLargeError, expand
+from atwood.expr.polynomial import Expansion, Polynomial, TooLargeError, expand, volume
 from atwood.expr.trigonometry import join_squares, products_of_waves, sum_of_waves
 
 _WEIGHTS = {"add": 1, "sub": 1, "mul": 1, "neg": 1, "div": 4, "sqrt": 6}
 _OTHER_WEIGHT = 12
 _MIXING_EFFORT = 200_000
+
+_BUDGET = 100_000
+"""So many operations on single terms are spent on rows: several times what it takes where it makes them shorter."""
+
+_WRITTEN = 8
+"""So often each normal form is written."""
 
 
 def cost(rows: Sequence[Expression], parameters: Collection[Expression]) -> int:
@@ -91,15 +97,22 @@ def _candidates(
 ) -> Iterator[list[Expression]]:
     """Yield the rows written in other ways."""
     try:
-        expansion = expand(rows, angles, parameters, limit)
+        expansion = expand(rows, angles, parameters, limit, _BUDGET)
     except TooLargeError:
-        return
+        try:
+            expansion = expand(rows, angles, parameters, limit, _BUDGET, whole=True)
+        except TooLargeError:
+            return
     if sum(map(len, expansion.rows)) > 2 * lowest:
         return
     for normal_form in _normal_forms(expansion, limit):
         terms = sum(len(polynomial) for polynomial in normal_form)
         if terms > 10 * limit or terms - len(rows) >= lowest:
             continue
+        try:
+            expansion.spend(_WRITTEN * sum(map(volume, normal_form)))
+        except TooLargeError:
+            return
         graph = rows[0].graph
         for single_angles in (False, True):
             emitter = Emitter(graph, expansion, single_angles)
@@ -125,6 +138,7 @@ def _normal_forms(expansion: Expansion, limit: int) -> Iterator[list[Polynomial]
     seen: list[list[Polynomial]] = []
     for form in forms:
         try:
+            expansion.spend(sum(map(volume, expansion.rows)))
             made = [form(row) for row in expansion.rows]
         except TooLargeError:
             continue

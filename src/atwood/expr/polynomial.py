@@ -33,7 +33,12 @@ _CANCELLED = 4e-15
 
 
 class TooLargeError(Exception):
-    """The polynomial form has more terms than is worth while."""
+    """The polynomial form has more terms than is worth while, or takes more work."""
+
+
+def volume(polynomial: Polynomial) -> int:
+    """Return the number of terms, with those in parameters counted singly."""
+    return sum(map(len, polynomial.values()))
 
 
 class Atom(NamedTuple):
@@ -65,6 +70,9 @@ class Expansion:
         The atoms that depend on parameters alone, by number.
     rows
         One polynomial for each expression that was expanded.
+    budget
+        How many operations on single terms may still be spent: coefficients of general directions and positions have
+        thousands of terms in parameters.
     """
 
     angles: tuple[Expression, ...]
@@ -72,6 +80,13 @@ class Expansion:
     constants: list[Expression] = field(default_factory=list)
     rows: list[Polynomial] = field(default_factory=list)
     numbers: dict[Atom | Expression, int] = field(default_factory=dict)
+    budget: int = 0
+
+    def spend(self, operations: int) -> None:
+        """Take operations off the budget, or raise if there are not so many left."""
+        self.budget -= operations
+        if self.budget < 0:
+            raise TooLargeError
 
     def number(self, atom: Atom) -> int:
         """Return the number of an atom, new or not."""
@@ -150,7 +165,12 @@ def multiply_polynomials(a: Polynomial, b: Polynomial, limit: int) -> Polynomial
 
 
 def expand(
-    rows: Sequence[Expression], angles: Collection[Expression], parameters: Collection[Expression], limit: int
+    rows: Sequence[Expression],
+    angles: Collection[Expression],
+    parameters: Collection[Expression],
+    limit: int,
+    budget: int = 1_000_000,
+    whole: bool = False,
 ) -> Expansion:
     """Write expressions as polynomials.
 
@@ -164,19 +184,26 @@ def expand(
         The symbols that go into coefficients.
     limit
         The largest number of monomials.
+    budget
+        How many operations on single terms this may take.
+    whole
+        Whether what depends on parameters alone is an atom and not looked into.
 
     Raises
     ------
     TooLargeError
         If a polynomial becomes larger than the limit, or has coefficients that are not finite.
     """
-    expansion = Expansion(tuple(angles))
+    expansion = Expansion(tuple(angles), budget=budget)
     nodes = live(rows)
     moving = varying(nodes, parameters) | {angle.index for angle in angles}
-    wanted = _wanted(rows, nodes, moving, expansion.angles)
+    atoms = {node.index for node in nodes if node.index not in moving} if whole else set[int]()
+    wanted = _wanted(rows, nodes, moving, atoms | {angle.index for angle in angles})
     known: dict[int, Polynomial] = {}
     for node in nodes:
-        if node.index in wanted:
+        if node.index in atoms and not node.is_constant:
+            known[node.index] = {ONE: {((expansion.constant_number(node), 1),): 1.0}}
+        elif node.index in wanted:
             known[node.index] = _expand_node(expansion, node, moving, known, limit)
             if len(known[node.index]) > limit:
                 raise TooLargeError
@@ -185,11 +212,10 @@ def expand(
 
 
 def _wanted(
-    rows: Iterable[Expression], nodes: Sequence[Expression], moving: set[int], angles: Collection[Expression]
+    rows: Iterable[Expression], nodes: Sequence[Expression], moving: set[int], leaves: Collection[int]
 ) -> set[int]:
     """Return the indices of the nodes whose polynomials are needed."""
     wanted = {row.index for row in rows}
-    leaves = {angle.index for angle in angles}
     for node in reversed(nodes):
         if node.index not in wanted or node.index in leaves:
             continue
@@ -219,8 +245,10 @@ def _expand_node(
     if operation == "neg":
         return add_polynomials({}, arguments[0], -1.0)
     if operation in ("add", "sub"):
+        expansion.spend(volume(arguments[0]) + volume(arguments[1]))
         return add_polynomials(arguments[0], arguments[1], 1.0 if operation == "add" else -1.0)
     if operation == "mul":
+        expansion.spend(volume(arguments[0]) * volume(arguments[1]))
         return multiply_polynomials(arguments[0], arguments[1], limit)
     if operation == "div":
         return multiply_polynomials(arguments[0], _inverse(expansion, node.arguments[1], moving, arguments[1]), limit)
