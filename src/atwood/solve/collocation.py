@@ -37,7 +37,7 @@ _SWEEPS = 60
 _PATIENCE = 8
 """In so many sweeps changes must become clearly smaller."""
 
-_CLOSE = 1e-4
+_CLOSE = 3e-2
 """Once a sweep changes less, one Newton step is enough to project what it gave."""
 
 _SETTLED = 1e-14
@@ -130,7 +130,7 @@ def find_arc(
         with np.errstate(all="ignore"):
             known = None if guess is None else guess(times)
             begin = known or (np.repeat(q[:, None], _POINTS, 1), np.repeat(u[:, None], _POINTS, 1))
-            return _settle(plan, (t, q, u), end, times, begin)
+            return _settle(plan, (t, q, u), end, times, begin, known is None)
     except AtwoodError:  # a state without a value, or without accelerations: nothing goes on smoothly here
         return None
 
@@ -149,7 +149,12 @@ _REACH = legendre.legvander(legendre.leggauss(_POINTS)[0], _POINTS)
 
 
 def _settle(
-    plan: Plan, begin: tuple[float, FloatArray, FloatArray], end: float, times: FloatArray, guess: States
+    plan: Plan,
+    begin: tuple[float, FloatArray, FloatArray],
+    end: float,
+    times: FloatArray,
+    guess: States,
+    is_far: bool,
 ) -> Arc | None:
     """Integrate the rates at the points again and again until nothing changes."""
     t, q, u = begin
@@ -159,7 +164,7 @@ def _settle(
     last, sizes = np.inf, []
     places, speeds = guess
     for _ in range(_SWEEPS):
-        held = _held(plan, times, places, speeds, last > _CLOSE)
+        held = _held(plan, times, places, speeds, is_far)
         accelerations = accelerations_at(plan.assembly, plan.assembly.form, times, held.coordinates, held.speeds, kept)
         turned = half * (integral @ accelerations.T)
         turned[0] += u
@@ -179,7 +184,7 @@ def _settle(
         if min(change, 10.0 * left) < _SETTLED or (change < _ROUNDED and change >= 0.5 * last):
             rest = np.sum(np.abs(moved[-_LAST:]), axis=0), np.sum(np.abs(turned[-_LAST:]), axis=0)
             return Arc(t, end, moved, turned, max(min(change, left), _size(plan, *rest)))
-        last = change
+        last, is_far = change, change > _CLOSE
     return None
 
 

@@ -135,20 +135,22 @@ def crossing(measure: Nearness, arc: Arc) -> tuple[float, float] | None:
 
 _POINTS = legendre.leggauss(12)
 
+_SERIES = (np.arange(12) + 0.5)[:, None] * (legendre.legvander(_POINTS[0], 11) * _POINTS[1][:, None]).T
+"""Gives coefficients of Legendre polynomials from values at the points."""
+
 
 def _sign_change(away: FloatArray) -> float | None:
     """Return where a measure at the points of Gauss and Legendre falls to zero to rise again; None if it does not.
 
     What falls to zero and rises again is smooth if its sign changes there.
     """
-    x, weights = _POINTS
+    x = _POINTS[0]
     order, least = np.arange(len(x)), int(np.argmin(away))
     if not np.all(np.isfinite(away)) or least in (0, len(x) - 1):
         return None
-    series_of = (order + 0.5)[:, None] * (legendre.legvander(x, len(x) - 1) * weights[:, None]).T
     smoothest, found = np.inf, None
     for first in (least, least + 1):  # the right one of two is that whose coefficients die away
-        series = series_of @ np.where(order < first, -away, away)
+        series = _SERIES @ np.where(order < first, -away, away)
         roots = legendre.legroots(series)
         real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
         inside = real[(real > x[first - 1] - 1e-9) & (real < x[first] + 1e-9)]

@@ -7,12 +7,16 @@ entry, and one column for each state.
 
 from __future__ import annotations
 
+import ctypes
 import heapq
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from atwood.kernels.llvm_elimination import LISTS, elimination_functions
 
 __all__ = ["Augmented", "Borders", "Elimination", "Normal", "Pattern"]
 
@@ -78,18 +82,6 @@ class Pattern:
         return Pattern(number[self.rows[which]], self.columns[which], (len(kept), self.shape[1])), which
 
 
-@dataclass(frozen=True)
-class _Step:
-    """One step of an elimination: the pivot, the entries below it, and which products change which entries."""
-
-    pivot: int
-    others: IndexArray
-    below: IndexArray
-    first: IndexArray
-    second: IndexArray
-    changed: IndexArray
-
-
 class Elimination:
     """Symmetric elimination ``A = L D L^T`` in an order that adds few entries.
 
@@ -120,35 +112,41 @@ class Elimination:
         heap = [(i in last, len(around[i]), i) for i in range(size)]
         heapq.heapify(heap)
         gone = [False] * size
-        self.steps: list[_Step] = []
+        lists: dict[str, list[int]] = {name: [] for name in LISTS}
         while heap:
             _, degree, p = heapq.heappop(heap)
             if gone[p] or degree != len(around[p]):
                 continue
             gone[p] = True
-            self._eliminate(p, around)
+            self._eliminate(p, around, lists)
             for j in around[p]:
                 heapq.heappush(heap, (j in last, len(around[j]), j))
+        begins = [*lists["begins"], len(lists["below"])]
+        lists["begins"], lists["starts"] = begins, [*lists["starts"], len(lists["changed"])]
+        self._touched = max((b - a for a, b in pairwise(begins)), default=0)
+        self._lists = [np.array(one, dtype=np.int64) for one in lists.values()]
+        self._addresses = (ctypes.c_void_p * len(LISTS))(*[one.ctypes.data for one in self._lists])
 
     def _place(self, i: int, j: int) -> int:
         return self.number.setdefault((i, j) if i < j else (j, i), len(self.number))
 
-    def _eliminate(self, p: int, around: list[set[int]]) -> None:
+    def _eliminate(self, p: int, around: list[set[int]], lists: dict[str, list[int]]) -> None:
         others = sorted(around[p])
         for j in others:
             around[j].discard(p)
-        below = [self._place(p, j) for j in others]
-        first, second, changed = [], [], []
+        lists["pivot"].append(p)
+        lists["begins"].append(len(lists["below"]))
+        lists["starts"].append(len(lists["changed"]))
+        lists["others"] += others
+        lists["below"] += [self._place(p, j) for j in others]
         for a, j in enumerate(others):
             around[j].update(others[a + 1 :])
             for b in range(a, len(others)):
                 around[others[b]].add(j)
-                first.append(a)
-                second.append(b)
-                changed.append(self._place(j, others[b]))
+                lists["first"].append(a)
+                lists["second"].append(b)
+                lists["changed"].append(self._place(j, others[b]))
             around[j].discard(j)
-        arrays = (np.array(one, dtype=np.intp) for one in (others, below, first, second, changed))
-        self.steps.append(_Step(p, *arrays))
 
     def factorise(self, entries: FloatArray) -> FloatArray:
         """Return the factors, from entries by their `number`; where a pivot is zero nothing finite comes out.
@@ -158,27 +156,19 @@ class Elimination:
         entries
             The matrix, shape (len(number), states); overwritten.
         """
-        with np.errstate(all="ignore"):
-            for step in self.steps:
-                if len(step.others):
-                    values = entries[step.below]
-                    shares = values / entries[step.pivot]
-                    entries[step.changed] -= shares[step.first] * values[step.second]
-                    entries[step.below] = shares
+        room = np.empty((self._touched, entries.shape[1]))
+        self._call(elimination_functions()[0], entries, room)
         return entries
 
     def solve(self, factors: FloatArray, right: FloatArray) -> FloatArray:
         """Return the solution for each state, shape (size, states)."""
-        found = right.copy()
-        with np.errstate(all="ignore"):
-            for step in self.steps:
-                if len(step.others):
-                    found[step.others] -= factors[step.below] * found[step.pivot]
-            found /= factors[: self.size]
-            for step in reversed(self.steps):
-                if len(step.others):
-                    found[step.pivot] -= np.einsum("is,is->s", factors[step.below], found[step.others])
+        found = np.array(right, dtype=np.float64, order="C")
+        self._call(elimination_functions()[1], factors, found)
         return found
+
+    def _call(self, function: Callable[..., Any], entries: FloatArray, values: FloatArray) -> None:
+        places = entries.ctypes.data, values.ctypes.data
+        function(self._addresses, *places, len(self._lists[0]), self.size, entries.shape[1])
 
 
 class Normal:
