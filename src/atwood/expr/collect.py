@@ -22,6 +22,9 @@ _MIXING_EFFORT = 200_000
 _BUDGET = 100_000
 """So many operations on single terms are spent on rows: several times what it takes where it makes them shorter."""
 
+_LONGEST = 1
+"""Beyond the budget, what depends on parameters alone is taken whole where it has more terms."""
+
 _WRITTEN = 8
 """So often each normal form is written."""
 
@@ -100,7 +103,7 @@ def _candidates(
         expansion = expand(rows, angles, parameters, limit, _BUDGET)
     except TooLargeError:
         try:
-            expansion = expand(rows, angles, parameters, limit, _BUDGET, whole=True)
+            expansion = expand(rows, angles, parameters, limit, _BUDGET, _LONGEST)
         except TooLargeError:
             return
     if sum(map(len, expansion.rows)) > 2 * lowest:

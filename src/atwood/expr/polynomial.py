@@ -73,6 +73,8 @@ class Expansion:
     budget
         How many operations on single terms may still be spent: coefficients of general directions and positions have
         thousands of terms in parameters.
+    taken
+        What was taken whole, by its terms up to a factor: the value, and its first coefficient.
     """
 
     angles: tuple[Expression, ...]
@@ -81,12 +83,21 @@ class Expansion:
     rows: list[Polynomial] = field(default_factory=list)
     numbers: dict[Atom | Expression, int] = field(default_factory=dict)
     budget: int = 0
+    taken: dict[tuple[tuple[Monomial, float], ...], tuple[Expression, float]] = field(default_factory=dict)
 
     def spend(self, operations: int) -> None:
         """Take operations off the budget, or raise if there are not so many left."""
         self.budget -= operations
         if self.budget < 0:
             raise TooLargeError
+
+    def taken_whole(self, node: Expression, coefficient: Coefficient) -> Coefficient:
+        """Return a coefficient as an atom, or as a multiple of one that was taken before."""
+        terms = sorted(coefficient.items())
+        leading = terms[0][1]
+        shape = tuple((monomial, value / leading) for monomial, value in terms)
+        first, factor = self.taken.setdefault(shape, (node, leading))
+        return {((self.constant_number(first), 1),): leading / factor}
 
     def number(self, atom: Atom) -> int:
         """Return the number of an atom, new or not."""
@@ -170,7 +181,7 @@ def expand(
     parameters: Collection[Expression],
     limit: int,
     budget: int = 1_000_000,
-    whole: bool = False,
+    longest: int | None = None,
 ) -> Expansion:
     """Write expressions as polynomials.
 
@@ -186,8 +197,8 @@ def expand(
         The largest number of monomials.
     budget
         How many operations on single terms this may take.
-    whole
-        Whether what depends on parameters alone is an atom and not looked into.
+    longest
+        What depends on parameters alone is an atom where it has more terms than this.
 
     Raises
     ------
@@ -197,14 +208,13 @@ def expand(
     expansion = Expansion(tuple(angles), budget=budget)
     nodes = live(rows)
     moving = varying(nodes, parameters) | {angle.index for angle in angles}
-    atoms = {node.index for node in nodes if node.index not in moving} if whole else set[int]()
-    wanted = _wanted(rows, nodes, moving, atoms | {angle.index for angle in angles})
+    wanted = _wanted(rows, nodes, moving, expansion.angles)
     known: dict[int, Polynomial] = {}
     for node in nodes:
-        if node.index in atoms and not node.is_constant:
-            known[node.index] = {ONE: {((expansion.constant_number(node), 1),): 1.0}}
-        elif node.index in wanted:
+        if node.index in wanted:
             known[node.index] = _expand_node(expansion, node, moving, known, limit)
+            if longest is not None and node.index not in moving and volume(known[node.index]) > longest:
+                known[node.index] = {ONE: expansion.taken_whole(node, known[node.index][ONE])}
             if len(known[node.index]) > limit:
                 raise TooLargeError
     expansion.rows = [known[row.index] for row in rows]
@@ -212,10 +222,11 @@ def expand(
 
 
 def _wanted(
-    rows: Iterable[Expression], nodes: Sequence[Expression], moving: set[int], leaves: Collection[int]
+    rows: Iterable[Expression], nodes: Sequence[Expression], moving: set[int], angles: Collection[Expression]
 ) -> set[int]:
     """Return the indices of the nodes whose polynomials are needed."""
     wanted = {row.index for row in rows}
+    leaves = {angle.index for angle in angles}
     for node in reversed(nodes):
         if node.index not in wanted or node.index in leaves:
             continue
