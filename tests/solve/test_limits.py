@@ -57,17 +57,17 @@ def test_a_crossing_is_left_when_the_time_is_used_up() -> None:
     assembly = assemble(FourBarRow(windows=10))
     simulate(assembly, t_end=0.01)
     for limit in (0.1, 0.3):
-        began = time.perf_counter()
+        began = time.process_time()
         result = simulate(assembly, max_seconds=limit, t_end=100.0)
-        assert time.perf_counter() - began < limit + 0.3
+        assert time.process_time() - began < limit + 0.3
         assert result.status == "time_limit"
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_run_without_time_for_its_start_has_nothing_and_says_so(form: str) -> None:
-    began = time.perf_counter()
+    began = time.process_time()
     result: Result = simulate(FourBarRow(windows=60), form=form, max_seconds=1e-9)
-    assert time.perf_counter() - began < 0.8
+    assert time.process_time() - began < 0.8
     assert result.status == "time_limit"
     assert "before the start was found" in result.message
     with pytest.raises(ResultError, match=r"there is nothing in it: the limit of 1e-09 s was used up.*more time"):
