@@ -71,6 +71,7 @@ from atwood.model.scene import Scene
 from atwood.model.vector import Vector, as_vector, cross, dot, norm
 
 if TYPE_CHECKING:
+    from atwood.checking import CheckReport, check
     from atwood.expr.formula import Formula, formula
     from atwood.model.store import from_data, load_scene, save_scene, to_data
     from atwood.pipeline import Assembly, assemble, simulate
@@ -91,6 +92,7 @@ __all__ = [
     "Assembly",
     "AtwoodError",
     "BodyInertia",
+    "CheckReport",
     "Comparison",
     "ComparisonRow",
     "Component",
@@ -135,6 +137,7 @@ __all__ = [
     "assemble",
     "atan",
     "atan2",
+    "check",
     "compare",
     "connect",
     "connector",
@@ -189,6 +192,7 @@ __all__ = [
 
 _LATER = {
     "Assembly": "atwood.pipeline",
+    "CheckReport": "atwood.checking",
     "Comparison": "atwood.study",
     "ComparisonRow": "atwood.study",
     "Formula": "atwood.expr.formula",
@@ -198,6 +202,7 @@ _LATER = {
     "Sweep": "atwood.study",
     "animate": "atwood.view",
     "assemble": "atwood.pipeline",
+    "check": "atwood.checking",
     "compare": "atwood.study",
     "formula": "atwood.expr.formula",
     "from_data": "atwood.model.store",

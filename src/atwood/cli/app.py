@@ -61,6 +61,7 @@ def main() -> None:
     atwood run double-pendulum           its motion and its forces
     atwood compare double-pendulum       what each form costs for which error
     atwood sweep double-pendulum --vary mass2=0.5:2:16
+    atwood check my_parts.py             whether components of one's own are sound
     """  # noqa: D301 - click reads the backspace, not the two letters
 
 
@@ -241,3 +242,20 @@ def sweep_command(scene: str, as_json: bool, **options: Any) -> None:
     from atwood.cli.sweeping import SweepRequest, sweep_scene
 
     sweep_scene(SweepRequest(scene=scene, as_json=as_json, **options))
+
+
+@main.command("check", short_help="Check components of one's own.")
+@click.argument("target", metavar="TARGET")
+@click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output.")
+@click.option("--run/--no-run", default=True, help="Also run them on a test bench, in both forms: about a second each.")
+@reporting_errors
+def check_command(target: str, as_json: bool, run: bool) -> None:
+    """Check the components of TARGET as the parts of the library are checked.
+
+    TARGET is FILE.py for all components that the file defines, FILE.py:NAME for one, or the name of a library's part.
+    Units of laws, joints against constraints, forces against energies, observables, both forms, all spaces. The exit
+    code is 1 if something is wrong.
+    """
+    from atwood.cli.checking import check_components
+
+    check_components(target, as_json, run)

@@ -158,7 +158,7 @@ def pairs(texts: Sequence[str], option: str) -> Iterator[tuple[str, str]]:
 
 
 def _scene_in_file(file: Path, name: str) -> Model:
-    module = _load(file)
+    module = load_file(file)
     where = f"{file}:{name}"
     if not hasattr(module, name):
         names = [*_candidates(module), *_functions(module)]
@@ -168,7 +168,7 @@ def _scene_in_file(file: Path, name: str) -> Model:
 
 def _only_scene(file: Path) -> tuple[Model, str]:
     """Return the scene of a file that defines just one."""
-    module = _load(file)
+    module = load_file(file)
     names = list(_candidates(module))
     if len(names) != 1:
         functions = ", ".join(_functions(module))
@@ -219,7 +219,7 @@ def _as_scene(value: Any, file: Path, where: str) -> Model:
     return value
 
 
-def _load(file: Path) -> ModuleType:
+def load_file(file: Path) -> ModuleType:
     """Run a file as a module; what it prints goes to standard error."""
     if not file.is_file():
         raise UsageError("there is no such file", where=str(file))

@@ -1,0 +1,234 @@
+"""Forces against energies: what a part's loads, potentials and Rayleigh functions say of each other, on numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.checking.report import Finding
+from atwood.consistency.joints import Unknown, attempt
+from atwood.consistency.trials import Pose, Trial, nudged
+from atwood.model.connectors import Motion
+from atwood.model.contributions import Load
+from atwood.model.laws import Law
+from atwood.model.vector import Vector, cross
+
+__all__ = ["Wrench", "energy_forces", "in_motion", "load_forces", "ways", "wrong_forces"]
+
+TOLERANCE = 1e-5
+
+Wrench = NDArray[np.float64]
+"""Force and torque on each connector along its ways to move, one after another."""
+
+
+def wrong_forces(trial: Trial, mode: str) -> Iterator[Finding | None]:
+    """Yield, for each comparison of forces and energies, what is wrong, or None.
+
+    Parameters
+    ----------
+    trial
+        The component in a random state.
+    mode
+        Its mode.
+    """
+    acting = [law for law in trial.component._laws.values() if law.holds_in(trial.space.name) and law.acts_in(mode)]
+    for law in acting:
+        try:
+            if law.kind == "dissipation":
+                yield _of_dissipation(trial, law)
+                yield from _anchored(trial, law, of_velocities=True)
+            elif law.kind == "potential":
+                yield from _anchored(trial, law)
+            elif law.kind == "force":
+                yield from _of_loads(trial, law, acting)
+        except Unknown:
+            continue
+
+
+def in_motion(trial: Trial, poses: Mapping[str, Pose] | None = None, speed: float = 1.0) -> Any:
+    """Return the component on numbers, with connectors that move as in the trial, so many times as fast."""
+    found: dict[str, Motion] = {}
+    for name, pose in (poses or trial.poses).items():
+        found[name] = trial.motion(name, pose, trial.going[name] * speed, trial.turning[name] * speed)
+    grips = {name: (value, rate * speed) for name, (value, rate) in trial.grips.items()}
+    return replace(trial, grips=grips).bound(0.0, poses or trial.poses, found)
+
+
+def energy_forces(trial: Trial, law: Law) -> Wrench:
+    """Return the forces of an energy: minus its differences along each way in which each connector can move."""
+    found = []
+    for name, pose in trial.poses.items():
+        for column in range(ways(trial, name)):
+            size = 1e-5 * (trial.length if column < len(trial.space.basis) else 1.0)
+            ends = []
+            for by in (size, -size):
+                poses = {**trial.poses, name: nudged(pose, column, by, trial.space)}
+                ends.append(attempt(getattr(in_motion(trial, poses), law.name))[0])
+            found.append((ends[1] - ends[0]) / (2.0 * size))
+    return np.array(found)
+
+
+def ways(trial: Trial, name: str) -> int:
+    """Return in how many ways a connector can move."""
+    turns = {"line": 0, "plane": 1, "space": 3}[trial.space.name] if trial.is_frame(name) else 0
+    return len(trial.space.basis) + turns
+
+
+def load_forces(trial: Trial, law: Law) -> Wrench:
+    """Return the loads of a law as forces on each connector along its ways to move.
+
+    Raises
+    ------
+    Unknown
+        If it has none there, or returns something else.
+    """
+    try:
+        loads = list(getattr(in_motion(trial), law.name)())
+        totals: dict[str, tuple[Vector, Vector]] = {}
+        for one in loads:
+            assert isinstance(one, Load)
+            force, torque = totals.get(one.at.name, (Vector(), Vector()))
+            totals[one.at.name] = force + one.force, torque + one.torque
+    except Exception as error:  # what is amiss is said when the law is read
+        raise Unknown from error
+    found: list[float] = []
+    for name in trial.poses:
+        force, torque = totals.get(name, (Vector(), Vector()))
+        components = [*trial.space.components(force)]
+        if ways(trial, name) > len(trial.space.basis):
+            components += [-torque.y] if trial.space.name == "plane" else [*torque]
+        found += [float(one) for one in components]
+    return np.array(found)
+
+
+def _speeds(trial: Trial) -> Wrench:
+    """Return the velocities of connectors along their ways to move."""
+    found: list[float] = []
+    for name in trial.poses:
+        found += [float(one) for one in trial.space.components(trial.going[name])]
+        if ways(trial, name) > len(trial.space.basis):
+            spin = trial.turning[name]
+            found += [-spin.y] if trial.space.name == "plane" else [*spin]
+    return np.array(found)
+
+
+def _of_dissipation(trial: Trial, law: Law) -> Finding | None:
+    """Refuse a Rayleigh function that is negative, or gives forces that drive: they have to take power away."""
+    values = [attempt(getattr(in_motion(trial, speed=speed), law.name))[0] for speed in (1.0, 1.001, 0.999)]
+    power = (values[1] - values[2]) / 0.002  # v . dR/dv, which is what the forces take
+    scale = abs(values[0]) + abs(power)
+    for what, value in (("it is negative", values[0]), ("its forces drive instead of braking", power)):
+        if value < -TOLERANCE * scale:
+            message = f"{what} ({value:.3g} W): a Rayleigh function is half the power that is lost"
+            return Finding("failure", "dissipation", law.name, trial.space.name, message)
+    return None
+
+
+def _of_loads(trial: Trial, law: Law, acting: list[Law]) -> Iterator[Finding | None]:
+    """Compare loads with potentials, with what is observed of energies, and with each other."""
+    loads, space = load_forces(trial, law), trial.space.name
+    size = float(np.abs(loads).max(initial=0.0))
+    if size == 0.0:
+        return
+    for other in acting:
+        if other.kind == "potential":
+            forces = energy_forces(trial, other)
+            for off, what in ((loads + forces, "undo"), (loads - forces, "are once more")):
+                if np.abs(off).max() < TOLERANCE * size:
+                    message = f"its loads {what} the forces of the potential {other.name!r}, which acts by itself"
+                    yield Finding("failure", "forces", law.name, space, message)
+                    return
+    yield None
+    power, still = float(loads @ _speeds(trial)), _loads_at_rest(trial, law)
+    if still is not None and np.abs(still - loads).max() < TOLERANCE * size and not trial.inputs:
+        for other in trial.component.laws("observable"):
+            if other.options.unit == "J" and other.holds_in(space):
+                yield _of_observed_energy(trial, law, other, power, loads)
+    yield from _resultant(trial, law, loads)
+
+
+def _loads_at_rest(trial: Trial, law: Law) -> Wrench | None:
+    still = {name: Vector() for name in trial.going}
+    try:
+        return load_forces(replace(trial, going=still, turning=still), law)
+    except Unknown:
+        return None
+
+
+def _of_observed_energy(trial: Trial, law: Law, energy: Law, power: float, loads: Wrench) -> Finding | None:
+    """Refuse loads that grow an energy that the part reports by what they put out, and not by what they take."""
+    try:
+        forces = energy_forces(trial, energy)
+    except Unknown:
+        return None
+    size = float(np.abs(loads).max())
+    if np.abs(forces + loads).max() < TOLERANCE * size:
+        message = (
+            f"its loads are the derivatives of the energy {energy.name!r} with the wrong sign: they have to be minus"
+        )
+        return Finding("failure", "forces", law.name, trial.space.name, message)
+    return None
+
+
+def _resultant(trial: Trial, law: Law, loads: Wrench) -> Iterator[Finding | None]:
+    """Note loads that do not cancel: what they push against is not among the connectors."""
+    force, torque = _sum(trial, loads)
+    size = float(np.abs(loads).max())
+    for what, total, scale in (("resultant force", force, size), ("resultant torque", torque, size * _reach(trial))):
+        if np.abs(total).max(initial=0.0) > 1e-6 * scale:
+            message = f"its loads have a {what}, so that they act against the world: is a reaction missing?"
+            yield Finding("note", "reactions", law.name, trial.space.name, message)
+            return
+
+
+def _sum(trial: Trial, loads: Wrench) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the sum of forces and of torques about the origin."""
+    force, torque, at = Vector(), Vector(), 0
+    for name, pose in trial.poses.items():
+        count = len(trial.space.basis)
+        one = trial.space.vector(tuple(loads[at : at + count]))
+        at += count
+        own = loads[at : at + ways(trial, name) - count]
+        at += len(own)
+        turning = Vector(*own) if len(own) == 3 else Vector(0.0, -own[0], 0.0) if len(own) else Vector()
+        force, torque = force + one, torque + cross(pose.position, one) + turning
+    return np.array([float(c) for c in force]), np.array([float(c) for c in torque])
+
+
+def _reach(trial: Trial) -> float:
+    return max([trial.length, *(abs(float(c)) for pose in trial.poses.values() for c in pose.position)])
+
+
+def _anchored(trial: Trial, law: Law, of_velocities: bool = False) -> Iterator[Finding | None]:
+    """Note an energy that changes when the whole is moved and turned, or that feels a motion of the whole."""
+    if of_velocities:
+        drift, spin = Vector(0.3, -0.5, 0.4), Vector(0.2, 0.6, -0.3)
+        drift = trial.space.vector(trial.space.components(drift)) * trial.length
+        spin = spin if trial.space.name == "space" else Vector(0.0, spin.y, 0.0) if trial.frames else Vector()
+        going = {name: drift + _in_space(trial, cross(spin, pose.position)) for name, pose in trial.poses.items()}
+        grips = {name: (value, 0.0) for name, (value, _) in trial.grips.items()}
+        whole = replace(trial, going=going, turning=dict.fromkeys(trial.poses, spin), grips=grips)
+        value = attempt(getattr(in_motion(whole), law.name))[0]
+        usual = attempt(getattr(in_motion(trial), law.name))[0]
+        changed = abs(value) > 1e-6 * (abs(usual) + abs(value))
+        what = "it takes power from a motion of the whole scene"
+    else:
+        forces = energy_forces(trial, law)
+        force, torque = _sum(trial, forces)
+        size = float(np.abs(forces).max(initial=0.0))
+        changed = bool(np.abs(force).max() > 1e-5 * size)
+        changed |= trial.space.has_rotation and bool(np.abs(torque).max() > 1e-5 * size * _reach(trial))
+        what = "it changes when the whole scene is moved or turned"
+    if changed and not trial.grips:
+        message = f"{what}: it acts against the world"
+        yield Finding("note", "reactions", law.name, trial.space.name, message)
+    else:
+        yield None
+
+
+def _in_space(trial: Trial, vector: Vector) -> Vector:
+    return trial.space.vector(trial.space.components(vector))

@@ -1,0 +1,93 @@
+"""What a check of a component found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+__all__ = ["CheckReport", "Finding"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that a check found.
+
+    Attributes
+    ----------
+    gravity
+        ``"failure"`` for what is wrong; ``"note"`` for what may be meant, or could not be looked at.
+    test
+        Which test found it, such as ``"units"``.
+    law
+        The law that it is about; empty for the component as a whole.
+    space
+        ``"line"``, ``"plane"`` or ``"space"``; empty where it does not matter.
+    message
+        What was found.
+    """
+
+    gravity: Literal["failure", "note"]
+    test: str
+    law: str
+    space: str
+    message: str
+
+    def __str__(self) -> str:
+        place = ", ".join(word for word in (self.law, self.space) if word)
+        return f"{self.gravity} ({self.test}{': ' if place else ''}{place}): {self.message}"
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """What `atwood.check` found of a component.
+
+    Attributes
+    ----------
+    component
+        Name of its class.
+    spaces
+        The spaces that it says it exists in, all of which were looked at.
+    tests
+        How many comparisons each test made.
+    findings
+        What was found, failures first.
+    """
+
+    component: str
+    spaces: tuple[str, ...]
+    tests: Mapping[str, int]
+    findings: tuple[Finding, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing is wrong; there may be notes."""
+        return not self.failures
+
+    @property
+    def failures(self) -> tuple[Finding, ...]:
+        """What is wrong."""
+        return tuple(one for one in self.findings if one.gravity == "failure")
+
+    @property
+    def notes(self) -> tuple[Finding, ...]:
+        """What may be meant, or could not be looked at."""
+        return tuple(one for one in self.findings if one.gravity == "note")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "component": self.component,
+            "ok": self.ok,
+            "spaces": list(self.spaces),
+            "tests": dict(self.tests),
+            "findings": [asdict(one) for one in self.findings],
+        }
+
+    def __str__(self) -> str:
+        made = ", ".join(f"{name} {count}" for name, count in self.tests.items())
+        head = f"{self.component}: {'sound' if self.ok else f'{len(self.failures)} failures'} ({made})"
+        return "\n".join([head, *(f"  {one}" for one in self.findings)])
+
+    def __repr__(self) -> str:
+        return str(self)

@@ -1,0 +1,101 @@
+"""`atwood check`: the conformance test of components."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from atwood.cli.errors import FAILED
+from atwood.cli.output import console, print_json
+from atwood.cli.parts import library_parts, looks_like_a_part
+from atwood.cli.scenes import load_file
+from atwood.errors import UsageError, suggestion
+
+if TYPE_CHECKING:
+    from atwood.checking import CheckReport
+
+__all__ = ["check_components"]
+
+
+def check_components(target: str, as_json: bool, run: bool) -> None:
+    """Check components and show what was found; leaves with exit code 1 if something is wrong.
+
+    Parameters
+    ----------
+    target
+        ``FILE.py`` for all components that it defines, ``FILE.py:NAME``, or the name of a part of a library.
+    as_json
+        Whether to write JSON.
+    run
+        Whether to run them on a test bench as well.
+    """
+    from atwood.checking import check
+
+    reports = [check(one, run=run) for one in _components(target)]
+    if as_json:
+        print_json({"ok": all(one.ok for one in reports), "components": [one.to_dict() for one in reports]})
+    else:
+        _print(reports)
+    if not all(one.ok for one in reports):
+        click.get_current_context().exit(FAILED)
+
+
+def _components(target: str) -> list[Any]:
+    file_text, colon, name = target.rpartition(":")
+    if not colon or not file_text.endswith(".py"):
+        file_text, name = target, ""
+    if looks_like_a_part(target):
+        parts = library_parts()
+        if target not in parts:
+            raise UsageError(f"no library has a part {target!r}", advice=suggestion(target, parts))
+        return [parts[target]]
+    if not file_text.endswith(".py"):
+        raise UsageError(f"{target!r} is no file", advice="Write FILE.py, FILE.py:NAME or the name of a part.")
+    found = _defined(load_file(Path(file_text)))
+    if name and name not in found:
+        raise UsageError(f"the file defines no component {name!r}", where=target, advice=suggestion(name, found))
+    if not found:
+        raise UsageError("it defines no component", where=file_text)
+    return [found[name]] if name else list(found.values())
+
+
+def _defined(module: ModuleType) -> dict[str, Any]:
+    """Return the components that a module itself defines: classes, and objects that have values."""
+    from atwood.model.component import Component
+    from atwood.model.composite import Model
+
+    found: dict[str, Any] = {}
+    for name, value in vars(module).items():
+        is_class = isinstance(value, type) and issubclass(value, Component) and value.__module__ == module.__name__
+        kind = value if is_class else type(value)
+        if name.startswith("_") or not (is_class or isinstance(value, Component)) or issubclass(kind, Model):
+            continue
+        found[name] = value
+    with_values = {type(value) for value in found.values() if not isinstance(value, type)}
+    return {name: value for name, value in found.items() if value not in with_values}
+
+
+def _print(reports: Sequence[CheckReport]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    out = console()
+    table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
+    for column in ("component", "spaces", "comparisons", "result"):
+        table.add_column(column, no_wrap=column != "spaces")
+    for one in reports:
+        result = Text("sound", style="green") if one.ok else Text(f"{len(one.failures)} wrong", style="red")
+        table.add_row(one.component, ", ".join(one.spaces), str(sum(one.tests.values())), result)
+    out.print(table)
+    for one in reports:
+        for finding in one.findings:
+            text = Text.assemble((one.component, "bold"), " ", (f"{finding.gravity} ", _STYLES[finding.gravity]))
+            place = ", ".join(word for word in (finding.test, finding.law, finding.space) if word)
+            out.print(text + Text(f"({place}): {finding.message}"), soft_wrap=True)
+
+
+_STYLES = {"failure": "red", "note": "dim"}
