@@ -249,6 +249,7 @@ def _of_event(trial: Trial, law: Law, made: Any) -> Iterator[tuple[float, Expone
 
 _UNITS: Mapping[str, Callable[[Trial, Law, Any], Iterator[tuple[float, Exponents]]]] = {
     "potential": _said("J"),
+    "lagrangian": _said("J"),
     "dissipation": _said("W"),
     "observable": _of_observable,
     "constraint": _of_constraint,
