@@ -9,7 +9,7 @@ import pytest
 
 from atwood import DeclarationError, Scene, StartError, UnsupportedError, simulate
 from atwood.pipeline import assemble
-from atwood_library import Disc, Force, Ground, Link, PointMass, Slider
+from atwood_library import Disc, Force, Ground, Link, PointMass, RigidBody, Slider
 
 from ..helpers.friction import (
     Capstan,
@@ -251,3 +251,29 @@ def test_scenes_whose_forces_read_no_reactions_have_nothing_of_it() -> None:
     assembly = assemble(scene, form="dae")
     assert not assembly.maximal.read
     assert not assembly.maximal.rows_with_multipliers
+
+
+def weightless(pull: Any) -> Scene:
+    """Return a link at rest on a journal bearing, without weight, that is drawn across at its end."""
+    scene = Scene(gravity=0.0)
+    ground, bearing = scene.add("ground", Ground()), scene.add("bearing", JournalBearing(friction=0.3))
+    link, force = scene.add("link", Link()), scene.add("force", Force(value=pull, direction=(0.0, 0.0, 1.0)))
+    for a, b in ((ground.frame, bearing.a), (bearing.b, link.a), (link.b, force.point)):
+        scene.connect(a, b)
+    scene.start.update({"link.angle": 0.0, "link.angular_velocity": 0.0})
+    return scene
+
+
+def test_where_nothing_presses_a_force_has_a_size_and_no_slope() -> None:
+    result = simulate(weightless(lambda t: t), t_end=0.4, rtol=1e-10, outputs=5)
+    assert result.array("bearing.force_z")[0] == 0.0
+    assert np.all(np.abs(result.array("bearing.force_z")[1:]) > 0.01)
+
+    balanced = Scene(gravity=0.0)  # nothing ever presses on a bearing at the centre of a disc
+    ground, bearing = balanced.add("ground", Ground()), balanced.add("bearing", JournalBearing())
+    disc = balanced.add("disc", RigidBody())
+    balanced.connect(ground.frame, bearing.a)
+    balanced.connect(bearing.b, disc.frame)
+    with pytest.raises(UnsupportedError, match="has no slope") as caught:
+        simulate(balanced, t_end=0.1)
+    assert caught.value.where == "bearing.bearing"

@@ -101,8 +101,15 @@ def known_multipliers(
     slopes = jacobian(found, forces)
     shares = {(r, c): e for r, c, e in zip(slopes.rows, slopes.columns, slopes.entries, strict=True)}
     rest = substitute(found, dict.fromkeys(forces, graph.zero))
-    known.update(zip(wanted, _fixed_point(wanted, rest, shares, values), strict=True))
-    return known
+    try:
+        found = _fixed_point(wanted, rest, shares, values)
+    except AtwoodError as error:
+        raise UnsupportedError(
+            f"a force reads a reaction that is always the same here, at which it has no slope ({error.message})",
+            where=wanted[0].name.removeprefix("lambda:").partition("[")[0],
+            advice="Round off the law there, as sqrt(n*n + a*a) instead of sqrt(n*n) with a small force a.",
+        ) from error
+    return {**known, **dict(zip(wanted, found, strict=True))}
 
 
 def _solve_system(
@@ -184,8 +191,13 @@ def _fixed_point(
     def step(values: Sequence[Expression]) -> list[Expression]:
         there = substitute(entries, dict(zip(unknowns, values, strict=True)))
         rows = [there[i * count : (i + 1) * count] for i in range(count)]
-        moves = [graph.convert(one) for one in solve(rows, gaps_at(values))]
-        return [value - move for value, move in zip(values, moves, strict=True)]
+        gaps = gaps_at(values)
+        moves = [graph.convert(one) for one in solve(rows, gaps)]
+        if is_affine:
+            return [value - move for value, move in zip(values, moves, strict=True)]
+        # A solution stays where it is: where nothing presses, the size of a force has no slope.
+        is_open = sum((absolute(gap) for gap in gaps), graph.zero) > 0.0
+        return [select(is_open, value - move, value) for value, move in zip(values, moves, strict=True)]
 
     none = [graph.zero] * count
     if is_affine:
