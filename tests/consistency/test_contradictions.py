@@ -313,12 +313,6 @@ class HasNoSuchRate(Wire):
         return aw.atan2(r.x, -r.z)
 
 
-class HoldsInNoSpace(Wire):
-    @aw.constraint(reaction="tension", unit="N", doc="Tension.", spaces=("plain",))
-    def wire(self):
-        return 0.0
-
-
 class ReportsTwice(Wire):
     @aw.observable(unit="N", doc="Tension.")
     def tension(self):
@@ -336,7 +330,6 @@ class ReportsTwice(Wire):
         (ActsInNoMode(), "it names a mode 'tight' that does not exist"),
         (LeadsToNoMode(), "its target 'then' offers a mode 'torn' that does not exist"),
         (HasNoSuchRate(), "it names an observable 'angular_speed' that does not exist"),
-        (HoldsInNoSpace(), "it names a space 'plain' that does not exist"),
         (ReportsTwice(), "its reaction 'tension' has the name of an observable"),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, aw.Component) else "",

@@ -69,7 +69,6 @@ def _wrong_settings(component: Component, where: str) -> Iterator[DeclarationErr
 def _in_law(component: Component, law: Law) -> Iterator[tuple[str, str]]:
     """Yield message and advice for each wrong name in one law."""
     cls, options = type(component), law.options
-    yield from _named("a space", getattr(options, "spaces", ()), SPACES)
     yield from _named("a mode", getattr(options, "modes", ()), cls.modes)
     observables = [one.name for one in cls.laws("observable")]
     if law.kind == "joint":
