@@ -11,6 +11,7 @@ from .trial import Discarded, Finding, Trial
 
 KINDS = {
     "arguments": "arguments",
+    "broken": "broken",
     "files": "files",
     "scenes": "scenes",
     "metamorphic": "metamorphic",

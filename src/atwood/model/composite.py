@@ -228,7 +228,8 @@ class Model(_State, Component):
         around: Component | None = self
         while around is not None:
             if around is part:
-                raise DeclarationError(f"a model cannot be a part of itself, as {name!r}", where=where)
+                advice = "Give it a copy(), or another model."
+                raise DeclarationError(f"a model cannot be a part of itself, as {name!r}", where=where, advice=advice)
             around = around._parent
 
     @takes_names

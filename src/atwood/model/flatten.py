@@ -107,7 +107,8 @@ def flatten(scene: Model, name: str | None = None) -> FlatScene:
     guess: dict[str, float] = {}
     _collect(scene, leaves, joined, start, guess)
     if not leaves:
-        raise DeclarationError("the scene has no parts", where=name or type(scene).__name__)
+        where, advice = name or type(scene).__name__, "Add some: scene.add('bob', PointMass())."
+        raise DeclarationError("the scene has no parts", where=where, advice=advice)
     connections, links = _split_links(scene, joined, leaves)
     settings = scene if isinstance(scene, Scene) else Scene()
     return FlatScene(

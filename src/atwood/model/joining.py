@@ -118,6 +118,7 @@ def _check_is_end(end: Any, where: str) -> None:
     if not isinstance(end, (Connector, ConnectorSpec, InputRef, OutputRef)):
         advice = "Connect things like rod.a or mass.point."
         if isinstance(end, Component):
+            where = end.path or where
             advice = f"Name one of its connectors: {', '.join(end.connector_specs())}."
         raise ConnectError(f"{show(end)} is no connector", where=where, advice=advice)
 
@@ -148,7 +149,8 @@ def check_ends(a: Any, b: Any, path_a: str, path_b: str) -> None:
 def _check_signal_units(source: OutputRef, target: InputRef, path_source: str, path_target: str) -> None:
     given, wanted = output_unit(source), target.component.signal_specs()[target.name].unit
     if given is not None and not given.has_dimension_of(wanted):
-        raise ConnectError(f"{path_source} is in {given.text} and {path_target} takes {wanted.text}")
+        advice = f"Connect an output in {wanted.text}, or put a part between that makes one of it."
+        raise ConnectError(f"{path_source} is in {given.text} and {path_target} takes {wanted.text}", advice=advice)
 
 
 def output_unit(output: OutputRef) -> Unit | None:

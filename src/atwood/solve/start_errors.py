@@ -77,14 +77,22 @@ def explain_positions(failed: Failed) -> StartError:
     """
     fixed = failed.level.fixed
     own = failed.missing[len(failed.missing) - len(fixed) :]
+    held = _missed_most(failed)
     if not any(one.value is not None for one in failed.equations.constraints):
-        return contradiction(fixed, own, _freedom(failed), _as_near_as_it_gets(failed))
+        return contradiction(fixed, own, _freedom(failed), _as_near_as_it_gets(failed), held)
     system = System(failed.assembly, failed.equations, [], True)
     units = units_of_rows(failed.assembly, failed.equations, system, failed.length)
     best = closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
     if best is not None and best.size > _CLOSED:
         return _open_loop(failed, system, best)
-    return contradiction(fixed, own, _freedom(failed), _what_stays_open(failed))
+    return contradiction(fixed, own, _freedom(failed), _what_stays_open(failed), held)
+
+
+def _missed_most(failed: Failed) -> str:
+    """Return the label of the constraint on positions that is missed most; empty if there is none."""
+    labels = [one.label for one in failed.equations.constraints if one.value is not None]
+    missed = np.abs(failed.missing[: len(labels)])
+    return labels[int(np.argmax(missed))] if len(labels) and np.any(missed > 0.0) else ""
 
 
 def _as_near_as_it_gets(failed: Failed) -> str:
