@@ -120,3 +120,11 @@ def test_a_tolerance_below_the_error_of_one_operation_is_raised_and_said(form: s
         result = simulate(SimplePendulum(), form=form, rtol=1e-16, t_end=1.0, max_steps=50_000)
     assert result.status == "finished"
     assert result.run.options.relative_tolerance == 1e-15
+
+
+def test_rounding_behind_a_singular_position_keeps_no_solver_from_going_on() -> None:
+    # Newton's iteration failed right behind the first place: rounding is larger there than the tolerance allows
+    result = simulate(FourBarRow(windows=2, space="space"), form="dae", rtol=1e-12, t_end=0.8, outputs=11, samples=1)
+    assert result.status == "finished"
+    assert [one.ways for one in result.passages] == [2]
+    assert result.energy.max_drift < 1e-9

@@ -32,7 +32,7 @@ from atwood.solve.event_watch import EventWatch, Root, State
 from atwood.solve.ida_sundae import REASONS
 from atwood.solve.native_callbacks import InterruptLater, Record, explain
 from atwood.solve.native_memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
-from atwood.solve.native_pace import FIRST_CHUNK, FIRST_COMPILED_CHUNK, Pace
+from atwood.solve.native_pace import FIRST_CHUNK, Pace, first_chunk
 from atwood.solve.native_setup import IdaTuning, prepare
 from atwood.solve.native_states import checked_state, copied, is_finite
 from atwood.solve.sundials_library import available, why_not
@@ -120,7 +120,7 @@ class NativeSession:
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
         self._starts = 0
         self._seconds = 0.0
-        self._pace = Pace(FIRST_CHUNK if self._record.calls_python else FIRST_COMPILED_CHUNK)
+        self._pace = Pace(FIRST_CHUNK if self._record.calls_python else first_chunk(problem.size))
         self._begin(state)
 
     def __enter__(self) -> NativeSession:

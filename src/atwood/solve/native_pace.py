@@ -9,17 +9,25 @@ from math import inf
 from atwood.solve.event_watch import ROUNDING
 from atwood.solve.ida_sundae import STALLED_STEPS
 
-__all__ = ["FIRST_CHUNK", "FIRST_COMPILED_CHUNK", "Pace"]
+__all__ = ["FIRST_CHUNK", "Pace", "first_chunk"]
 
 MOMENT = 0.02
 """IDA is left alone for about so long, in seconds."""
 
-FIRST_CHUNK, FIRST_COMPILED_CHUNK, LARGEST_CHUNK = 20, 500, 1_000_000
-"""How many steps IDA is left alone for: at first, at first with compiled functions, and at most."""
+FIRST_CHUNK, LARGEST_CHUNK = 20, 1_000_000
+"""How many steps IDA is left alone for: at first, and at most."""
+
+_FIRST_COMPILED_CHUNK, _SMALL = 500, 40
+"""The same at first with compiled functions, up to so many unknowns; with more of them fewer."""
 
 
 _CRAWL, _REPEATED, _ENDLESS = 2000, 0.25, 1e9
 """Steps do not get on if over so many of them such a share had to be repeated, and it would take so many to the end."""
+
+
+def first_chunk(size: int) -> int:
+    """Return how many steps IDA is left alone for at first with compiled functions of so many unknowns."""
+    return max(1, _FIRST_COMPILED_CHUNK * _SMALL // max(_SMALL, size))
 
 
 @dataclass
