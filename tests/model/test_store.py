@@ -302,6 +302,7 @@ FUNCTIONS = {
     "time": lambda t: t,
     "line": lambda t: 1 + 2 * t,
     "wave": lambda t: aw.sin(2 * t) ** 2 + aw.cos(t) / (1 + t),
+    "remainder": lambda t: t % 0.3 + aw.floor(t),
     "step": lambda t: aw.select((t > 1) & ~(t >= 2), t, -t),
     "either": lambda t: aw.select((t < 1) | (t <= 0.5), aw.exp(-t), aw.sqrt(t)),
     "bounds": lambda t: aw.maximum(aw.minimum(t, 1.5), 0.25) + aw.absolute(t - 1) + aw.sign(t - 1),

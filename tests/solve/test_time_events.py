@@ -148,6 +148,19 @@ FORCES: dict[str, tuple[Function, Callable[[np.ndarray], np.ndarray]]] = {
         lambda t: select(t < 0.5, sqrt(0.6 - t), sqrt(t - 0.4)),
         lambda t: roots(np.minimum(t, 0.5)) + np.where(t < 0.5, 0.0, later_roots(t - 0.5)),
     ),
+    "remainder": (
+        lambda t: t % 0.1,
+        lambda t: (
+            (n := np.floor(10.0 * t + 1e-9)) * (n - 1.0) / 2.0 * 5e-4
+            + n * 1e-3 / 6.0
+            + 5e-3 * n * (r := t - 0.1 * n)
+            + r**3 / 6.0
+        ),
+    ),
+    "whole numbers": (
+        lambda t: math.floor(2.0 * t + 0.5),
+        lambda t: 0.5 * np.maximum(t - 0.25, 0.0) ** 2 + 0.5 * np.maximum(t - 0.75, 0.0) ** 2,
+    ),
     "at the very end": (lambda t: select(t < 1.0, 1.0, 1e9), lambda t: 0.5 * t * t),
 }
 

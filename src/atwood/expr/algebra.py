@@ -372,6 +372,10 @@ def unary(operation: str, a: Expression) -> Expression:
         wave = _time_wave(operation, a)
         if wave is not None:
             return wave
+    if operation == "floor":
+        relation = _time_relation("floor", a)
+        if relation is not None:
+            return relation
     if operation in ("sign", "absolute"):
         side = _time_relation("sign", a)
         if side is not None:

@@ -19,6 +19,7 @@ from atwood.errors import AtwoodError, KernelEvaluationError, UsageError
 from atwood.expr import algebra
 from atwood.expr.graph import Expression, Graph
 from atwood.expr.operations import ExternalFunction, solve_floats
+from atwood.expr.operations import floor as _floor_of_float
 from atwood.expr.operations import sign as _sign_of_float
 
 Scalar: TypeAlias = Any
@@ -166,6 +167,11 @@ def absolute(x: Scalar) -> Scalar:
 def sign(x: Scalar) -> Scalar:
     """Return -1, 0 or 1."""
     return _unary("sign", x, _sign_of_float, "sign", "sign")
+
+
+def floor(x: Scalar) -> Scalar:
+    """Return the largest whole number that is not above a value; ``x // y`` and ``x % y`` are written with it."""
+    return _unary("floor", x, _floor_of_float, "floor", "floor")
 
 
 def atan2(y: Scalar, x: Scalar) -> Scalar:

@@ -143,6 +143,19 @@ class Expression:
         a = _operand(self, other)
         return NotImplemented if a is None else algebra.power(a, self)
 
+    def __floor__(self) -> Expression:
+        return algebra.unary("floor", self)
+
+    def __floordiv__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.unary("floor", algebra.divide(self, b))
+
+    def __mod__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        if b is None:
+            return NotImplemented
+        return algebra.subtract(self, algebra.multiply(b, algebra.unary("floor", algebra.divide(self, b))))
+
     def __neg__(self) -> Expression:
         return algebra.negate(self)
 

@@ -167,6 +167,7 @@ _EXACT: Mapping[str, Callable[..., Bounds]] = {
     "neg": lambda a: (-a[1], -a[0]),
     "absolute": _magnitude,
     "sign": lambda a: (np.sign(a[0]), np.sign(a[1])),
+    "floor": _rising(np.floor),
     "minimum": lambda a, b: (np.minimum(a[0], b[0]), np.minimum(a[1], b[1])),
     "maximum": lambda a, b: (np.maximum(a[0], b[0]), np.maximum(a[1], b[1])),
     "select": _chosen,

@@ -80,6 +80,11 @@ def sign(a: float) -> float:
     return 1.0 if a > 0.0 else -1.0 if a < 0.0 else a * 0.0
 
 
+def floor(a: float) -> float:
+    """Return the largest whole number that is not above ``a``; infinities and ``nan`` as they are."""
+    return float(math.floor(a)) if math.isfinite(a) else a
+
+
 def minimum(a: float, b: float) -> float:
     """Return ``a`` if ``a <= b``, else ``b``."""
     return a if a <= b else b
@@ -122,6 +127,7 @@ UNARY: Mapping[str, Callable[[float], float]] = {
     "tanh": math.tanh,
     "absolute": abs,
     "sign": sign,
+    "floor": floor,
     "logical_not": lambda a: 1.0 if a == 0.0 else 0.0,
 }
 """Operations of one argument."""
@@ -148,7 +154,7 @@ LEAVES = frozenset({"constant", "symbol"})
 UNCOUNTED = LEAVES | {"component"}
 """Operations that cost nothing: leaves, and picking one unknown of a linear solve."""
 
-PIECEWISE_CONSTANT = frozenset({"sign", "less", "less_equal", "logical_and", "logical_or", "logical_not"})
+PIECEWISE_CONSTANT = frozenset({"sign", "floor", "less", "less_equal", "logical_and", "logical_or", "logical_not"})
 """Operations with derivative zero wherever they have one."""
 
 COMMUTATIVE = frozenset({"add", "mul"})

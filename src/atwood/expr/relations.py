@@ -8,12 +8,14 @@ That is what Modelica calls a time event (Modelica Language Specification, secti
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
 
+from atwood.expr import algebra
 from atwood.expr.analysis import evaluate, live
 from atwood.expr.derivatives import jvp
 from atwood.expr.graph import Expression
@@ -35,14 +37,18 @@ class Relation(NamedTuple):
     symbol
         What stands for it in the equations.
     kind
-        ``"less"``, ``"less_equal"`` or ``"nonzero"``, true (1) or not (0), or ``"sign"`` (-1, 0 or 1).
+        ``"less"``, ``"less_equal"`` or ``"nonzero"``, true (1) or not (0), ``"sign"`` (-1, 0 or 1), or ``"floor"``, the
+        largest whole number that is not above.
     difference
-        What is compared with zero; it may read relations that were found before.
+        What is compared with zero, or rounded down; it may read relations that were found before.
+    zero
+        What passes zero where the relation changes.
     """
 
     symbol: Expression
     kind: str
     difference: Expression
+    zero: Expression
 
 
 class TimeRelations:
@@ -110,7 +116,9 @@ class TimeRelations:
             symbol = difference.graph.symbol(f"relation {len(self.found)}")
             self._symbols[key] = symbol
             self._kinds[symbol.index] = _TIMED
-            self.found.append(Relation(symbol, kind, difference))
+            whole = kind == "floor"
+            zero = algebra.unary("sin", algebra.multiply(symbol.graph.constant(math.pi), difference))
+            self.found.append(Relation(symbol, kind, difference, zero if whole else difference))
         return self._symbols[key]
 
     def _kind(self, expression: Expression) -> int:
@@ -138,6 +146,7 @@ _VALUES: Mapping[str, Callable[[float], float]] = {
     "less_equal": lambda d: float(d <= 0.0),
     "nonzero": lambda d: float(d != 0.0),
     "sign": lambda d: float(np.sign(d)),
+    "floor": lambda d: float(np.floor(d)),
 }
 
 
@@ -159,6 +168,11 @@ def values_just_after(relations: Sequence[Relation], known: Mapping[Expression, 
     assert relations_of is not None
     values: dict[Expression, float] = {**known, relations_of.time: t}
     for one in relations:
+        if one.kind == "floor":
+            nearest = float(np.round(evaluate([one.difference], values)[0]))
+            side = _side_after(one.difference - nearest, values, relations_of.time)
+            values[one.symbol] = relation_value("floor", nearest + float(np.clip(side, -0.5, 0.5)))
+            continue
         values[one.symbol] = relation_value(one.kind, _side_after(one.difference, values, relations_of.time))
     return tuple(values[one.symbol] for one in relations)
 

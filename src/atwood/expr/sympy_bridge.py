@@ -24,7 +24,8 @@ SympyExpression: TypeAlias = Any
 _LARGEST_DENOMINATOR = 64
 _TO_SYMPY = {"absolute": "Abs", "log": "log", "minimum": "Min", "maximum": "Max"}
 _FROM_SYMPY_UNARY = {"Abs": "absolute"} | {
-    name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "sign")
+    name: name
+    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "sign", "floor")
 }
 
 

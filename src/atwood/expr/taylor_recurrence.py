@@ -241,5 +241,6 @@ _WORDS = {
     "maximum": "a larger of two values",
     "absolute": "an absolute value",
     "sign": "a sign",
+    "floor": "a number that is rounded down",
 }
 _PIECEWISE = frozenset((*_WORDS, *_COMPARISONS))

@@ -29,6 +29,7 @@ LIBRARY_FUNCTIONS: Mapping[str, tuple[str, int]] = {
     "sinh": ("sinh", 1),
     "cosh": ("cosh", 1),
     "tanh": ("tanh", 1),
+    "floor": ("floor", 1),
     "atan2": ("atan2", 2),
     "pow": ("pow", 2),
 }

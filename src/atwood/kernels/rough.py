@@ -37,6 +37,7 @@ _EXACT: dict[str, Callable[..., Any]] = {
     "neg": np.negative,
     "absolute": np.absolute,
     "sign": np.sign,
+    "floor": np.floor,
     "less": _logical(np.less),
     "less_equal": _logical(np.less_equal),
     "logical_and": _logical(np.logical_and),

@@ -151,7 +151,7 @@ class _Pieces:
         owner = np.searchsorted(self.edges, edges[:-1], side="right") - 1
         own = np.zeros(len(owner))
         for share in _INSIDE:  # the first that is not zero tells
-            values = search.function(edges[:-1] + share * np.diff(edges), owner)
+            values = search.value(edges[:-1] + share * np.diff(edges), owner)
             own = np.where(own == 0.0, values, own)
         kind = assembly.relations[number].kind
         found = np.array([relation_value(kind, value) for value in own.tolist()])
@@ -187,13 +187,13 @@ class _Search:
         self._assembly, self._number, self._pieces = assembly, number, pieces
         relations = assembly.relations
         self._symbols = tuple(one.symbol for one in relations[:number])
-        self._time, self._difference = assembly.mechanism.time, relations[number].difference
+        self._time, self._difference = assembly.mechanism.time, relations[number].zero
         count = len(assembly.parameters) - len(relations)
         self._known = dict(zip(assembly.parameters[:count], assembly.parameter_values[:count].tolist(), strict=True))
 
         def make() -> Program:
             groups = (InputGroup("t", (self._time,)), InputGroup("relations", self._symbols))
-            outputs = (OutputGroup("difference", (self._difference,)),)
+            outputs = (OutputGroup("difference", (self._difference, relations[number].difference)),)
             return Program(f"{assembly.flat.name} time", groups, assembly.parameters[:count], outputs)
 
         program = assembly.shared.get(("relation", number), make)
@@ -201,9 +201,16 @@ class _Search:
 
     def function(self, times: FloatArray, owner: IntArray) -> FloatArray:
         """Return the function at times in pieces of these numbers."""
+        return self._row(0, times, owner)
+
+    def value(self, times: FloatArray, owner: IntArray) -> FloatArray:
+        """Return what the relation is of, at times in pieces of these numbers."""
+        return self._row(1, times, owner)
+
+    def _row(self, row: int, times: FloatArray, owner: IntArray) -> FloatArray:
         with np.errstate(all="ignore"):
             values = self._kernel(times[None, :], self._pieces.values[:, owner])[0]
-        return np.array(np.broadcast_to(values[0], times.shape), dtype=float)
+        return np.array(np.broadcast_to(values[row], times.shape), dtype=float)
 
     def _is_positive(self, times: FloatArray, owner: IntArray) -> BoolArray:
         return self.function(times, owner) >= 0.0
