@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from atwood import Result, Scene, assemble, simulate
+from atwood import Result, Scene, assemble, simulate, sweep
 from atwood import clock as clock_module
 from atwood.clock import Clock, TimeIsUp, check_time, more_time, time_left, within_time
 from atwood.errors import ResultError, SolveError
@@ -72,6 +72,12 @@ def test_a_run_without_time_for_its_start_has_nothing_and_says_so(form: str) -> 
     assert "before the start was found" in result.message
     with pytest.raises(ResultError, match=r"there is nothing in it: the limit of 1e-09 s was used up.*more time"):
         _ = result.time
+
+
+def test_a_sweep_without_time_says_so_for_each_run() -> None:
+    found = sweep(FourBarRow(windows=60), {"gravity": [9.0, 9.81]}, quantities=["crank[0].angle"], max_seconds=1e-9)
+    assert found.status == ("time_limit", "time_limit")
+    assert all("before the start was found" in one for one in found.messages.values())
 
 
 def test_steps_are_counted_over_changes_of_the_solver_and_the_limit_is_said_as_asked_for() -> None:

@@ -234,6 +234,8 @@ def _run(order: Order, records: Records, structures: _Structures, run: int) -> N
         records.messages[run] = result.message
     if result.status == "interrupted":
         raise KeyboardInterrupt
+    if not result.run.segments:  # there was no time to find its start
+        return
     try:
         _take(order, records, run, result)
     except AtwoodError as error:
