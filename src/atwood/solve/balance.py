@@ -20,8 +20,9 @@ from atwood.solve.matrices import (
     is_best_full,
     is_full,
     scaled,
+    to_array,
 )
-from atwood.solve.rank import least_norm, row_scales
+from atwood.solve.rank import least_norm, least_size, row_scales
 from atwood.solve.rounding import RowErrors
 from atwood.solve.turning import Turning, turning_of
 
@@ -235,7 +236,7 @@ def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -
         raise _undetermined(t)
     accelerations, multipliers = solution[:n], solution[n:]
     if kept is not None and len(kept) < len(now.gamma):
-        multipliers = np.linalg.lstsq(now.slope.T, now.mass @ accelerations + now.bias, rcond=None)[0]
+        multipliers = least_size(to_array(now.slope)[None], kept, multipliers[None])[0]
     return accelerations, multipliers
 
 

@@ -25,6 +25,7 @@ __all__ = [
     "certain",
     "independent_rows",
     "least_norm",
+    "least_size",
     "open_directions",
     "review_rows",
     "row_scales",
@@ -218,6 +219,36 @@ def _made_of(kept: Matrix, others: Matrix) -> FloatArray:
     from atwood.solve.sparse import csr_made_of
 
     return csr_made_of(kept, others)
+
+
+def least_size(slope: FloatArray, kept: NDArray[np.intp], multipliers: FloatArray) -> FloatArray:
+    """Return the multipliers of all rows of least size that have the force of some of the independent ones.
+
+    What other rows are made of, ``G_r = W G_k``, gives all that exert no force: no small number has to be called zero.
+
+    Parameters
+    ----------
+    slope
+        The rows at some states, shape (states, rows, columns).
+    kept
+        Which rows are independent, all others following from them.
+    multipliers
+        Of the independent rows, shape (states, kept).
+    """
+    others = np.setdiff1d(np.arange(slope.shape[1]), kept)
+    found = np.zeros(slope.shape[:2])
+    if not len(kept):
+        return found
+    columns = np.max(np.abs(slope[:, kept]), axis=1)
+    even = slope / np.where(columns > 0.0, columns, 1.0)[:, None, :]
+    rows = np.max(np.abs(even[:, kept]), axis=2)[:, :, None]
+    weights = even[:, others] @ np.linalg.pinv(even[:, kept] / rows) / np.swapaxes(rows, 1, 2)
+    found[:, kept] = multipliers
+    without_force = np.zeros((*found.shape, len(others)))
+    without_force[:, kept], without_force[:, others] = -np.swapaxes(weights, 1, 2), np.eye(len(others))
+    basis = np.linalg.qr(without_force)[0]
+    left: FloatArray = found - (basis @ (np.swapaxes(basis, 1, 2) @ found[:, :, None]))[:, :, 0]
+    return left
 
 
 def _is_clear(matrix: Matrix, errors: FloatArray) -> bool:

@@ -19,6 +19,7 @@ from atwood.mechanics.release import release_program
 from atwood.solve.balance import balance_of
 from atwood.solve.columns import masses_at
 from atwood.solve.matrices import is_best_full
+from atwood.solve.rank import least_size
 from atwood.solve.redundancy import RankFinding, find_rank, kept_along
 from atwood.solve.scales import coordinate_scales, motion_scales, scene_length
 from atwood.solve.sparse_states import States
@@ -120,11 +121,7 @@ def _solved(
             ) from None
         solved = solution[..., 0] / scale
         found_a[:, part] = solved[:, :n].T
-        found = solved[:, n:, None]
-        if is_redundant:
-            across = np.swapaxes(full_slope, 1, 2)
-            found = np.linalg.pinv(across, rcond=1e-9) @ (across[:, :, kept] @ found)
-        found_l[:, part] = found[:, :, 0].T
+        found_l[:, part] = (least_size(full_slope, kept, solved[:, n:]) if is_redundant else solved[:, n:]).T
     return found_a, found_l
 
 
