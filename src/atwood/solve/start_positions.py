@@ -13,6 +13,7 @@ from atwood.mechanics.equations import Equations
 from atwood.solve.closing import closest, places_around, units_of_rows
 from atwood.solve.facing import wrongly_turned
 from atwood.solve.matrices import Matrix
+from atwood.solve.rank import row_sizes
 from atwood.solve.start_errors import Failed, explain_positions, far_from_guess, wrong_way_round
 from atwood.solve.start_system import MET, System, counted, newton
 from atwood.solve.start_targets import Level, said
@@ -166,7 +167,7 @@ def _far_off(system: System, t: float, q: FloatArray) -> float:
         missing, matrix = system.at(t, q, np.zeros(system.speeds))
     except KernelEvaluationError:
         return np.inf
-    rows = np.max(np.abs(matrix), axis=1, initial=0.0)
+    rows = row_sizes(matrix, np.ones(matrix.shape[1]))
     return float(np.sum((missing / np.where(rows > 0.0, rows, 1.0)) ** 2))
 
 
