@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atwood import DeclarationError, Scene, StartError, UnsupportedError, simulate
+from atwood import DeclarationError, Load, Scene, StartError, UnsupportedError, Vector, force, simulate
 from atwood.pipeline import assemble
-from atwood_library import Disc, Force, Ground, Link, PointMass, RigidBody, Slider
+from atwood_library import Disc, Force, Ground, Link, PointMass, RigidBody, Slider, Weld
 
 from ..helpers.friction import (
     Capstan,
@@ -277,3 +277,21 @@ def test_where_nothing_presses_a_force_has_a_size_and_no_slope() -> None:
     with pytest.raises(UnsupportedError, match="has no slope") as caught:
         simulate(balanced, t_end=0.1)
     assert caught.value.where == "bearing.bearing"
+
+
+class _GlueThatTears(Weld):
+    @force
+    def pull(self) -> list[Load]:
+        """Return a force that reads what a rigid connection carries."""
+        return [Load(self.b, Vector(self.reaction("force.x"), 0.0, 0.0))]
+
+
+def test_what_a_rigid_connection_carries_cannot_be_read() -> None:
+    scene = Scene()
+    ground, glue, body = scene.add("ground", Ground()), scene.add("glue", _GlueThatTears()), scene.add("body", Link())
+    scene.connect(ground.frame, glue.a)
+    scene.connect(glue.b, body.a)
+    with pytest.raises(DeclarationError, match="may not read the reaction") as caught:
+        assemble(scene)
+    assert caught.value.where == "glue"
+    assert "rigid connection" in caught.value.advice

@@ -231,9 +231,13 @@ class Component:
         """Return a reaction of this component; only within a force, a dissipation, an observable or an event."""
         reactions = self._binding().reactions
         if name not in reactions:
-            raise DeclarationError(
-                f"this law may not read the reaction {name!r}", where=self.path, advice=suggestion(name, reactions)
-            )
+            advice = suggestion(name, reactions)
+            if any(law.options.rigid and law.options.reaction_doc for law in self.laws("joint")):
+                advice = (
+                    "What passes through a rigid connection is worked out after the motion: hold the parts by a "
+                    "@constraint, whose reaction a force may read."
+                )
+            raise DeclarationError(f"this law may not read the reaction {name!r}", where=self.path, advice=advice)
         return reactions[name]
 
     def energy_around(self, kind: str) -> Scalar:
