@@ -24,6 +24,7 @@ from atwood.solve.problem import Plan, pack_state
 from atwood.solve.projection import project_safely
 from atwood.solve.record import Recorder
 from atwood.solve.redundancy import RankFinding
+from atwood.solve.stuck import explain_stuck
 from atwood.solve.tolerance import too_tight
 
 __all__ = ["Outcome", "Stretch", "run_stretch"]
@@ -246,7 +247,8 @@ class _Runner:
         found = find_missing(assembly, *states)
         if found is None:
             stuck = None if self.guard is None else self.guard.explain(advance.message)
-            return stuck or (None if self.order is None else too_tight(self.order, self.choices[-1].solver, advance))
+            tight = None if stuck or self.order is None else too_tight(self.order, self.choices[-1].solver, advance)
+            return stuck or tight or explain_stuck(self.stretch.plan, advance)
         return SolveError(
             f"{found.describe()}, so that the run cannot go on: {advance.message}",
             where=found.part,
