@@ -213,7 +213,7 @@ def read_mechanism(
         bodies = find_bodies(network, locals_)
     mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links, told, t_start=flat.t_start)
     check_closures(mechanism)
-    check_tensors(mechanism.locals_, table.values)
+    check_tensors(mechanism.locals_, table.values, mechanism.space)
     return mechanism
 
 

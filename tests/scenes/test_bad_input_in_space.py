@@ -383,3 +383,16 @@ def test_a_contradiction_is_told_in_the_angles_that_were_given(form: str) -> Non
     error = refused(hung(Pivot(axis=(0.0, 0.0, 1.0)), {"body.theta": 0.5, "body.phi": 0.1}), form)
     assert error.where == "body.theta"
     assert "body.theta = 0.5, body.phi = 0.1 cannot all hold" in error.message
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_in_a_plane_the_moment_about_its_normal_is_enough(form: str) -> None:
+    scene = Scene(space="plane", gravity=0.0, t_end=1.0)
+    scene.add("body", RigidBody(mass=1.0, moments=(0.0, 0.3, 0.0)))
+    scene.start["body.angular_speed"] = 2.0
+    result = simulate(scene, form=form, outputs=3)
+    assert result["body.angle"][-1] == pytest.approx(2.0)
+    refused = Scene(space="plane", gravity=0.0, t_end=1.0)
+    refused.add("body", RigidBody(mass=1.0, moments=(0.1, 0.3, 0.1)))
+    with pytest.raises(ParameterError, match="greater than the"):
+        simulate(refused, form=form)

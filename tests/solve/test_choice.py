@@ -221,3 +221,13 @@ def test_the_fallback_is_announced(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(UsageError, match="they are elsewhere"):
         simulate(SCENES["double-pendulum"](), solver="ida", t_end=0.1)
     assert solvers(simulate(SCENES["double-pendulum"](), t_end=0.1, outputs=3)) == ["explicit"]
+
+
+@pytest.mark.parametrize("solver", ["explicit", "auto"])
+def test_a_long_chain_does_not_fly_apart_at_a_loose_tolerance(solver: str) -> None:
+    """At 0.1 its steps became too small to move the time, at 0.53 s."""
+    loose = simulate(SCENES["chain"](links=40), rtol=0.1, solver=solver, t_end=2.0, outputs=11)
+    tight = simulate(SCENES["chain"](links=40), rtol=1e-3, solver=solver, t_end=2.0, outputs=11)
+    assert loose.status == "finished"
+    assert loose.statistics.steps == tight.statistics.steps
+    assert loose.energy.max_drift < 0.1

@@ -25,7 +25,7 @@ class RigidBody(Solid):
         unit="kg*m^2",
         size=3,
         minimum=0.0,
-        doc="Moments of inertia Jxx, Jyy, Jzz about the centre of mass.",
+        doc="Moments of inertia Jxx, Jyy, Jzz about the centre of mass; in a plane Jyy alone will do.",
     )
     products: tuple[float, float, float] = parameter(
         (0.0, 0.0, 0.0),

@@ -161,8 +161,10 @@ def tensor_of(path: str, body: BodyInertia) -> Axes:
     return Vector(*rows[0]), Vector(*rows[1]), Vector(*rows[2])
 
 
-def check_tensors(locals_: Mapping[str, LocalPart], values: Mapping[Expression, float]) -> None:
+def check_tensors(locals_: Mapping[str, LocalPart], values: Mapping[Expression, float], space: Space) -> None:
     """Refuse inertia that no body can have: not symmetric, a negative principal moment, one beyond the others' sum.
+
+    In a plane only the moment about its normal counts, and the others need not be given: they may all be zero.
 
     Raises
     ------
@@ -177,6 +179,8 @@ def check_tensors(locals_: Mapping[str, LocalPart], values: Mapping[Expression, 
             graph = next(iter(values)).graph if values else None
             numbers = evaluate([graph.convert(entry) for entry in entries], values) if graph else entries
             tensor = np.array(numbers, dtype=float).reshape(3, 3)
+            if space.name == "plane" and tensor[1, 1] > 0.0 and np.count_nonzero(tensor) == 1:
+                continue
             try:
                 verify_moments(symmetric_part(tensor))
             except ParameterError as error:

@@ -21,6 +21,7 @@ from atwood.solve.event_watch import State
 __all__ = [
     "CALM",
     "EDGE",
+    "LOOSEST",
     "STIFF",
     "CompiledEvents",
     "CompiledRates",
@@ -224,6 +225,10 @@ class Stepper(Protocol):
     def counts(self) -> Counts:
         """What it has done so far, over all starts."""
         ...
+
+
+LOOSEST = 1e-3
+"""The largest relative tolerance that steps are chosen by: longer steps gain energy unseen, until chains fly apart."""
 
 
 def absolute_tolerances(options: SolverOptions, size: int) -> FloatArray:

@@ -16,7 +16,7 @@ from atwood.solve.driver import (
     Session,
     SolverOptions,
 )
-from atwood.solve.explicit_problem import CompiledEvents
+from atwood.solve.explicit_problem import LOOSEST, CompiledEvents
 from atwood.solve.explicit_session import ExplicitSession, Leave
 from atwood.solve.modes import EventProbe
 from atwood.solve.options import SOLVERS, RunOptions
@@ -47,12 +47,13 @@ class Order:
     end: float
     budget: Budget
 
-    def settings(self, t: float) -> SolverOptions:
-        """Return the options of a solver that starts at a time."""
+    def settings(self, t: float, loosest: float = 1.0) -> SolverOptions:
+        """Return the options of a solver that starts at a time, with no looser tolerance than it can hold."""
         options = self.options
+        relative = min(options.relative_tolerance, loosest)
         return SolverOptions(
-            relative_tolerance=options.relative_tolerance,
-            absolute_tolerances=self.plan.tolerances(options.relative_tolerance),
+            relative_tolerance=relative,
+            absolute_tolerances=self.plan.tolerances(relative),
             max_step=options.max_step,
             max_order=options.max_order,
             horizon=options.t_end - t if options.t_end > t else 1.0,
@@ -147,7 +148,7 @@ def open_explicit_session(
         from atwood.solve.taylor_scene import open_taylor, taylor_problem
 
         series = taylor_problem(assembly, order.end, has_events=bool(probe.directions))
-        return open_taylor(problem, series, order.settings(t), t, y, order.budget)
-    session = open_explicit(problem, order.settings(t), t, y, order.budget, leave=leave, end=order.end)
+        return open_taylor(problem, series, order.settings(t, LOOSEST), t, y, order.budget)
+    session = open_explicit(problem, order.settings(t, LOOSEST), t, y, order.budget, leave=leave, end=order.end)
     session.limit_steps(longest_step(assembly.equations, order.plan.program.split(y)[1]))
     return session

@@ -21,6 +21,7 @@ from atwood.forms.accelerations import acceleration_program
 from atwood.solve.choice import choose
 from atwood.solve.columns import masses_at
 from atwood.solve.driver import SolverOptions
+from atwood.solve.explicit_problem import LOOSEST
 from atwood.solve.explicit_scene import compiled_rates, explicit_problem
 from atwood.solve.modes import find_watches
 from atwood.solve.problem import make_plan
@@ -169,7 +170,8 @@ class _Batches:
             problem = explicit_problem(assembly)
             assert problem is not None
             span = options.t_end - assembly.flat.t_start
-            settings = SolverOptions(options.relative_tolerance, 1.0, max_step=options.max_step, horizon=span)
+            relative = min(options.relative_tolerance, LOOSEST)
+            settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=span)
             self._own.made = CompiledStepper(replace(problem, compiled=lambda: own.rates), settings), own
         found: tuple[Any, Any] = self._own.made
         return found
@@ -224,7 +226,7 @@ class _Batches:
             times.append(np.broadcast_to(np.sqrt(lengths / gravity)[:, None], u.shape))
         every = np.concatenate(times, axis=1)
         time = np.min(np.where(every > 0.0, every, np.inf), axis=1)
-        relative = order.options.relative_tolerance
+        relative = min(order.options.relative_tolerance, LOOSEST)
         return np.concatenate([relative * coordinate_sizes, relative * (sizes / time[:, None])], axis=1)
 
     # -- after the last step --------------------------------------------------------------------------------------
