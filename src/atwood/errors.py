@@ -60,6 +60,10 @@ class DeclarationError(AtwoodError):
     """A component, connector or model is declared in a way that cannot mean anything."""
 
 
+class MissingNameError(DeclarationError, AttributeError):
+    """A component is asked for a name that it does not have."""
+
+
 class ParameterError(AtwoodError):
     """A parameter is unknown, missing, or has a value that is not admissible."""
 

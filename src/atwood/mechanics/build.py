@@ -11,7 +11,7 @@ from atwood.mechanics.constraints import constraint_values, find_constraints, le
 from atwood.mechanics.elimination import SOLVED, check_held, drop_closed, eliminate_linear
 from atwood.mechanics.equations import Equations, force_rows, motion_rows, put_in_place
 from atwood.mechanics.forces import Site, local_map
-from atwood.mechanics.inertia import add_masses
+from atwood.mechanics.inertia import add_masses, check_masses
 from atwood.mechanics.kinematics import Kinematics, shapes
 from atwood.mechanics.mechanism import Mechanism, check_closures, extent, make_gravity
 from atwood.mechanics.motion import motion_in_plane, motion_in_space
@@ -47,6 +47,7 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     graph, bodies, space = mechanism.table.graph, mechanism.bodies, mechanism.space
     layouts = {body.index: body_offsets(body, space) for body in bodies.bodies}
     masses = add_masses(mechanism.graph, bodies, mechanism.locals_, layouts, space)
+    check_masses(masses, mechanism.table.values)
     shape_of = shapes(bodies, layouts, {index: one.center for index, one in masses.bodies.items()})
     turns = {node: turn for _, body_turns in layouts.values() for node, turn in body_turns.items()}
     site = Site(graph, mechanism.graph, bodies, space, turns)

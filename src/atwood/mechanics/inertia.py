@@ -25,6 +25,7 @@ __all__ = [
     "Masses",
     "RigidMass",
     "add_masses",
+    "check_masses",
     "check_tensors",
     "shifted_tensor",
     "sum_vectors",
@@ -185,6 +186,28 @@ def check_tensors(locals_: Mapping[str, LocalPart], values: Mapping[Expression, 
                 verify_moments(symmetric_part(tensor))
             except ParameterError as error:
                 raise ParameterError(error.message, where=path, advice=error.advice) from error
+
+
+def check_masses(masses: Masses, values: Mapping[Expression, float]) -> None:
+    """Refuse bodies whose masses add up to less than nothing; one that depends on time is known only later.
+
+    Raises
+    ------
+    ParameterError
+        With the paths of the parts.
+    """
+    found = [(" and ".join(one.parts), one.mass) for one in masses.bodies.values()]
+    found += [(one.part, row[i]) for one in masses.coupled for i, row in enumerate(one.masses)]
+    for where, mass in found:
+        if isinstance(mass, Expression) and not mass.is_parametric:
+            continue
+        number = evaluate([mass], values)[0] if isinstance(mass, Expression) else float(mass)
+        if number < 0.0:
+            raise ParameterError(
+                f"the mass of the body is {number:.6g} kg in all, and no body has less than none",
+                where=where,
+                advice="A part may take mass away, as a hole does, but not more than there is.",
+            )
 
 
 def _is_nothing(moment: Scalar | Axes) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from atwood.errors import AtwoodError
@@ -17,6 +18,8 @@ from atwood.mechanics.equations import Equations
 from atwood.mechanics.observables import Observable, Reaction, add_up, make_binding, part_energies, take
 from atwood.model.component import Binding, bind
 from atwood.model.local import LocalPart
+from atwood.model.returned import call_law, not_evaluated, one_scalar
+from atwood.model.vector import Vector
 
 __all__ = ["Observables", "Reader", "observe"]
 
@@ -110,6 +113,10 @@ def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, 
             value = getattr(bound, law.name)()
         except (AtwoodError, ArithmeticError):
             continue  # it asks for an orientation that nothing determines, or that never leaves a pole
+        except Exception as error:  # whatever a law of somebody's own can raise
+            raise not_evaluated(path, law, error) from error
+        if not isinstance(value, Vector):
+            value = call_law(path, law, partial(one_scalar, mechanism.table.graph, value))
         options = law.options
         rate = f"{path}.{options.rate}" if options.rate else ""
         take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic, rate)

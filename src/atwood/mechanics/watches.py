@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
-from atwood.expr import Expression
+from atwood.expr import Expression, Graph
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.equations import Equations
 from atwood.mechanics.observables import Reaction
 from atwood.mechanics.reading import Reader
 from atwood.model.component import bind
+from atwood.model.laws import Law
+from atwood.model.returned import call_law, one_scalar
 
 __all__ = ["Watch", "list_watches"]
 
@@ -52,6 +56,7 @@ def list_watches(
 ) -> tuple[Watch, ...]:
     """Return what is watched in the present modes; what is constant can never cross zero and is left out."""
     found = []
+    graph = mechanism.table.graph
     reader = Reader(mechanism, equations, reactions)
     for path, local in mechanism.locals_.items():
         component = local.part.component
@@ -62,7 +67,7 @@ def list_watches(
             continue
         bound = bind(component, reader.binding(local))
         for law in laws:
-            value = mechanism.table.graph.convert(getattr(bound, law.name)())
+            value = call_law(path, law, partial(_evaluated, graph, bound, law))
             if value.is_constant or value in mechanism.table.values:
                 continue
             options, target = law.options, law.options.target
@@ -72,3 +77,7 @@ def list_watches(
                 Watch(path, law.name, value, options.direction, target, options.message, options.unit, options.impact)
             )
     return tuple(found)
+
+
+def _evaluated(graph: Graph, bound: Any, law: Law) -> Expression:
+    return one_scalar(graph, getattr(bound, law.name)())

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
 from atwood.arguments import NAME, check
-from atwood.errors import DeclarationError, ParameterError, UsageError, suggestion
+from atwood.errors import DeclarationError, MissingNameError, ParameterError, UsageError, near_matches, suggestion
 from atwood.expr import Scalar
 from atwood.model.binding import Binding
 from atwood.model.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
@@ -125,7 +125,20 @@ class Component:
         for law in self.laws("joint") if name in ("force", "torque") else ():
             if law.options.rigid and law.options.reaction_doc:
                 return Quantity(self, name, "N" if name == "force" else "N*m", law.options.reaction_doc)
-        raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
+        if name.startswith("_"):  # what Python asks for, which nobody reads
+            raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
+        raise self._missing(name)
+
+    def _missing(self, name: str) -> MissingNameError:
+        """Return the error that says what there is instead of a name: something alike, and the connectors."""
+        kind = type(self).__name__
+        there = [*self._connectors, *self._children(), *self._parameters, *self._signals]
+        there += [law.name for law in self.laws("observable")]
+        close = near_matches(name, there)
+        advice = suggestion(name, close) if close else ""
+        if self._connectors:
+            advice += f"{' ' if advice else ''}Its connectors are {', '.join(self._connectors)}."
+        return MissingNameError(f"a {kind} has no {name!r}", where=self.path or kind, advice=advice)
 
     def __delattr__(self, name: str) -> None:
         raise UsageError(f"{name!r} cannot be taken away", where=self.path or type(self).__name__)

@@ -7,7 +7,7 @@ says by itself which connectors it depends on, and whose derivatives are the for
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,13 +16,14 @@ from atwood.expr import Expression, Graph, Scalar, depends_on, live
 from atwood.model.carried import Asked, Carried
 from atwood.model.component import Binding, bind
 from atwood.model.connectors import Frame, JointCoordinate, Motion
-from atwood.model.contributions import BodyInertia, Placement, PointInertia
+from atwood.model.contributions import BodyInertia, Load, Placement, PointInertia
 from atwood.model.fields import ParameterSpec
 from atwood.model.flatten import FlatScene, Part
 from atwood.model.grips import counting_constraints, find_grips, formulas_of
 from atwood.model.laws import Law, scalars
 from atwood.model.local_parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart, multiplier_symbol
 from atwood.model.moving_mass import check_lagrangians, find_varying
+from atwood.model.returned import call_law, listed, one_scalar
 from atwood.model.shafts import Held, find_held
 from atwood.model.space import FIXED_AXES, Space, planar_axes
 from atwood.model.vector import Vector
@@ -154,11 +155,11 @@ def _localize_part(
 
     def scalar_laws(kind: Any, only_in_modes: bool = False) -> tuple[Expression, ...]:
         chosen = [law for law in laws(kind) if law.options.modes or not only_in_modes]
-        found = [_call(part, law, functools.partial(_scalar, acting, law, graph)) for law in chosen]
+        found = [call_law(part.path, law, functools.partial(_scalar, acting, law, graph)) for law in chosen]
         return tuple(one for one in found if not one.is_zero)
 
     def listed_laws(kind: Any, bound: Any) -> list[Any]:
-        return [one for law in laws(kind) for one in _call(part, law, functools.partial(_listed, bound, law))]
+        return [one for law in laws(kind) for one in call_law(part.path, law, functools.partial(_listed, bound, law))]
 
     potentials, switched = scalar_laws("potential"), scalar_laws("potential", only_in_modes=True)
     constraints = [one for law in laws("constraint") for one in _local_constraints(part, law, acting, graph)]
@@ -221,7 +222,7 @@ def _multipliers_read(
 
 
 def _scalar(bound: Any, law: Law, graph: Graph) -> Expression:
-    return graph.convert(getattr(bound, law.name)())
+    return one_scalar(graph, getattr(bound, law.name)())
 
 
 def _check_reads(
@@ -248,7 +249,7 @@ def _check_reads(
 
 
 def _listed(bound: Any, law: Law) -> list[Any]:
-    return list(getattr(bound, law.name)())
+    return listed(getattr(bound, law.name)(), (Load,) if law.kind == "force" else (PointInertia, BodyInertia))
 
 
 def _parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
@@ -306,7 +307,7 @@ def _source_value(source: Part, observable: str, flat: FlatScene, time: Expressi
     values |= {name: _signal(source, name, given, flat, time, table, {}) for name, given in source.signals.items()}
     bound = bind(source.component, Binding(values=values, time=time))
     law = next(law for law in source.component.laws("observable") if law.name == observable)
-    return table.graph.convert(_call(source, law, getattr(bound, law.name)))
+    return table.graph.convert(call_law(source.path, law, getattr(bound, law.name)))
 
 
 def _local_connector(path: str, is_frame: bool, space: Space, graph: Graph) -> LocalConnector:
@@ -343,7 +344,7 @@ def _local_joint(
     part: Part, law: Law, bound: Any, graph: Graph, connectors: Mapping[str, LocalConnector]
 ) -> LocalJoint:
     coordinates = tuple(graph.symbol(f"{part.path}.{name}") for name in law.options.coordinates)
-    placement = _call(part, law, lambda: getattr(bound, law.name)(*coordinates))
+    placement = call_law(part.path, law, lambda: getattr(bound, law.name)(*coordinates))
     if not isinstance(placement, Placement):
         raise DeclarationError("a joint must return a Placement", where=f"{part.path}.{law.name}")
     ends = [connectors[name].axes for name in (law.options.a, law.options.b) if name in connectors]
@@ -351,7 +352,7 @@ def _local_joint(
 
 
 def _local_constraints(part: Part, law: Law, bound: Any, graph: Graph) -> Iterable[LocalConstraint]:
-    values = _call(part, law, lambda: [graph.convert(one) for one in scalars(getattr(bound, law.name)())])
+    values = call_law(part.path, law, lambda: [one_scalar(graph, one) for one in scalars(getattr(bound, law.name)())])
     names = law.options.reactions
     if len(names) == 1 and len(values) == 3:
         names = tuple(f"{names[0]}.{axis}" for axis in "xyz")
@@ -361,18 +362,3 @@ def _local_constraints(part: Part, law: Law, bound: Any, graph: Graph) -> Iterab
         )
     for index, (value, name) in enumerate(zip(values, names, strict=True)):
         yield LocalConstraint(law, index, value, name, law.options.sign)
-
-
-def _call(part: Part, law: Law, function: Callable[[], Any]) -> Any:
-    try:
-        return function()
-    except AtwoodError as error:
-        if error.where.startswith(part.path):
-            raise
-        raise type(error)(error.message, where=f"{part.path}.{law.name}", advice=error.advice) from error
-    except Exception as error:  # whatever a law of somebody's own can raise
-        raise DeclarationError(
-            f"the law cannot be evaluated ({type(error).__name__}: {error})",
-            where=f"{part.path}.{law.name}",
-            advice="A law is plain arithmetic with Atwood's functions, on self's parameters and connectors.",
-        ) from error

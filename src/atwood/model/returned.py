@@ -1,0 +1,101 @@
+"""What laws return: read into expressions, or refused in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from atwood.errors import AtwoodError, DeclarationError
+from atwood.expr import Expression, Graph
+from atwood.model.contributions import Load, Placement, PointInertia
+from atwood.model.laws import Law
+from atwood.model.vector import Vector
+
+__all__ = ["call_law", "listed", "not_evaluated", "one_scalar"]
+
+
+def call_law(path: str, law: Law, function: Callable[[], Any]) -> Any:
+    """Return what a function gives that evaluates a law; whatever it raises says the part and the law.
+
+    Parameters
+    ----------
+    path
+        The part.
+    law
+        The law.
+    function
+        Evaluates it.
+    """
+    try:
+        return function()
+    except AtwoodError as error:
+        if error.where.startswith(path):
+            raise
+        raise type(error)(error.message, where=f"{path}.{law.name}", advice=error.advice) from error
+    except Exception as error:  # whatever a law of somebody's own can raise
+        raise not_evaluated(path, law, error) from error
+
+
+def not_evaluated(path: str, law: Law, error: Exception) -> DeclarationError:
+    """Return the error that says that a law of a part raises something."""
+    return DeclarationError(
+        f"the law cannot be evaluated ({type(error).__name__}: {error})",
+        where=f"{path}.{law.name}",
+        advice="A law is plain arithmetic with Atwood's functions, on self's parameters and connectors.",
+    )
+
+
+def one_scalar(graph: Graph, value: Any) -> Expression:
+    """Return the one number that a law gives, as an expression.
+
+    Raises
+    ------
+    DeclarationError
+        If it is none.
+    """
+    if value is None:
+        raise DeclarationError("it returns nothing", advice="End it with return and a number.")
+    if isinstance(value, Vector):
+        raise DeclarationError(
+            "it returns a Vector where one number is wanted",
+            advice="Return a component, or atwood.dot or atwood.norm of it.",
+        )
+    try:
+        return graph.convert(value)
+    except (TypeError, ValueError):
+        raise DeclarationError(f"it returns {_in_words(value)} where a number is wanted") from None
+
+
+def listed(value: Any, kinds: tuple[type, ...]) -> list[Any]:
+    """Return what a law gives as a list of loads, or of inertias.
+
+    Parameters
+    ----------
+    value
+        What it gave.
+    kinds
+        What they can be.
+
+    Raises
+    ------
+    DeclarationError
+        If it is no iterable of these.
+    """
+    wanted = " or ".join(kind.__name__ for kind in kinds)
+    advice = f"Yield each {wanted}, or return a list of them, which may be empty."
+    if value is None:
+        raise DeclarationError("it returns nothing", advice=advice)
+    if isinstance(value, kinds):
+        raise DeclarationError(f"it returns one {type(value).__name__} and no list", advice=advice)
+    if isinstance(value, (Vector, str)) or not isinstance(value, Iterable):
+        raise DeclarationError(f"it returns {_in_words(value)}", advice=advice)
+    found = list(value)
+    for one in found:
+        if not isinstance(one, kinds):
+            raise DeclarationError(f"it gives {_in_words(one)} where a {wanted} is wanted", advice=advice)
+    return found
+
+
+def _in_words(value: Any) -> str:
+    kind = type(value).__name__
+    return f"a {kind}" if isinstance(value, (Vector, Load, Placement, PointInertia)) else f"{value!r} of type {kind}"
