@@ -30,7 +30,7 @@ WRONG = [
     (mine.WrongDerivative, "derivatives", "energy", "external functions"),
     (mine.WrongJoint, "laws", "swing", "it says that it solves 'together'"),
     (mine.WrongName, "names", "level", "its target 'stopp' is no mode"),
-    (mine.BadPicture, "outline", "outline", "AttributeError"),
+    (mine.BadPicture, "outline", "outline", "it raises MissingNameError"),
     (mine.Uneven, "units", "together", "and is in m"),
 ]
 
