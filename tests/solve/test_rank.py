@@ -7,7 +7,15 @@ import pytest
 
 from atwood.expr import Graph, InputGroup, OutputGroup, Program, cos, sin
 from atwood.kernels.rough import ROUGHNESS, WAYS, RoughProgram, roughly
-from atwood.solve.rank import certain, independent_rows, least_norm, open_directions, row_scales
+from atwood.solve.rank import (
+    certain,
+    independent_rows,
+    least_norm,
+    least_size,
+    open_directions,
+    review_rows,
+    row_scales,
+)
 from atwood.solve.sparse import csr_of
 
 EPS = float(np.finfo(float).eps)
@@ -123,6 +131,36 @@ def test_open_directions() -> None:
     assert len(open_directions(near)) == 0
     assert len(open_directions(near, 1e-6)) == 1
     assert len(open_directions(np.zeros((0, 3)))) == 3
+
+
+# -- which rows are kept ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("angle", "kept"), [(0.0, [0, 2]), (1.1, [0, 2]), (1.4, [1, 2]), (1.5707963267948966, [1, 2])])
+@pytest.mark.parametrize("sparse", [False, True])
+def test_other_rows_are_kept_where_a_choice_has_become_poor(angle: float, kept: list[int], sparse: bool) -> None:
+    """A component along a direction that turns away, by more than three times the other one at 1.25 rad."""
+    rows = np.array([[np.cos(angle), 0.0, 0.0], [np.sin(angle), 0.0, 0.0], [0.0, 1.0, 1.0]])
+    at = np.nonzero(rows)
+    matrix = csr_of(*at, rows[at], rows.shape) if sparse else rows
+    assert review_rows(matrix, 4e-15 * np.ones(3), [0, 2]) == kept
+
+
+def test_rounding_is_never_kept_in_place_of_a_row() -> None:
+    rows = np.array([[1.0, 0.0], [1e-17, 3e-17], [0.0, 1.0]])
+    assert review_rows(rows, 4e-15 * np.ones(3), [0, 2]) == [0, 2]
+    assert review_rows(rows[[0, 2]], 4e-15 * np.ones(2), [0, 1]) == [0, 1]
+
+
+def test_multipliers_of_least_size() -> None:
+    random = np.random.default_rng(2)
+    slope = np.stack([random_rows(7, 9, 4, seed) for seed in (1, 2, 3)])
+    kept, found = np.array([0, 2, 3, 6]), random.standard_normal((3, 4))
+    every = least_size(slope, kept, found)
+    for rows, some, all_ in zip(slope, found, every, strict=True):
+        expected = np.linalg.lstsq(rows.T, rows[kept].T @ some, rcond=1e-9)[0]
+        np.testing.assert_allclose(all_, expected, atol=1e-11)
+    assert least_size(slope, np.zeros(0, dtype=np.intp), np.zeros((3, 0))) == pytest.approx(np.zeros((3, 7)))
 
 
 # -- rough arithmetic -------------------------------------------------------------------------------------------------

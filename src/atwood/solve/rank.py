@@ -202,9 +202,13 @@ def review_rows(matrix: Matrix, errors: FloatArray, kept: Sequence[int]) -> list
     units = np.where(errors > 0.0, errors / ROUGHNESS, 1.0)
     rows, bound = scaled(matrix, np.ones(matrix.shape[1]), units), _POOR
     for _ in range(10 * len(chosen)):
-        weights = np.abs(_made_of(rows[chosen], rows[others]))
-        if not weights.size or not np.all(np.isfinite(weights)):
-            return list(kept) if not weights.size else independent_rows(matrix, errors, len(kept))
+        if not others:
+            break
+        made_of = _made_of(rows[chosen], rows[others])
+        left = to_array(rows[others]) - made_of @ to_array(rows[chosen])
+        if not np.max(np.abs(left), initial=0.0) <= _LOOK:  # the choice itself is not independent here
+            return independent_rows(matrix, errors, len(kept))
+        weights = np.abs(made_of)
         this, that = np.unravel_index(int(np.argmax(weights)), weights.shape)
         if weights[this, that] <= bound:
             break

@@ -126,7 +126,7 @@ def review_kept(finding: RankFinding, balance: Balance, t: float, q: FloatArray,
         return finding
     slope = scaled(balance.held(t, q, np.zeros_like(scales)).slope, scales)
     kept = tuple(review_rows(slope, finding.errors, finding.kept))
-    if kept == finding.kept:
+    if kept == finding.kept or len(kept) < len(finding.kept):  # at a singular position no choice is a good one
         return finding
     redundant = tuple(i for i in range(balance.constraints) if i not in set(kept))
     return replace(finding, kept=kept, redundant=redundant)
