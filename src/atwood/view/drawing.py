@@ -98,7 +98,9 @@ def _moments(result: Result, times: Sequence[float] | None) -> list[int]:
     slack = 1e-9 * (last - first)
     for time in times:
         if not first - slack <= time <= last + slack:
-            raise UsageError(f"t = {time:g} s lies outside the run, {first:g} to {last:g} s")
+            raise UsageError(
+                f"t = {time:g} s lies outside the run, {first:g} to {last:g} s", advice="Give a time of it."
+            )
     return sorted({int(np.argmin(np.abs(result.time - time))) for time in times})
 
 
