@@ -15,6 +15,7 @@ KINDS = {
     "files": "files",
     "scenes": "scenes",
     "metamorphic": "metamorphic",
+    "memory": "memory",
 }
 """Name of a kind and its module, whose `check(seed)` makes a trial."""
 

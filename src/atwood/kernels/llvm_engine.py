@@ -9,10 +9,11 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import itertools
+import os
 import sys
 import threading
 from collections.abc import Iterable, Mapping
-from functools import cache
+from functools import cache, lru_cache
 
 import llvmlite
 from llvmlite import binding
@@ -31,6 +32,7 @@ __all__ = [
 
 _lock = threading.Lock()
 _numbers = itertools.count()
+_LOADS = 200
 
 
 class LoadedCode:
@@ -102,8 +104,10 @@ def load_code(
     for name in names:
         builder.export_symbol(name)
     with _lock:
-        tracker = builder.link(_linker(), f"atwood.{next(_numbers)}")
-    return LoadedCode(tracker, {name: tracker[name] for name in names}, kept)
+        number = next(_numbers)
+        linker = _linker(number // _LOADS)
+        tracker = builder.link(linker, f"atwood.{number}")
+    return LoadedCode(tracker, {name: tracker[name] for name in names}, (linker, *kept))
 
 
 @cache
@@ -146,10 +150,15 @@ def sincos_name() -> str:
 
 @cache
 def target_description() -> tuple[str, ...]:
-    """Return everything about this machine and LLVM that changes object code."""
+    """Return everything about this machine and LLVM that changes object code.
+
+    Code is made for this processor, or for the one that ``ATWOOD_CPU`` names in LLVM's words, such as ``x86-64``.
+    """
     version = ".".join(map(str, binding.llvm_version_info))
-    features = binding.get_host_cpu_features().flatten()
-    return (llvmlite.__version__, version, binding.get_process_triple(), binding.get_host_cpu_name(), features)
+    cpu, features = os.environ.get("ATWOOD_CPU", ""), ""
+    if not cpu:
+        cpu, features = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    return (llvmlite.__version__, version, binding.get_process_triple(), cpu, features)
 
 
 @cache
@@ -161,8 +170,9 @@ def _machine(level: int) -> binding.TargetMachine:
     return target.create_target_machine(cpu=cpu, features=features, opt=level, jit=True, codemodel="jitdefault")
 
 
-@cache
-def _linker() -> binding.LLJIT:
+@lru_cache(maxsize=1)
+def _linker(_: int) -> binding.LLJIT:
+    """Return what loads code. It keeps some kilobytes of all it ever loaded, and is renewed now and then."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     return binding.create_lljit_compiler()
