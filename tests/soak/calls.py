@@ -225,7 +225,7 @@ def _pictures() -> Iterator[Call]:
         "plot_mechanism",
         atwood.plot_mechanism,
         shown,
-        {"result": "object", "file": "picture", "times": "mapping", "view": "index", "trace": "texts"},
+        {"result": "object", "file": "picture", "times": "mapping", "view": "optional object", "trace": "texts"},
         also,
         said,
     )
