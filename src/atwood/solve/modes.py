@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import SolveError
-from atwood.expr import OutputGroup, Program, depends_on, jacobian
+from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import event_program
 from atwood.forms.places import to_maximal
+from atwood.mechanics.equations import Constraint
 from atwood.mechanics.watches import Watch, list_watches
 from atwood.solve.balance import Balance, BalanceValues, balance_of
 from atwood.solve.charts import CHART, Reassemble, chart_watches, enter_charts
@@ -284,8 +285,8 @@ def plastic_impact(
 ) -> FloatArray:
     """Return the velocities after an impact: the nearest admissible ones in the metric of the masses.
 
-    Impulses act along the constraints only: ``M (u+ - u-) = G^T Lambda``, ``G u+ + g_t = 0``. What has modes, as a rope
-    has, can only pull: an impact that would make it push is refused.
+    Impulses act along the constraints only: ``M (u+ - u-) = G^T Lambda``, ``G u+ + g_t = 0``. One that is one-sided, as
+    a rope is that can only pull, bears impulses of one sign: an impact that needs the other one is refused.
 
     Parameters
     ----------
@@ -303,13 +304,55 @@ def plastic_impact(
     velocities, impulses = _solve_impact(now, u, sizes, balance.row_scales(now, t, q, sizes))
     size = float(np.max(np.abs(impulses), initial=0.0))
     for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
-        if one.key[0] in after.modes and one.sign * impulse < -1e-9 * size:
+        if abs(impulse) > 1e-9 * size and _is_refused(after, one, state, one.sign * impulse):
             raise SolveError(
-                f"at t = {t:.6g} the jerk ({happening.message}, {happening.part}) would make it push",
+                f"at t = {t:.6g} the impact ({happening.message}, {happening.part}) needs an impulse of the sign that "
+                "this one-sided constraint does not bear: a rope would have to push",
                 where=one.key[0],
                 advice="Several ropes that jerk at once, of which some go slack, cannot be solved yet.",
             )
     return velocities
+
+
+_SIZES = (1e-9, 1e9)
+"""Between these, beside the impulses, lies any force that an event could compare a reaction with."""
+
+
+def _is_refused(
+    after: Assembly, constraint: Constraint, state: tuple[float, FloatArray, FloatArray], impulse: float
+) -> bool:
+    """Return whether events of its part let go of a constraint for a reaction of this sign, however small or large.
+
+    A limit in both directions, or one that is not zero, makes no constraint one-sided.
+    """
+    part, own = constraint.key[0], [one.symbol for one in after.reactions if one.key == constraint.key]
+    watches = [one for one in _watches_of_reactions(after) if one.part == part and depends_on(one.value, own)]
+    if not watches:
+        return False
+    t, q, u = state
+    equations = after.maximal
+    known: dict[Expression, float] = dict(zip(after.parameters, after.parameter_values, strict=True))
+    known |= {equations.time: t, **dict(zip(equations.coordinates, q, strict=True))}
+    known |= dict(zip((*equations.speeds, *equations.accelerations), (*u, *np.zeros_like(u)), strict=True))
+    known |= dict.fromkeys((one.symbol for one in after.reactions), 0.0)
+
+    def lets_go(reaction: float) -> bool:
+        values = evaluate([one.value for one in watches], {**known, **dict.fromkeys(own, reaction)})
+        return any(one.direction * value > 0.0 for one, value in zip(watches, values, strict=True))
+
+    refused, other = (all(lets_go(sign * size * impulse) for size in _SIZES) for sign in (1.0, -1.0))
+    return refused and not other
+
+
+def _watches_of_reactions(assembly: Assembly) -> tuple[Watch, ...]:
+    """Return the events that read reactions, in maximal coordinates."""
+    symbols = [one.symbol for one in assembly.reactions]
+
+    def make() -> tuple[Watch, ...]:
+        every = list_watches(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.modes)
+        return tuple(one for one in every if depends_on(one.value, symbols))
+
+    return assembly.shared.get("watches of reactions", make)
 
 
 def _solve_impact(
