@@ -73,6 +73,11 @@ class NativeCallbacks:
         An ``IDARootFn``: ``int (double t, N_Vector y, N_Vector yp, double *values, void *data)``; 0 for none.  It
         writes the values of the problem's event functions and returns 0, or 1 where one is not finite.  It tells
         in which steps something happens; what and when is then found out with the problem's own functions.
+    restart_events
+        ``restart_events(t)``: called before IDA starts at a time.
+    has_noticed
+        Asked where `events` did not return 0: whether that was to say that a value may have passed zero and come back
+        since they were called before, in which case they return 0 when they are called again.
     missing_values
         How often residual and Jacobian had no finite value so far, if somebody counts it.
     attend
@@ -92,6 +97,8 @@ class NativeCallbacks:
     weights: int = 0
     set_weights: Callable[[FloatArray, FloatArray], None] | None = None
     events: int = 0
+    restart_events: Callable[[float], None] | None = None
+    has_noticed: Callable[[], bool] | None = None
     missing_values: Callable[[], int] | None = None
     attend: Callable[[float, FloatArray], bool | None] | None = None
     last_rate: Callable[[], float] | None = None

@@ -10,6 +10,7 @@ The rules, which decide the cases on the edge:
 - what has just happened at a restart does not happen again there: its sign is read a little later;
 - a change within rounding of a restart belongs to the restart;
 - events within rounding of each other happen together;
+- a function that passes zero and comes back within a step has passed it: see `atwood.solve.dips`;
 - what needs no exact time happens at the end of the step in which its sign changed, unless something else does before.
 """
 
@@ -22,6 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import KernelEvaluationError
+from atwood.kernels.tangents import SECANT
+from atwood.solve.dips import Point, find_dip, may_dip
 from atwood.solve.driver import FloatArray, ImplicitProblem, IntArray
 
 __all__ = ["EventWatch", "Root", "State"]
@@ -66,6 +69,7 @@ class EventWatch:
         self._fired_at = -np.inf
         self._start = -np.inf
         self._settling = True
+        self._last: Point | None = None
         self.evaluations = 0
 
     @property
@@ -87,6 +91,7 @@ class EventWatch:
         self._set_signs(signs)
         self._start = t
         self._settling = True
+        self._last = None
 
     def search(self, begin: float, end: float, at: Interpolant) -> Root | None:
         """Return the first root between two times of the last step, or `None`.
@@ -134,6 +139,9 @@ class EventWatch:
         return signs, changed & allowed
 
     def _first_root(self, begin: float, end: float, at: Interpolant) -> Root | None:
+        dip = self._dip(begin, end, at)
+        if dip is not None:
+            return self._first_root(begin, dip, at) or self._first_root(dip, end, at)
         if self._nothing_changed(at(end)):
             return None
         tolerance = 4 * ROUNDING * (abs(end) + (end - begin))
@@ -148,7 +156,10 @@ class EventWatch:
             if not np.any(crossed & ~self._rough):
                 self._set_signs(np.where(signs != 0, signs, self._signs))
                 return Root(at(end), tuple(int(sign) for sign in np.where(crossed, signs, 0)))
-            time = self._narrow(begin, end, values, at, tolerance)
+            before, time = self._narrow(begin, end, values, at, tolerance)
+            dip = self._dip(begin, before, at)
+            if dip is not None:
+                return self._first_root(begin, dip, at) or self._first_root(dip, end, at)
             # What follows within rounding belongs to the same moment.
             after = min(time + moment, end)
             signs, together = self._crossings(self._values(at(after)))
@@ -163,8 +174,34 @@ class EventWatch:
                 return None
             begin = after
 
-    def _narrow(self, begin: float, end: float, end_values: FloatArray, at: Interpolant, tolerance: float) -> float:
-        """Return the first time, within the tolerance, at which some event has passed zero.
+    def _dip(self, begin: float, end: float, at: Interpolant) -> float | None:
+        """Return a time between two others at which an event has the other sign, where both have the known one."""
+        signs = np.where(self._rough, 0.0, self._signs)
+        if not (signs.any() and begin < end):
+            return None
+        last = self._last
+        first = last if last is not None and last.time == begin else self._point(at(begin), end - begin)
+        self._last = last = self._point(at(end), begin - end)
+        if not may_dip(first, last, signs).any():
+            return None
+        return find_dip(first, last, signs, lambda t, width: self._point(at(t), -width))
+
+    def _point(self, state: State, width: float) -> Point:
+        """Return values and slopes, the latter over a small part of a width that begins at the state."""
+        t, y, yp = state
+        values, past = self._values(state), SECANT * width
+        self.evaluations += 1
+        try:
+            others = np.asarray(self._function(t + past, y + past * yp, yp), dtype=np.float64)
+        except ArithmeticError:
+            others = values
+        with np.errstate(invalid="ignore"):
+            return Point(t, values, np.nan_to_num((others - values) / past, nan=0.0))
+
+    def _narrow(
+        self, begin: float, end: float, end_values: FloatArray, at: Interpolant, tolerance: float
+    ) -> tuple[float, float]:
+        """Return the last time before some event has passed zero and the first after it, within the tolerance.
 
         Regula falsi on the event functions that have passed zero at the end, with a bisection whenever two
         guesses together did not halve the interval.
@@ -188,7 +225,7 @@ class EventWatch:
                 end, end_values = middle, middle_values
             else:
                 begin, values = middle, middle_values
-        return end
+        return begin, end
 
     def _guess(self, begin: float, end: float, values: FloatArray, end_values: FloatArray) -> float:
         """Return the earliest zero of the chords of the event functions that have passed zero at the end."""

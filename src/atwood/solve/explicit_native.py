@@ -141,6 +141,7 @@ class CompiledStepper:
     def __init__(self, problem: ExplicitProblem, options: SolverOptions) -> None:
         self._size, self._options = problem.size, options
         self._failure: BaseException | None = None
+        self._restart: Callable[[float], None] | None = None
         rates = self._in_python(problem) if problem.compiled is None else problem.compiled()
         self._keep = rates.keep
         self._absolute = absolute_tolerances(options, problem.size)
@@ -180,7 +181,7 @@ class CompiledStepper:
     def watch(self, events: CompiledEvents) -> None:
         """Let `run` and `sample` come back with `Outcome.NOTICED` after a step in which an event may have happened."""
         self._values, self._signs = np.zeros((2, events.count))
-        self._keep = (self._keep, events)
+        self._keep, self._restart = (self._keep, events), events.restart
         places = (array.ctypes.data for array in (self._values, self._signs))
         self._pointers[5:9] = events.function, events.data, *places
         self._counts[_EVENTS] = events.count
@@ -204,6 +205,8 @@ class CompiledStepper:
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
         self._y[:] = y
+        if self._restart is not None:
+            self._restart(t)
         return self._finish(self._begin(self._session, t, self._places[0])) == 0
 
     def state(self) -> State:

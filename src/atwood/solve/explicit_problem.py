@@ -69,12 +69,14 @@ class CompiledEvents:
     Parameters
     ----------
     function
-        ``int (double t, const double *y, const double *yp, double *values, void *data)``, which returns 0, or another
-        number where a value is not finite.
+        ``int (double t, const double *y, const double *yp, double *values, void *data)``, called after every step. It
+        returns 0, or another number where a value is not finite or may have passed zero and come back.
     data
         Its last argument.
     count
         The number of events.
+    restart
+        ``restart(t)``: called before the first step after a start at a time.
     keep
         Whatever must live as long as the addresses are used.
     """
@@ -82,6 +84,7 @@ class CompiledEvents:
     function: int
     data: int
     count: int
+    restart: Callable[[float], None]
     keep: object = None
 
 

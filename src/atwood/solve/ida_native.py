@@ -39,7 +39,10 @@ from atwood.solve.sundials_library import available, why_not
 
 __all__ = ["IdaTuning", "NativeSession", "available", "open_session", "why_not"]
 
-EVENT_REASONS = {-10: "an event function has no value"}
+NO_EVENT_VALUE = -10
+"""IDA's flag when the event functions did not return 0."""
+
+EVENT_REASONS = {NO_EVENT_VALUE: "an event function has no value"}
 
 
 def open_session(
@@ -214,6 +217,8 @@ class NativeSession:
             self._memory.call("IDASetStopTime", self._stop_time)
         if self._watch is not None:
             self._watch.restart(state)
+        if self._native is not None and self._native.restart_events is not None:
+            self._native.restart_events(state[0])
         self._here = state
         self._newest: State | None = state  # the end of the last step, where IDA has just taken a single one
         self._reached = state[0]
@@ -221,6 +226,7 @@ class NativeSession:
         self._behind = False  # whether IDA last handed out a time before the end of its last step
         self._root: Root | None = None
         self._searched = state[0]
+        self._looks_on = False  # whether IDA itself looks at what is left of its last step when it goes on
         self._pace.mark, self._pace.lap = (state[0], 0), (state[0], 0, 0)
         self._stale = False
         self._starts += 1
@@ -240,7 +246,8 @@ class NativeSession:
             self._restart(self._here)
         by_steps = self.budget.poll is not None or (self._watch is not None and not self._finds_events)
         while True:
-            root = self._find_root()
+            is_known = self._looks_on and not self._searched < t_out <= self._reached
+            root = None if is_known else self._find_root()
             if root is not None and root.state[0] <= t_out:
                 self._root, self._here = None, root.state
                 return Advance(*copied(root.state), Status.EVENT, root.events)
@@ -331,6 +338,7 @@ class NativeSession:
                 # IDA has looked for events: up to where it was sent, or not up to the end of a step that has one.
                 begin = self._memory.begin_of_step()
                 self._searched = max(self._searched, begin if flag == ROOT_RETURN else t)
+                self._looks_on = flag != ROOT_RETURN
             return None
         failure = self._judge(0 if flag == TOO_MUCH_WORK else flag, t)
         if failure is None:
@@ -341,10 +349,18 @@ class NativeSession:
     def _solve(self, t_out: float, task: int) -> tuple[int, float]:
         with self._guard:
             flag, t = self._memory.solve(t_out, task)
-            while flag == STOPPED_BY_WEIGHTS and self._attend(t):
+            while (flag == STOPPED_BY_WEIGHTS and self._attend(t)) or (flag == NO_EVENT_VALUE and self._noticed()):
+                if flag == NO_EVENT_VALUE and task == TO_TIME:
+                    flag = ROOT_RETURN
+                    break
                 flag, t = self._memory.solve(t_out, task)
         self._is_first = False
         return flag, t
+
+    def _noticed(self) -> bool:
+        """Tell whether the functions of events only said that something may have happened within a step."""
+        native = self._native
+        return native is not None and native.has_noticed is not None and native.has_noticed()
 
     def _attend(self, t: float) -> bool:
         """Let compiled functions that asked for it be looked at; return whether IDA can go on."""

@@ -102,7 +102,15 @@ def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem
             return made
         block = found.joined(made.user_data, made.data_bytes)
         keep = (made.keep, found, block)
-        return replace(made, user_data=ctypes.addressof(block), data_bytes=0, events=found.ida, keep=keep)
+        return replace(
+            made,
+            user_data=ctypes.addressof(block),
+            data_bytes=0,
+            events=found.ida,
+            restart_events=found.restart,
+            has_noticed=found.has_noticed,
+            keep=keep,
+        )
 
     return replace(problem, events=found.function(), native=native)
 
@@ -142,7 +150,7 @@ def open_explicit_session(
     problem = replace(problem, event_rough=probe.rough)
     found = None if problem.events is None else probe.compiled(for_ida=False)
     if found is not None:
-        own = CompiledEvents(found.explicit, found.address, found.count, found)
+        own = CompiledEvents(found.explicit, found.address, found.count, found.restart, found)
         problem = replace(problem, events=found.function(), compiled_events=lambda: own)
     if solver == "taylor":
         from atwood.solve.taylor_scene import open_taylor, taylor_problem
