@@ -19,7 +19,7 @@ from atwood.pipeline import assemble
 from atwood.solve.problem import make_plan
 from atwood.solve.reactions import ReactionSolver
 from atwood.solve.start import find_start, own_state
-from atwood_library import Disc, Ground, Link, Pivot, Rod, RotaryDrive, Spherical, Weld
+from atwood_library import Disc, Ground, Link, Pivot, RigidBody, Rod, RotaryDrive, Spherical, Weld
 
 FORMS = ("reduced", "dae")
 Triple = tuple[float, float, float]
@@ -204,6 +204,39 @@ def test_a_rod_beside_a_link_is_one_constraint_too_many(form: str) -> None:
     alone.connect(ball.b, link.a)
     expected = simulate(alone, form=form, rtol=1e-10, outputs=3).array("link.position.z")
     np.testing.assert_allclose(found.array("link.position.z"), expected, atol=1e-7)
+
+
+def door(length: float) -> Scene:
+    """Return a door that hangs on two hinges, one above the other; it has five constraints too many."""
+    scene = Scene(space="space", t_end=length**0.5)
+    ground, high = scene.add("ground", Ground()), scene.add("high", Weld(displacement=(0.0, 0.0, 2.0 * length)))
+    moments = tuple(length**2 * one for one in (0.3, 0.4, 0.1))
+    leaf = scene.add("leaf", RigidBody(mass=1.0, center=(0.5 * length, 0.0, length), moments=moments))
+    up = scene.add("up", Weld(displacement=(0.0, 0.0, 2.0 * length)))
+    scene.connect(ground.frame, high.a)
+    scene.connect(leaf.frame, up.a)
+    for name, (a, b) in {"low": (ground.frame, leaf.frame), "top": (high.b, up.b)}.items():
+        hinge = scene.add(name, Pivot(axis=(0.0, 0.0, 1.0)))
+        scene.connect(a, hinge.a)
+        scene.connect(hinge.b, b)
+    return scene
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_shares_that_are_open_do_not_depend_on_the_unit_of_length(form: str) -> None:
+    """The weight's moment goes into the hinges' moments and into a couple of their forces, in some proportion."""
+
+    def shares(length: float) -> list[float]:
+        assembly = assemble(door(length), form=form)
+        start = find_start(assembly)
+        q, u = own_state(assembly, start)
+        found = ReactionSolver(assembly, 0.0, q, u).at(np.array([0.0]), q[:, None], u[:, None])[0][:, 0]
+        values = dict(zip((one.path for one in assembly.reactions), found, strict=True))
+        moment = math.hypot(values["top.bearing_1"], values["top.bearing_2"]) / length
+        return [values["top.force.x"], values["top.force.z"], moment]
+
+    for length in (1e-6, 1e6):
+        np.testing.assert_allclose(shares(length), shares(1.0), rtol=1e-9, atol=1e-9)
 
 
 # -- on what turns ----------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -96,7 +97,10 @@ def decide(mechanism: Mechanism, how: Callable[[Mechanism], T]) -> T:
 
 
 def extent(mechanism: Mechanism) -> float:
-    """Return the extent of a mechanism, m: the largest length among the parameters of what moves; 0 if none is."""
+    """Return the extent of a mechanism, m: the largest length among the parameters of what moves; 0 if none is.
+
+    Of a vector that is its magnitude, which does not depend on how the scene is turned.
+    """
     sizes = [0.0]
     for path, local in mechanism.locals_.items():
         bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors}
@@ -105,7 +109,7 @@ def extent(mechanism: Mechanism) -> float:
         for name, spec in local.part.component.parameter_specs().items():
             value = local.part.values[name]
             if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
-                sizes += [abs(v) for v in (value if isinstance(value, tuple) else (value,))]
+                sizes.append(math.hypot(*value) if isinstance(value, tuple) else abs(value))
     return max(sizes)
 
 

@@ -20,9 +20,8 @@ from atwood.solve.matrices import (
     is_best_full,
     is_full,
     scaled,
-    to_array,
 )
-from atwood.solve.rank import least_norm, least_size, row_scales
+from atwood.solve.rank import least_norm, row_scales
 from atwood.solve.rounding import RowErrors
 from atwood.solve.turning import Turning, turning_of
 
@@ -126,7 +125,7 @@ class Balance:
         t, q, u
             A state that fulfils the constraints.
         kept
-            Constraints that are independent; the multipliers of all are then those of least size.
+            Constraints that are independent, all unless given; the multipliers are those of these.
 
         Raises
         ------
@@ -219,7 +218,7 @@ def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -
         solved = solve_bordered(now.mass, slope, now.bias, gamma)
         if solved is None:
             raise _undetermined(t)
-        return solved[0], solved[1] if m == len(now.gamma) else least_norm(now.slope.T, now.mass @ solved[0] + now.bias)
+        return solved
     matrix = np.zeros((n + m, n + m))
     matrix[:n, :n] = now.mass
     matrix[:n, n:] = -slope.T
@@ -234,10 +233,7 @@ def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -
         raise _undetermined(t) from None
     if not np.all(np.isfinite(solution)):
         raise _undetermined(t)
-    accelerations, multipliers = solution[:n], solution[n:]
-    if kept is not None and len(kept) < len(now.gamma):
-        multipliers = least_size(to_array(now.slope)[None], kept, multipliers[None])[0]
-    return accelerations, multipliers
+    return solution[:n], solution[n:]
 
 
 def _undetermined(t: float) -> SolveError:

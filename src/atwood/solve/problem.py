@@ -20,7 +20,6 @@ from atwood.solve.columns import columns_of
 from atwood.solve.dependent import choose_dependent, review_choice
 from atwood.solve.driver import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.solve.matrices import to_array
-from atwood.solve.rank import least_norm
 from atwood.solve.read_reactions import check_read_reactions
 from atwood.solve.redundancy import RankFinding, find_rank, review_kept
 from atwood.solve.scales import Scales, coordinate_scales, find_scales, motion_scales
@@ -376,9 +375,6 @@ def pack_state(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[Floa
     now = plan.balance.at(t, q, u)
     accelerations, multipliers = solve_balance(now, plan.kept, t)
     if plan.assembly.form == "dae":
-        if plan.kept is not None:  # the solver knows the multipliers of the kept constraints only
-            force = now.mass @ accelerations + now.bias
-            multipliers = least_norm(now.slope[plan.kept].T, force)
         tail = [multipliers, np.zeros(plan.program.extra)]
     else:
         tail = []

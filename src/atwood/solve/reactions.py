@@ -15,13 +15,14 @@ from atwood.errors import SolveError
 from atwood.forms.accelerations import acceleration_program
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.places import to_maximal
+from atwood.forms.program import BalanceProgram
 from atwood.mechanics.release import release_program
 from atwood.solve.balance import balance_of
 from atwood.solve.columns import masses_at
 from atwood.solve.matrices import is_best_full
 from atwood.solve.rank import least_size
 from atwood.solve.redundancy import RankFinding, find_rank, kept_along
-from atwood.solve.scales import coordinate_scales, motion_scales, scene_length
+from atwood.solve.scales import coordinate_scales, motion_scales, multiplier_sizes, scene_length
 from atwood.solve.sparse_states import States
 from atwood.solve.turning import turning_of
 
@@ -59,11 +60,14 @@ def accelerations_and_multipliers(
     -------
     accelerations, multipliers, drift
         Of shape (number, samples); drift is the constraints' explicit time derivative. With redundant constraints the
-        multipliers are those of least size.
+        multipliers are those of least size, moments divided by the extent of the scene.
     """
     program = assembly.balance(form)
     values = assembly.kernel(program.program, vectorized=True)(t[None, :], q, u)
-    return *_solved(assembly, form, (t, q, u), kept, values, True), np.asarray(values[6])
+    a, multipliers = _solved(assembly, form, (t, q, u), kept, values)
+    if len(kept) < program.constraints:
+        multipliers = _of_least_size(assembly, form, kept, values[5], multipliers)
+    return a, multipliers, np.asarray(values[6])
 
 
 def accelerations_at(
@@ -71,7 +75,37 @@ def accelerations_at(
 ) -> FloatArray:
     """Return the accelerations alone; see `accelerations_and_multipliers`."""
     values = assembly.kernel(assembly.balance(form).program, vectorized=True)(t[None, :], q, u)
-    return _solved(assembly, form, (t, q, u), kept, values, False)[0]
+    return _solved(assembly, form, (t, q, u), kept, values)[0]
+
+
+def _states(assembly: Assembly, form: FormName, kept: NDArray[np.intp]) -> States:
+    chosen = tuple(kept.tolist())
+    return assembly.shared.get(("states", form, chosen), lambda: States(assembly.balance(form), chosen))
+
+
+def _is_full(program: BalanceProgram) -> bool:
+    return program.mass_product is not None or is_best_full((program.speeds,) * 2, len(program.mass_rows), many=True)
+
+
+def _of_least_size(
+    assembly: Assembly, form: FormName, kept: NDArray[np.intp], slope: FloatArray, multipliers: FloatArray
+) -> FloatArray:
+    """Return the multipliers of all constraints from those of the independent ones, shape (constraints, samples)."""
+    program, samples = assembly.balance(form), slope.shape[1]
+    # Forces, and moments divided by a length, along displacements and rotations times a length.
+    sizes = multiplier_sizes(assembly, form)[:, None]
+    columns = motion_scales(assembly.in_coordinates(form), scene_length(assembly))[:, None]
+    even, forces = slope * sizes[program.slope_rows] * columns[program.slope_columns], multipliers / sizes[kept]
+    if not _is_full(program):
+        return _states(assembly, form, kept).least_size(even, forces) * sizes
+    found = np.zeros((program.constraints, samples))
+    step = max(1, _CHUNK // (program.constraints * program.speeds))
+    for first in range(0, samples, step):
+        part = slice(first, min(first + step, samples))
+        full = np.zeros((part.stop - part.start, program.constraints, program.speeds))
+        full[:, program.slope_rows, program.slope_columns] = even[:, part].T
+        found[:, part] = least_size(full, kept, forces[:, part].T).T
+    return found * sizes
 
 
 def _solved(
@@ -80,19 +114,14 @@ def _solved(
     state: tuple[FloatArray, FloatArray, FloatArray],
     kept: NDArray[np.intp],
     values: tuple[FloatArray, ...],
-    every: bool,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return accelerations and multipliers, those of redundant constraints too if every one is asked for."""
+    """Return accelerations and the multipliers of the independent constraints."""
     program, (t, q, u) = assembly.balance(form), state
     n, m, samples = program.speeds, program.constraints, len(t)
     mass, bias, _, _, gamma, slope, _ = values
-    if program.mass_product is None and not is_best_full((n, n), len(mass), many=True):
-        chosen = tuple(kept.tolist())
-        states = assembly.shared.get(("states", form, chosen), lambda: States(program, chosen))
-        a, found = states.solve(t, (mass, bias, gamma, slope))
-        return a, states.least_size(slope, found) if every else found
-    is_redundant = every and len(kept) < m
-    found_a, found_l = np.zeros((n, samples)), np.zeros((m if every else len(kept), samples))
+    if not _is_full(program):
+        return _states(assembly, form, kept).solve(t, (mass, bias, gamma, slope))
+    found_a, found_l = np.zeros((n, samples)), np.zeros((len(kept), samples))
     size = n + len(kept)
     step = max(1, _CHUNK // max(1, size * size))
     for first in range(0, samples, step):
@@ -121,7 +150,7 @@ def _solved(
             ) from None
         solved = solution[..., 0] / scale
         found_a[:, part] = solved[:, :n].T
-        found_l[:, part] = (least_size(full_slope, kept, solved[:, n:]) if is_redundant else solved[:, n:]).T
+        found_l[:, part] = solved[:, n:].T
     return found_a, found_l
 
 

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.expr import InputGroup, OutputGroup, Program
-from atwood.forms.assembly import Assembly
+from atwood.forms.assembly import Assembly, FormName
 from atwood.mechanics.build import extent
 from atwood.mechanics.equations import Equations
+from atwood.model.units import parse_unit
 
 __all__ = [
     "Scales",
@@ -18,6 +19,7 @@ __all__ = [
     "find_scales",
     "motion_names",
     "motion_scales",
+    "multiplier_sizes",
     "scene_length",
     "total_mass",
 ]
@@ -66,6 +68,19 @@ def coordinate_scales(equations: Equations, length: float) -> FloatArray:
 def motion_scales(equations: Equations, length: float) -> FloatArray:
     """Return the size of a displacement along each speed: the extent, or one radian."""
     return np.array([length if one.unit == "m/s" else 1.0 for one in equations.speed_names])
+
+
+def multiplier_sizes(assembly: Assembly, form: FormName) -> FloatArray:
+    """Return the size of each constraint's multiplier beside that of a force: for a moment, the extent.
+
+    Unlike the size of a displacement, it does not depend on where the scene starts. Where a constraint is neither in
+    lengths nor in angles, its multiplier counts by its own powers of a length.
+    """
+    length = extent(assembly.mechanism) or scene_length(assembly)
+    units = {one.key[:2]: one.unit for one in assembly.reactions}
+    found = [units.get(one.key[:2], "N") for one in assembly.in_coordinates(form).constraints]
+    # A force is of one power of a length.
+    return np.array([length ** (parse_unit(unit).exponents[1] - 1) for unit in found])
 
 
 def motion_names(equations: Equations) -> tuple[str, ...]:
