@@ -30,6 +30,9 @@ States: TypeAlias = tuple[FloatArray, FloatArray]
 _POINTS = 12
 """Of the polynomials."""
 
+_DERIVATIVE = legendre.legder(np.eye(_POINTS + 1))
+"""Gives coefficients of the derivative of a polynomial from its own."""
+
 _LAST = 2
 """What the last so many coefficients add up to tells the error of a polynomial."""
 
@@ -68,9 +71,9 @@ class Arc:
     def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return coordinates, speeds and accelerations at times, each of shape (number, times)."""
         x = (2.0 * np.asarray(t, dtype=float) - self.start - self.end) / (self.end - self.start)
-        slope = legendre.legder(self.speeds) * (2.0 / (self.end - self.start))
-        q, u, a = (legendre.legval(x, one) for one in (self.coordinates, self.speeds, slope))
-        return np.asarray(q), np.asarray(u), np.asarray(a)
+        each = legendre.legvander(x, len(self.speeds) - 1)
+        slope = (_DERIVATIVE @ self.speeds) * (2.0 / (self.end - self.start))
+        return (each @ self.coordinates).T, (each @ self.speeds).T, (each[:, :-1] @ slope).T
 
 
 @dataclass(frozen=True, eq=False)

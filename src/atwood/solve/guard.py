@@ -19,7 +19,7 @@ from atwood.solve.driver import Advance, FloatArray, Status
 from atwood.solve.nearness import Nearness, crossing, find_loss, nearly_lost
 from atwood.solve.passage import Passage, stuck_at
 from atwood.solve.problem import Plan
-from atwood.solve.projection import project_safely
+from atwood.solve.projection import project_safely, project_states
 
 __all__ = ["Guard", "guard_of"]
 
@@ -211,8 +211,7 @@ class Guard:
             if arc is None or not arc.error < max(self.tolerance, _ACCURATE):
                 continue
             times = np.linspace(arc.start, arc.end, _FINE)
-            self._measures.learn(times, arc.at(times)[0])
-            away = self._measures.at(times, arc.at(times)[0])
+            away = self._measures.learn(times, arc.at(times)[0])
             found = crossing(self._measures, arc)
             if found is not None:
                 return self._passage(arc, *found)
@@ -225,8 +224,7 @@ class Guard:
         if new := self._looks[len(self._away) :]:
             t = np.array([one.t for one in new])
             q = np.stack([one.y[: self._n] for one in new], axis=1)
-            self._measures.learn(t, q)
-            self._away += self._measures.at(t, q).tolist()
+            self._away += self._measures.learn(t, q).tolist()
             self._largest = max([self._largest, *(one for one in self._away[-len(new) :] if np.isfinite(one))])
 
     def _forget(self) -> None:
@@ -372,6 +370,9 @@ class Guard:
     def _state(self, one: _Look) -> tuple[float, FloatArray, FloatArray] | None:
         """Return a state that fulfils the constraints; None if there is none."""
         q, u = one.y[: self._n], one.y[self._n : self._n + self._m]
+        made = project_states(self.plan, np.array([one.t]), q[:, None], u[:, None])
+        if not made.doubtful[0]:
+            return one.t, made.coordinates[:, 0], made.speeds[:, 0]
         try:
             return one.t, *project_safely(self.plan, one.t, q, u)
         except AtwoodError:

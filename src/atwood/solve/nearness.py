@@ -73,9 +73,11 @@ class Nearness:
         self.plan = plan
         self.rows = np.zeros(plan.balance.constraints)
 
-    def learn(self, t: FloatArray, q: FloatArray) -> None:
-        """Learn from states how much constraints change; see `at`."""
-        self.rows = np.maximum(self.rows, np.max(self._constraints(t, q).rows, axis=0))
+    def learn(self, t: FloatArray, q: FloatArray) -> FloatArray:
+        """Learn from states how much constraints change, and return the measure there; see `at`."""
+        now = self._constraints(t, q)
+        self.rows = np.maximum(self.rows, np.max(now.rows, axis=0))
+        return self._of(now)
 
     def at(self, t: FloatArray, q: FloatArray) -> FloatArray:
         """Return the measure, shape (states,).
@@ -85,16 +87,18 @@ class Nearness:
         t, q
             Times and places near the constraints, of shape (states,) and (number, states).
         """
-        now = self._constraints(t, q)
-        share = now.rows / self.rows
+        return self._of(self._constraints(t, q))
+
+    def _of(self, now: ConstraintsAt) -> FloatArray:
+        share, count = now.rows / self.rows, len(now.value)
         if now.normal is None and len(now.kept) <= _SMALL:
             slopes = (now.slope * share[:, :, None])[:, now.kept]
             if not slopes.shape[1]:
-                return np.ones(len(t))  # what constraints there are follow from what is eliminated
+                return np.ones(count)  # what constraints there are follow from what is eliminated
             if not np.all(np.isfinite(slopes)):
-                return np.full(len(t), np.nan)
+                return np.full(count, np.nan)
             return np.asarray(np.linalg.svd(slopes, compute_uv=False)[:, -1])
-        right = np.sin(_GOLDEN * np.arange(1.0, now.value.shape[1] + 1.0)) * np.ones((len(t), 1))
+        right = np.sin(_GOLDEN * np.arange(1.0, now.value.shape[1] + 1.0)) * np.ones((count, 1))
         with np.errstate(all="ignore"):
             step = now.step(right / share)
             size: FloatArray = np.linalg.norm(right[:, now.kept], axis=1) / np.linalg.norm(step, axis=1)
@@ -151,13 +155,45 @@ def _sign_change(away: FloatArray) -> float | None:
     smoothest, found = np.inf, None
     for first in (least, least + 1):  # the right one of two is that whose coefficients die away
         series = _SERIES @ np.where(order < first, -away, away)
-        roots = legendre.legroots(series)
-        real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
-        inside = real[(real > x[first - 1] - 1e-9) & (real < x[first] + 1e-9)]
         tail = float(np.sum(np.abs(series[-2:])))
-        if len(inside) and tail < smoothest:
-            smoothest, found = tail, float(inside[0])
+        if tail < smoothest:
+            smoothest, found = tail, _root(series, float(x[first - 1]), float(x[first]))
     return found
+
+
+def _root(series: FloatArray, below: float, above: float) -> float:
+    """Return where a series of Legendre polynomials is zero between two places of which it has the signs - and +.
+
+    By false position, the end that stays being given half its weight (M. Dowell and P. Jarratt, *A modified regula
+    falsi method*, BIT 11, 1971).
+    """
+    coefficients = series.tolist()
+    low, high = legendre.legval([below, above], series).tolist()
+    x, last = below, 0.0
+    for _ in range(_ROOT_STEPS):
+        if not above - below > _ROOTED:
+            break
+        x = (below * high - above * low) / (high - low) if low < 0.0 < high else 0.5 * (below + above)
+        value = _clenshaw(coefficients, x)
+        if value == 0.0:
+            break
+        if value < 0.0:
+            below, low, high = x, value, 0.5 * high if last < 0.0 else high
+        else:
+            above, high, low = x, value, 0.5 * low if last > 0.0 else low
+        last = value
+    return x
+
+
+_ROOT_STEPS, _ROOTED = 60, 1e-15
+
+
+def _clenshaw(coefficients: list[float], x: float) -> float:
+    """Return the value of a series of Legendre polynomials at one place; numbers one by one are fastest here."""
+    value = after = 0.0
+    for k in range(len(coefficients) - 1, 0, -1):
+        value, after = coefficients[k] + ((2 * k + 1) * x * value) / (k + 1) - (k + 1) / (k + 2) * after, value
+    return coefficients[0] + x * value - 0.5 * after
 
 
 def find_loss(measure: Nearness, arc: Arc, t: float, away: float) -> Loss | None:

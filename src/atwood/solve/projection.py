@@ -155,6 +155,7 @@ def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) ->
     """Return states after one step of Newton's method towards the constraints on position and velocity.
 
     For iterations that come ever nearer to the constraints by themselves: what is missed is missed squared afterwards.
+    Speeds are projected once: where little is missed, so is little by rounding.
 
     Parameters
     ----------
@@ -173,9 +174,7 @@ def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) ->
 
     def hold(other: FloatArray) -> FloatArray:
         speeds = (other / sizes).T
-        for _ in range(2):  # the second pass takes out the rounding of the first
-            speeds = speeds - solve(now.rate(speeds))
-        return sizes * speeds.T
+        return sizes * (speeds - solve(now.rate(speeds))).T
 
     return Held(q, hold(u), hold)
 

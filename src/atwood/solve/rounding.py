@@ -70,6 +70,7 @@ class RowErrors:
         self._first: float | None = None
         self._reach = self._passed = 0.0
         self._values = self._entries = self._tangent = np.zeros(0)
+        self._known: tuple[FloatArray, FloatArray] | None = None
 
     def near(self, t: float, q: FloatArray, scales: FloatArray) -> FloatArray:
         """Return how far rounding can take values and slopes where coordinates are of like size, shape (rows,).
@@ -88,7 +89,11 @@ class RowErrors:
             self._reach, self._passed = max(reach, self._reach, 1.0), max(passed, self._passed)
             aside = _ASIDE * scales * np.sin(_GOLDEN * np.arange(1.0, len(scales) + 1.0))
             self._learn(t, self._turning.moved(t, q, aside), scales)
-        return self._shared(np.maximum(self._values, self._of_rows(self._entries, self._tangent, scales)))
+            self._known = None
+        if self._known is None or self._known[0] is not scales:
+            found = self._shared(np.maximum(self._values, self._of_rows(self._entries, self._tangent, scales)))
+            self._known = scales, found
+        return self._known[1]
 
     @cached_property
     def moves_by_itself(self) -> bool:
