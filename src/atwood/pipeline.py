@@ -16,7 +16,7 @@ from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.consistency.check import check_laws, check_names
 from atwood.errors import StartError
-from atwood.expr import Graph
+from atwood.expr import Expression, Graph
 from atwood.expr.relations import TimeRelations
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
@@ -99,7 +99,7 @@ def assemble(
         If the scene is not sound; the error names the part.
     """
     made = assemble_flat(flatten(scene, name), form=form, level=level, orientation=orientation)
-    return replace(made, source=Source(_assemble_like, scene.copy()))
+    return replace(made, source=Source(_assemble_like, _find_places, scene.copy()))
 
 
 def assemble_flat(
@@ -134,25 +134,22 @@ def assemble_flat(
     mechanism = read_mechanism(flat, all_modes, sides)
     chosen: Any = form
     level = level if form == "dae" else ""
-    source, charts = Source(_assemble_like), Orientation(orientation)
+    source, charts = Source(_assemble_like, _find_places), Orientation(orientation)
     made = Assembly(flat, mechanism, chosen, level, all_modes, source, orientation=charts)
-    return made if all_modes or not holds_velocities(mechanism) else _with_start(made)
+    # Where parts have modes, another mode could begin with other constants, and everything stays as it is.
+    return made if all_modes or not holds_velocities(mechanism) else with_places(made, _find_places(made))
 
 
-def _with_start(assembly: Assembly) -> Assembly:
-    """Return an assembly whose constraints on velocities become what they are, with constants from the start.
-
-    Where parts have modes, another mode could begin with other constants, and everything stays as it is.
-    """
+def _find_places(assembly: Assembly) -> dict[str, dict[Expression, float]]:
+    """Return where a scene starts whose constraints on velocities are still what they are."""
     start = find_start(assembly)
     reduced, maximal = assembly.regular, assembly.maximal
     q, _ = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
     time = {assembly.mechanism.time: start.time, **assembly.known_relations}
-    places = {
+    return {
         "reduced": {**time, **dict(zip(reduced.coordinates, start.coordinates.tolist(), strict=True))},
         "dae": {**time, **dict(zip(maximal.coordinates, (float(x) for x in q), strict=True))},
     }
-    return with_places(assembly, places)
 
 
 def _assemble_like(

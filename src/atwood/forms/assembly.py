@@ -26,8 +26,9 @@ from atwood.forms.program import (
     state_groups,
 )
 from atwood.forms.reduced import reduced_form
-from atwood.forms.shared import Shared, with_values_of
+from atwood.forms.shared import Shared
 from atwood.forms.source import Source, no_start_quantity
+from atwood.forms.starting import moved_to
 from atwood.kernels import BoundKernel, CompiledProgram, compile_program
 from atwood.mechanics.build import Mechanism, build_equations
 from atwood.mechanics.equations import Equations
@@ -252,7 +253,7 @@ class Assembly:
         flat, source
             See `with_flat`.
         """
-        mechanism, reason = self._moved(flat)
+        mechanism, reason = moved_to(self, flat)
         if mechanism is None:
             return None, reason
         fresh: dict[str, Any] = {"source": source, "why_new": "", "given_relations": None, "_kernels": {}}
@@ -283,18 +284,10 @@ class Assembly:
 
         key = ("mode", tuple(sorted(modes.items())), tuple(sorted(sides.items())), charts)
         known = self.shared.family.get(key, make)
-        mechanism, _ = known._moved(self.flat)
+        mechanism, _ = moved_to(known, self.flat)
         if mechanism is None:
             return make()
         return replace(known, flat=self.flat, mechanism=mechanism, source=source, why_new="", _kernels={})
-
-    def _moved(self, flat: FlatScene) -> tuple[Mechanism | None, str]:
-        """Return the mechanism with the values of another scene; None, and why, if its structure is another."""
-        with self.shared.lock:
-            # What was decided by the size of numbers is known only when the equations are.
-            if self.reduced.integrals or (self.mechanism.places is not None and self.maximal.integrals):
-                return None, "the start gives constants of integration"
-            return with_values_of(self.flat, self.mechanism, self.shared, flat)
 
     # -- programs -------------------------------------------------------------------------------------------------
 

@@ -19,7 +19,7 @@ from atwood.model.flatten import FlatScene, Part
 from atwood.model.local import LocalPart
 from atwood.topology.sides import find_sides
 
-__all__ = ["Shared", "Slot", "find_slots", "with_values_of"]
+__all__ = ["DECIDED", "Shared", "Slot", "decided_alike", "find_slots", "with_values_of"]
 
 T = TypeVar("T")
 
@@ -170,12 +170,25 @@ def with_values_of(
         values[symbol] = float(value)
     moved = _moved(mechanism, other, values)
     check_closures(moved)
-    for decide, outcome in mechanism.decisions:
-        if decide(moved) != outcome:
-            return None, "other coordinates are eliminated with these values"
+    if not decided_alike(moved):
+        return None, DECIDED
     if mechanism.sides is not None and _sides(moved, other, shared) != mechanism.sides:
         return None, "on the line, parts start on other sides of each other"
     return moved, ""
+
+
+DECIDED = "other coordinates are eliminated with these values"
+
+
+def decided_alike(mechanism: Mechanism) -> bool:
+    """Return whether all that was decided by the size of numbers comes out with these as it did.
+
+    Parameters
+    ----------
+    mechanism
+        With other values than those that it was decided with.
+    """
+    return all(decide(mechanism) == outcome for decide, outcome in mechanism.decisions)
 
 
 def _changed_parts(flat: FlatScene, other: FlatScene) -> str:

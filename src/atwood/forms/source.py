@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from atwood.errors import StartError, UsageError, suggestion, suggestion_in_parts
+from atwood.expr import Expression
 from atwood.model.composite import Model
 from atwood.model.flatten import FlatScene
 from atwood.model.scene import Scene
@@ -40,11 +41,14 @@ class Source:
     ----------
     assemble
         How scenes are assembled.
+    places
+        Gives where a scene starts, as `atwood.mechanics.mechanism.Mechanism` has it.
     scene
         A copy of the scene, which nobody else changes; None if there were only its leaves.
     """
 
     assemble: Assemble
+    places: Callable[[Assembly], Mapping[str, Mapping[Expression, float]]]
     scene: Model | None = None
 
     def changed(self, values: Mapping[str, Any], start: Mapping[str, Any], guess: Mapping[str, Any]) -> Model:

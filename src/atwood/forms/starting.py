@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from atwood.expr import Expression
-from atwood.forms.assembly import Assembly
-from atwood.forms.shared import Shared
+from atwood.forms.shared import DECIDED, Shared, decided_alike, with_values_of
+from atwood.mechanics.mechanism import Mechanism, started_at
+from atwood.model.flatten import FlatScene
 
-__all__ = ["starting", "with_places"]
+if TYPE_CHECKING:
+    from atwood.forms.assembly import Assembly
+
+__all__ = ["moved_to", "starting", "with_places"]
 
 
 def starting(assembly: Assembly) -> Assembly:
@@ -20,14 +25,15 @@ def starting(assembly: Assembly) -> Assembly:
     assembly
         The scene; it is returned itself where nothing depends on the start.
     """
-    if assembly.mechanism.places is None:
+    mechanism = assembly.mechanism
+    if mechanism.places is None:
         return assembly
-    shared, known = assembly.shared.get("starting", lambda: (Shared(), assembly.parameters))
-    every = assembly.mechanism.table.values
-    values = {symbol: every[symbol] for symbol in known if symbol in every}
-    table = replace(assembly.mechanism.table, values=values)
-    mechanism = replace(assembly.mechanism, table=table, places=None)
-    return replace(assembly, mechanism=mechanism, source=None, why_new="", shared=shared, _kernels={})
+    decisions: list[tuple[Callable[[Mechanism], object], object]] = []
+    shared, decisions = assembly.shared.get("starting", lambda: (_beside(assembly.shared), decisions))
+    values = {symbol: value for symbol, value in mechanism.table.values.items() if symbol not in mechanism.constants}
+    table = replace(mechanism.table, values=values)
+    before = replace(mechanism, table=table, places=None, constants={}, decisions=decisions)
+    return replace(assembly, mechanism=before, source=None, why_new="", shared=shared, _kernels={})
 
 
 def with_places(assembly: Assembly, places: Mapping[str, Mapping[Expression, float]]) -> Assembly:
@@ -40,11 +46,58 @@ def with_places(assembly: Assembly, places: Mapping[str, Mapping[Expression, flo
     places
         See `atwood.mechanics.mechanism.Mechanism`.
     """
-    shared, parameters = Shared(), assembly.parameters
-    shared.get("starting", lambda: (assembly.shared, parameters))
+    shared, decisions = _beside(assembly.shared), assembly.mechanism.decisions
+    shared.get("starting", lambda: (assembly.shared, decisions))
     # Constants of integration are further parameters.
     table = replace(assembly.mechanism.table, values=dict(assembly.mechanism.table.values))
-    mechanism = replace(assembly.mechanism, table=table, places=places)
+    mechanism = replace(assembly.mechanism, table=table, places=places, constants={}, decisions=[])
     made = replace(assembly, mechanism=mechanism, shared=shared, _kernels={})
     _ = made.reduced, made.maximal  # the constants must be there before anything is bound
     return made
+
+
+def _beside(shared: Shared) -> Shared:
+    """Return what other equations on the same graph share, which only one thread at a time may add to."""
+    made = Shared()
+    made.lock = shared.lock
+    return made
+
+
+def moved_to(assembly: Assembly, flat: FlatScene) -> tuple[Mechanism | None, str]:
+    """Return the mechanism with the values of another scene; None, and why, if its structure is another.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    flat
+        The other one, taken apart.
+
+    Raises
+    ------
+    StartError
+        If constants come from the start, and the other scene has none.
+    """
+    before = starting(assembly)
+    with assembly.shared.lock:
+        # What was decided by the size of numbers is known only when the equations are.
+        if before is assembly:
+            _ = assembly.reduced
+        else:
+            _ = before.regular, before.maximal, assembly.reduced, assembly.maximal
+        mechanism, reason = with_values_of(before.flat, before.mechanism, before.shared, flat)
+    if mechanism is None or before is assembly:
+        return mechanism, reason
+    own = assembly.mechanism
+    places = own.places
+    if own.constants:
+        if assembly.source is None:
+            return None, "the start gives constants of integration"
+        there = replace(before, flat=flat, mechanism=mechanism, given_relations=None, _kernels={})
+        places = assembly.source.places(there)
+    assert places is not None
+    values = {**own.table.values, **mechanism.table.values}
+    made = replace(own, table=replace(own.table, values=values), locals_=mechanism.locals_)
+    made = started_at(made, places)
+    with assembly.shared.lock:
+        return (made, "") if decided_alike(made) else (None, DECIDED)

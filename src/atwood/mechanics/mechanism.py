@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from atwood.errors import TopologyError
@@ -18,7 +18,7 @@ from atwood.model.vector import Vector, as_vector
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import Joint, MechanismGraph
 
-__all__ = ["CLOSES", "Mechanism", "check_closures", "decide", "extent", "make_gravity"]
+__all__ = ["CLOSES", "Mechanism", "check_closures", "decide", "extent", "from_start", "make_gravity", "started_at"]
 
 T = TypeVar("T")
 
@@ -51,6 +51,9 @@ class Mechanism:
     places
         Where the scene starts, by form and by the symbols of its coordinates; None where nothing depends on it: then
         constraints on velocities stay what they are.
+    constants
+        Further parameters, whose values the start gives: for each, by which form's coordinates it is said, and what it
+        is the value of there. One may depend on those before it.
     t_start
         When it starts, s.
     """
@@ -66,6 +69,7 @@ class Mechanism:
     sides: Mapping[tuple[str, str, str], float] | None = None
     decisions: list[tuple[Callable[[Mechanism], object], object]] = field(default_factory=list)
     places: Mapping[str, Mapping[Expression, float]] | None = None
+    constants: dict[Expression, tuple[str, Expression]] = field(default_factory=dict)
     t_start: float = 0.0
 
     def known_at_start(self) -> dict[Expression, float]:
@@ -94,6 +98,45 @@ def decide(mechanism: Mechanism, how: Callable[[Mechanism], T]) -> T:
     outcome = how(mechanism)
     mechanism.decisions.append((how, outcome))
     return outcome
+
+
+def from_start(mechanism: Mechanism, name: str, form: str, value: Expression) -> Expression:
+    """Return a parameter that has the value of an expression where the scene starts, whichever start that is.
+
+    Parameters
+    ----------
+    mechanism
+        It notes the parameter.
+    name
+        Of the parameter.
+    form, value
+        In which form's coordinates it is said, and what it is the value of.
+    """
+    symbol = mechanism.table.graph.parameter(name)
+    mechanism.constants[symbol] = form, value
+    mechanism.table.values[symbol] = _at_start(mechanism, form, value)
+    return symbol
+
+
+def _at_start(mechanism: Mechanism, form: str, value: Expression) -> float:
+    assert mechanism.places is not None
+    return evaluate([value], {**mechanism.table.values, **mechanism.places[form]})[0]
+
+
+def started_at(mechanism: Mechanism, places: Mapping[str, Mapping[Expression, float]]) -> Mechanism:
+    """Return a mechanism with the constants of another start.
+
+    Parameters
+    ----------
+    mechanism
+        With the values of all other parameters.
+    places
+        Where it starts.
+    """
+    made = replace(mechanism, places=places, table=replace(mechanism.table, values=dict(mechanism.table.values)))
+    for symbol, said in mechanism.constants.items():
+        made.table.values[symbol] = _at_start(made, *said)
+    return made
 
 
 def extent(mechanism: Mechanism) -> float:

@@ -208,6 +208,14 @@ def constant_pivot(
 def _at_reference(mechanism: Mechanism, places: Places, constants: Sequence[Expression]) -> list[Expression]:
     """Return expressions that are the same everywhere, but for a common factor, in terms of parameters alone."""
     found = substitute(list(constants), places.reference())
+    numbers = decide(mechanism, partial(_away_from_reference, places, tuple(constants), tuple(found)))
+    return found if numbers is None else [one.graph.constant(x) for one, x in zip(found, numbers, strict=True)]
+
+
+def _away_from_reference(
+    places: Places, constants: Sequence[Expression], found: Sequence[Expression], mechanism: Mechanism
+) -> tuple[float, ...] | None:
+    """Return the values elsewhere of what has none, or others, at the reference; None where these are alike."""
     numbers = places.values(mechanism, constants)[0]
     try:
         values = np.array(evaluate(found, mechanism.table.values))
@@ -217,8 +225,8 @@ def _at_reference(mechanism: Mechanism, places: Places, constants: Sequence[Expr
     off = values * numbers[largest] - numbers * values[largest]
     size = abs(numbers[largest] * values[largest])
     if size > 0.0 and np.max(np.abs(off)) <= 1e-9 * size:  # False where there is no value
-        return found
-    return [one.graph.constant(number) for one, number in zip(found, numbers.tolist(), strict=True)]
+        return None
+    return tuple(numbers.tolist())
 
 
 Integral = tuple[tuple[int, ...], dict[int, Expression]]

@@ -21,7 +21,7 @@ from atwood.mechanics.elimination import SOLVED, eliminate_linear
 from atwood.mechanics.equations import Integral, put_in_place
 from atwood.mechanics.forces import Site, local_map
 from atwood.mechanics.inertia import Masses
-from atwood.mechanics.mechanism import Mechanism, decide, extent
+from atwood.mechanics.mechanism import Mechanism, decide, extent, from_start
 from atwood.mechanics.motion import Motion, Movement
 from atwood.mechanics.pfaffian import (
     NEEDED,
@@ -130,10 +130,7 @@ def _held_still(
 
     Such a constraint depends on one coordinate alone, which is at a root of it that stands by itself.
     """
-    table = mechanism.table
     made: list[Integral] = []
-    assert mechanism.places is not None
-    start = {**table.values, **mechanism.places["reduced"]}
     state: Movement | None = None
     for number, (path, one, given) in enumerate(values):
         if given is SOLVED:
@@ -149,18 +146,37 @@ def _held_still(
             continue
         symbol = state.coordinates[alone]
         (slope,) = jvp([value], {symbol: 1.0})
-        step = 0.5 * (extent(mechanism) or 1.0) if state.names[alone].unit == "m" else 0.5
-        near, away = (evaluate([slope], {**start, symbol: start[symbol] + far})[0] for far in (0.0, step))
-        if not abs(near) > 1e-3 * abs(away):
+        is_length = state.names[alone].unit == "m"
+        if not decide(mechanism, partial(_stands_by_itself, symbol, slope, is_length)):
             continue
-        constant = table.graph.convert(table.scalar(f"place {count + len(made)}", start[symbol]))
+        constant = mechanism.table.graph.zero  # it shapes the equations, as other zeros do
+        if not decide(mechanism, partial(_is_at_zero, symbol, is_length)):
+            constant = from_start(mechanism, f"place {count + len(made)}", "reduced", symbol)
         solution.update({s: substitute([e], {symbol: constant})[0] for s, e in solution.items()})
         solution[symbol] = constant
         values[number] = (path, one, SOLVED)
         made.append(Integral(((path, one.law.name, one.index),), symbol - constant, constant, False))
-        start = {**start, **table.values}
         state = None  # it is another motion now
     return made
+
+
+def _stands_by_itself(symbol: Expression, slope: Expression, is_length: bool, mechanism: Mechanism) -> bool:
+    """Return whether a coordinate starts at a root that stands by itself, of a value with the given slope."""
+    assert mechanism.places is not None
+    start = {**mechanism.table.values, **mechanism.places["reduced"]}
+    step = 0.5 * _unit(mechanism, is_length)
+    near, away = (evaluate([slope], {**start, symbol: start[symbol] + far})[0] for far in (0.0, step))
+    return abs(near) > 1e-3 * abs(away)
+
+
+def _is_at_zero(symbol: Expression, is_length: bool, mechanism: Mechanism) -> bool:
+    """Return whether a coordinate starts at zero, but for rounding."""
+    assert mechanism.places is not None
+    return abs(mechanism.places["reduced"][symbol]) <= 1e-13 * _unit(mechanism, is_length)
+
+
+def _unit(mechanism: Mechanism, is_length: bool) -> float:
+    return (extent(mechanism) or 1.0) if is_length else 1.0
 
 
 def _depends_on_one(places: Places, value: Expression, mechanism: Mechanism) -> int | None:
@@ -207,7 +223,7 @@ def _integral(
     form: str = "reduced",
 ) -> Integral:
     """Return an integral with its constant, a parameter that gets its value from the start."""
-    graph, table = mechanism.table.graph, mechanism.table
+    graph = mechanism.table.graph
     places = {rate: q for q, rate in zip(state.coordinates, state.rates, strict=True)}
     symbols = [places.get(speed) for speed in state.speeds] + [mechanism.time]
     total = graph.zero
@@ -215,11 +231,10 @@ def _integral(
         symbol = symbols[i]
         assert symbol is not None
         total = total + c * symbol
-    assert mechanism.places is not None
-    (start,) = evaluate([total], {**table.values, **mechanism.places[form]})
-    constant = table.scalar(f"integral {number} ({form})", start)
+    # Also where it is zero, which another start need not make it.
+    constant = from_start(mechanism, f"integral {number} ({form})", form, graph.convert(total))
     keys = tuple((forms[i].path, forms[i].constraint.law.name, forms[i].constraint.index) for i in members)
-    return Integral(keys, graph.convert(total - constant), graph.convert(constant))
+    return Integral(keys, graph.convert(total - constant), constant)
 
 
 def _solved_speeds(mechanism: Mechanism, places: Places, forms: Sequence[Form]) -> dict[Expression, Expression]:

@@ -152,9 +152,11 @@ def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
     u = dict(zip(before.speeds, start.speeds.tolist(), strict=True))
     place = {**assembly.mechanism.table.values, **assembly.known_relations, before.time: start.time, **q}
     sizes = np.maximum(coordinate_scales(before, start.length), np.abs(start.coordinates))
-    for one in after.integrals:
+    slopes_of = assembly.shared.get(
+        "slopes of integrals", lambda: [jacobian([one.value], before.coordinates) for one in after.integrals]
+    )
+    for one, slopes in zip(after.integrals, slopes_of, strict=True):
         (missed,) = evaluate([one.value], place)
-        slopes = jacobian([one.value], before.coordinates)
         terms = np.abs(evaluate(slopes.entries, place)) * sizes[list(slopes.columns)]
         if not abs(missed) <= 1e-9 * float(np.max(terms, initial=0.0)):
             raise StartError(

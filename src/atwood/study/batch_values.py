@@ -43,7 +43,8 @@ class ParameterRows:
         self._order = order
         assembly = order.assembly
         axes = [(k, axis) for k, axis in enumerate(order.cases.axes) if not axis.is_start]
-        self.varies = bool(axes)
+        # Constants that the start gives are parameters, too.
+        self.varies = bool(axes or assembly.mechanism.constants)
         self._lock = threading.Lock()
         if not self.varies:
             return
@@ -73,7 +74,8 @@ class ParameterRows:
         kinds = {type(part.component) for path, part in assembly.flat.parts.items() if path in varied}
         checks = any(kind.check_values is not Component.check_values for kind in kinds)
         closures = mechanism.bodies.closures
-        self._is_simple = not mechanism.decisions and not closures and not checks and not self._builds()
+        is_plain = not mechanism.decisions and not mechanism.constants and not closures and not checks
+        self._is_simple = is_plain and not self._builds()
 
     def _builds(self) -> bool:
         """Return whether some model makes its parts from its parameters."""
@@ -267,7 +269,7 @@ class StartRows:
     def _assembly(self, run: int) -> Assembly:
         """Return the assembly of a run."""
         order, assembly = self._order, self._order.assembly
-        if any(not axis.is_start for axis in order.cases.axes):
+        if assembly.mechanism.constants or any(not axis.is_start for axis in order.cases.axes):
             return assembly.with_values(order.cases.of(run)[0], start=order.cases.of(run)[1])
         start = {path: float(column[run]) for path, column in self._columns.items()}
         return replace(assembly, flat=replace(assembly.flat, start={**assembly.flat.start, **start}))
