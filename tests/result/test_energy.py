@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import atwood_library as lib
-from atwood import Component, Point, Result, Scalar, Scene, connector, potential, select, simulate, sin
+from atwood import Component, Point, Result, Scalar, Scene, connector, external, potential, select, simulate, sin
+from atwood.errors import ResultError
+from atwood.expr import ExternalFunction
 from atwood.result.work import integral_in_steps, integral_of_samples, nodes_between
 from atwood.solve.retrace import run_again, times_of_steps
 from atwood_library.scenes import SCENES
@@ -270,3 +272,14 @@ def test_integrals_and_their_errors() -> None:
     for count in (3, 7):
         parts, error = integral_in_steps(grid, np.exp(nodes_between(grid, count)).reshape(-1, count))
         assert abs(parts[-1] - math.expm1(1.0)) < max(error, 1e-15)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # a function in Python is slow
+def test_power_that_has_no_value_at_a_sample_is_an_error_and_no_drift_of_zero() -> None:
+    gap = ExternalFunction("gap", lambda t: math.nan if t == 0.7125 else 1.0, (None,))
+    scene = flying(1.0)
+    push = scene.add("push", lib.Force(value=lambda t: external(gap, t)))
+    scene.connect(push.point, scene["bob"].point)
+    result = simulate(scene, t_end=1.0, solver="ida")
+    with pytest.raises(ResultError, match="has no value"):
+        _ = result.energy

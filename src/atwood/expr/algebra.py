@@ -404,12 +404,12 @@ def binary(operation: str, a: Expression, b: Expression) -> Expression:
         first = _time_relation("less", a, b) if operation == "minimum" else _time_relation("less", b, a)
         if first is not None:
             return select(first, a, b)
-    if operation == "atan2":
-        is_left, is_below = _time_relation("less", b, a.graph.zero), _time_relation("less", a, a.graph.zero)
-        if is_left is not None and is_below is not None:  # it jumps where it comes round
-            half = select(is_below, a.graph.constant(-math.pi), a.graph.constant(math.pi))
-            around = add(a.graph.node("atan2", (negate(a), negate(b))), half)
-            return select(is_left, around, a.graph.node("atan2", (a, b)))
+    relations = a.graph.relations
+    if operation == "atan2" and relations is not None and relations.are_timed(a, b):  # it jumps where it comes round
+        is_left, is_below = relations.take("less", b), relations.take("less", a)
+        half = select(is_below, a.graph.constant(-math.pi), a.graph.constant(math.pi))
+        around = add(a.graph.node("atan2", (negate(a), negate(b))), half)
+        return select(is_left, around, a.graph.node("atan2", (a, b)))
     return a.graph.node(operation, (a, b))
 
 

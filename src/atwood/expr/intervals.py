@@ -138,7 +138,7 @@ def _power(a: Bounds, b: Bounds) -> Bounds:
 
 def _turn(y: Bounds, x: Bounds) -> Bounds:
     low, high = _corners(np.arctan2, y, x)
-    comes_round = (x[0] <= 0.0) & (y[0] <= 0.0) & (y[1] >= 0.0)
+    comes_round = (x[0] <= 0.0) & (y[0] <= 0.0) & (y[1] >= 0.0) & (y[0] < y[1])  # not where y is zero exactly
     return np.where(comes_round, -math.pi, low), np.where(comes_round, math.pi, high)
 
 

@@ -113,12 +113,14 @@ class TimeRelations:
             return difference
         key = (kind, difference)
         if key not in self._symbols:
-            symbol = difference.graph.symbol(f"relation {len(self.found)}")
+            graph, zero = difference.graph, difference
+            if kind == "floor":
+                zero = algebra.unary("sin", algebra.multiply(graph.constant(math.pi), difference))
+            symbol = graph.symbol(f"relation {len(self.found)}")
+            # Making nodes may end with `TimeIsUp`: so it is known only once it is found, too.
             self._symbols[key] = symbol
             self._kinds[symbol.index] = _TIMED
-            whole = kind == "floor"
-            zero = algebra.unary("sin", algebra.multiply(symbol.graph.constant(math.pi), difference))
-            self.found.append(Relation(symbol, kind, difference, zero if whole else difference))
+            self.found.append(Relation(symbol, kind, difference, zero))
         return self._symbols[key]
 
     def _kind(self, expression: Expression) -> int:
@@ -170,8 +172,8 @@ def values_just_after(relations: Sequence[Relation], known: Mapping[Expression, 
     for one in relations:
         if one.kind == "floor":
             nearest = float(np.round(evaluate([one.difference], values)[0]))
-            side = _side_after(one.difference - nearest, values, relations_of.time)
-            values[one.symbol] = relation_value("floor", nearest + float(np.clip(side, -0.5, 0.5)))
+            is_below = _side_after(one.difference - nearest, values, relations_of.time) < 0.0
+            values[one.symbol] = nearest - 1.0 if is_below else nearest
             continue
         values[one.symbol] = relation_value(one.kind, _side_after(one.difference, values, relations_of.time))
     return tuple(values[one.symbol] for one in relations)

@@ -242,6 +242,6 @@ def make_ledger(
     all_work = np.concatenate(done)
     balance = kinetic + potential - all_work
     exchanged, rounding = exchange(pieces, all_work), 2.0 * max(one.rounding for one in pieces)
-    beyond = max(0.0, float(np.max(np.abs(balance - balance[0]))) - rounding)
+    beyond = float(np.maximum(0.0, np.max(np.abs(balance - balance[0])) - rounding))  # nan stays nan
     share = beyond / max(exchanged, rounding) if beyond else 0.0
     return EnergyLedger(kinetic[shown], potential[shown], all_work[shown], share, exchanged, rounding + unsure)

@@ -38,7 +38,6 @@ __all__ = ["Result", "output_number"]
 
 FloatArray = NDArray[np.float64]
 
-
 _LONGER = "Give it more time; or assemble the scene first, and hand the assembly to several runs."
 
 
@@ -323,9 +322,10 @@ class Result:
     def energy(self) -> EnergyLedger:
         """Kinetic and potential energy, work, and how well they balance."""
         pieces = [account(segment, self._power_of_drives) for segment in self._segments]
-        if not all(np.all(np.isfinite(x)) for one in pieces for x in (one.kinetic, one.potential)):
+        every = (x for one in pieces for x in (one.kinetic, one.potential, one.power) if x is not None)
+        if not all(np.all(np.isfinite(x)) for x in every):
             raise ResultError(
-                "the energy has no value somewhere along the run",
+                "the energy, or the power put in, has no value somewhere along the run",
                 where=self._without_energy(),
                 advice="A law is evaluated outside its domain there: look at its formula and at the start.",
             )
