@@ -35,7 +35,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return count
 
 
-@pytest.mark.parametrize(("form", "most"), [("reduced", 35), ("dae", 50)])
+@pytest.mark.parametrize(("form", "most"), [("reduced", 28), ("dae", 40)])
 def test_a_crossing_takes_few_evaluations(form: str, most: int, calls: list[int]) -> None:
     result = simulate(FourBarRow(windows=1), form=form)
     assert len(result.passages) == 10

@@ -13,7 +13,7 @@ from atwood import Result, Scene, assemble, simulate, sweep
 from atwood import clock as clock_module
 from atwood.clock import Clock, TimeIsUp, check_time, more_time, time_left, within_time
 from atwood.errors import ResultError, SolveError
-from atwood.solve import explicit_session, ida_native
+from atwood.solve import explicit_session, ida_native, without_inertia
 from atwood_library.scenes import DoublePendulum, FourBar, FourBarRow, SimplePendulum
 
 FORMS = ("reduced", "dae")
@@ -72,6 +72,15 @@ def test_a_run_without_time_for_its_start_has_nothing_and_says_so(form: str) -> 
     assert "before the start was found" in result.message
     with pytest.raises(ResultError, match=r"there is nothing in it: the limit of 1e-09 s was used up.*more time"):
         _ = result.time
+
+
+def test_what_has_inertia_everywhere_needs_no_singular_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    # those of rows of four-bars cannot be interrupted, and took longer than all else at their start
+    def refuse(*_: object) -> None:
+        raise AssertionError("what is free to move is looked for")
+
+    monkeypatch.setattr(without_inertia, "open_directions", refuse)
+    assert simulate(FourBarRow(windows=3), t_end=0.01).status == "finished"
 
 
 def test_a_sweep_without_time_says_so_for_each_run() -> None:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.clock import within_time
 from atwood.kernels.rough import ROUGHNESS
 from atwood.solve.matrices import Matrix, is_full, scaled, to_array
 
@@ -274,7 +275,8 @@ def open_directions(matrix: FloatArray, least: float = 0.0) -> FloatArray:
         Where they nearly depend on each other: what counts as no change, relative to the size of each.
     """
     sizes = np.linalg.norm(matrix, axis=1, keepdims=True)
-    _, values, directions = np.linalg.svd(matrix / np.where(sizes > 0.0, sizes, 1.0))
+    rows = matrix / np.where(sizes > 0.0, sizes, 1.0)
+    _, values, directions = within_time(lambda: np.linalg.svd(rows))
     return np.asarray(directions[len(matrix) if least == 0.0 else int(np.sum(values > least)) :])
 
 

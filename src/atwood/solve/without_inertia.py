@@ -45,6 +45,8 @@ def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatA
             raise _without_inertia(assembly, moving)
         return
     weighed = mass * sizes[:, None] * sizes[None, :]
+    if _is_clearly_positive(weighed):
+        return
     if slope.shape[0]:
         free = open_directions(scaled(slope, sizes))
     else:
@@ -55,6 +57,15 @@ def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatA
     if values[0] > 1e-14 * max(values[-1], 1e-300):
         return
     raise _without_inertia(assembly, np.abs(vectors[:, 0] @ free))
+
+
+def _is_clearly_positive(weighed: FloatArray) -> bool:
+    """Return whether there is inertia in every direction, free or not: then what is free need not be found."""
+    try:
+        np.linalg.cholesky(weighed - 1e-12 * np.trace(weighed) * np.eye(len(weighed)))
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def _sizes_of_inertia(mass: Matrix, sizes: FloatArray) -> FloatArray:
