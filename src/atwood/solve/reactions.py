@@ -98,11 +98,12 @@ def _of_least_size(
     even, forces = slope * sizes[program.slope_rows] * columns[program.slope_columns], multipliers / sizes[kept]
     if not _is_full(program):
         return _states(assembly, form, kept).least_size(even, forces) * sizes
-    found = np.zeros((program.constraints, samples))
+    found = np.full((program.constraints, samples), np.nan)
+    known = np.flatnonzero(np.all(np.isfinite(even), axis=0) & np.all(np.isfinite(forces), axis=0))
     step = max(1, _CHUNK // (program.constraints * program.speeds))
-    for first in range(0, samples, step):
-        part = slice(first, min(first + step, samples))
-        full = np.zeros((part.stop - part.start, program.constraints, program.speeds))
+    for first in range(0, len(known), step):
+        part = known[first : first + step]
+        full = np.zeros((len(part), program.constraints, program.speeds))
         full[:, program.slope_rows, program.slope_columns] = even[:, part].T
         found[:, part] = least_size(full, kept, forces[:, part].T).T
     return found * sizes

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.errors import KernelEvaluationError
 from atwood.solve.balance import Balance
 from atwood.solve.matrices import scaled, to_array
 from atwood.solve.rank import CLEAR, SINGULAR, independent_rows, open_directions, review_rows, row_sizes
@@ -181,17 +182,18 @@ def _nearby(balance: Balance, t: float, q: FloatArray, scales: FloatArray, here:
             break
         # any direction that no symmetry singles out
         along = np.sin(attempt * _GOLDEN * np.arange(1.0, len(admissible) + 1.0)) @ admissible
-        moved = balance.turning.moved(t, q, step * scales * along / np.linalg.norm(along))
-        nearby, _ = balance.project(t, moved, still, scales)
-        miss = balance.misses(t, nearby, still, scales)[0]
-        if not miss <= _ADMISSIBLE:
-            # From a singular position, Newton's method falls back into it unless something holds it away.
-            held = np.where(np.arange(len(scales)) == np.argmax(np.abs(along)), 0.0, scales)
-            nearby, _ = balance.project(t, moved, still, held, iterations=30)
-            miss = balance.misses(t, nearby, still, scales)[0]
-            if not miss <= _ADMISSIBLE:
-                continue
-        found.append(_look(balance, t, nearby, scales, miss))
+        way = step * scales * along / np.linalg.norm(along)
+        # From a singular position, Newton's method falls back into it unless something holds it away.
+        held = np.where(np.arange(len(scales)) == np.argmax(np.abs(along)), 0.0, scales)
+        for free, iterations in ((scales, 12), (held, 30)):
+            try:
+                nearby, _ = balance.project(t, balance.turning.moved(t, q, way), still, free, iterations)
+                miss = balance.misses(t, nearby, still, scales)[0]
+                if miss <= _ADMISSIBLE:
+                    found.append(_look(balance, t, nearby, scales, miss))
+                    break
+            except (KernelEvaluationError, np.linalg.LinAlgError):
+                continue  # a law has no value there: that says nothing about the start
     return found, bool(len(admissible))
 
 
