@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from atwood import UsageError
-from atwood.arguments import FILE, FLAG, TEXTS, each, instance, number, one_of, optional, takes, whole
+from atwood.arguments import FILE, FLAG, TEXT, each, instance, number, one_of, optional, takes, whole
 
 
 @takes(
     share=number("a share between 0 and 1", above=0.0, below=1.0),
     count=whole("a count from 1 to 9", 1, 9),
     word=one_of(("alpha", "beta")),
-    names=TEXTS,
+    names=each(TEXT, "a list of texts"),
     flag=FLAG,
     file=optional(FILE),
     parts=each(instance("a number", complex), "complex numbers"),

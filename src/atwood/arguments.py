@@ -29,7 +29,6 @@ __all__ = [
     "MAPPING",
     "NAME",
     "TEXT",
-    "TEXTS",
     "Kind",
     "Refused",
     "check",
@@ -355,7 +354,6 @@ ANYTHING = Kind("anything", lambda value: value)
 TEXT = Kind("text", _text)
 NAME = Kind("a name, as text", _not_blank)
 DOC = Kind("one line of meaning", _not_blank)
-TEXTS = each(TEXT, "a list of texts")
 FILE = Kind("the path of a file, as text or a Path", _file)
 CALLBACK = Kind("a function", _callback)
 FLAG = Kind("True or False", _flag)

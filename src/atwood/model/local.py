@@ -6,9 +6,9 @@ says by itself which connectors it depends on, and whose derivatives are the for
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, UnsupportedError
@@ -19,7 +19,7 @@ from atwood.model.connectors import Frame, JointCoordinate, Motion
 from atwood.model.contributions import BodyInertia, Load, Placement, PointInertia
 from atwood.model.fields import ParameterSpec
 from atwood.model.flatten import FlatScene, Part
-from atwood.model.grips import counting_constraints, find_grips, formulas_of
+from atwood.model.grips import Grip, counting_constraints, find_grips, formulas_of
 from atwood.model.laws import Law, scalars
 from atwood.model.local_parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart, multiplier_symbol
 from atwood.model.moving_mass import check_lagrangians, find_varying
@@ -112,18 +112,50 @@ def _check_space(path: str, part: Part, space: str) -> None:
 _PLACES = {"line": "on a line", "plane": "in a plane", "space": "in space"}
 
 
-def _localize_part(
+@dataclass(frozen=True)
+class _Bound:
+    """A part on its symbols, before its laws are evaluated."""
+
+    binding: Binding
+    connectors: dict[str, LocalConnector]
+    signal_symbols: dict[str, Expression]
+    grips: Sequence[Grip]
+
+
+@dataclass(frozen=True)
+class _Laws:
+    """The laws of a part that hold in the space and the mode."""
+
+    part: Part
+    space: Space
+    mode: str
+    graph: Graph
+
+    def of(self, kind: Any) -> list[Law]:
+        laws = self.part.component.laws(kind)
+        return [law for law in laws if law.holds_in(self.space.name) and law.acts_in(self.mode)]
+
+    def scalars(self, bound: Any, kind: Any, only_in_modes: bool = False) -> tuple[Expression, ...]:
+        """Return what laws give that return one number, where that is not zero."""
+        chosen = [law for law in self.of(kind) if law.options.modes or not only_in_modes]
+        found = [call_law(self.part.path, law, partial(_scalar, bound, law, self.graph)) for law in chosen]
+        return tuple(one for one in found if not one.is_zero)
+
+    def listed(self, bound: Any, kind: Any) -> list[Any]:
+        """Return what laws give that return several things."""
+        return [one for law in self.of(kind) for one in call_law(self.part.path, law, partial(_listed, bound, law))]
+
+
+def _bind_part(
     part: Part,
     flat: FlatScene,
     space: Space,
     time: Expression,
     table: ParameterTable,
-    modes: Mapping[str, str],
     sides: Mapping[tuple[str, str, str], float] | None,
     taken: Sequence[tuple[Held, LocalPart]],
-    counted: Collection[str],
-    carried: Mapping[tuple[str, str], Carried],
-) -> LocalPart:
+) -> _Bound:
+    """Return the symbols of a part, and the numbers of its parameters."""
     graph, component = table.graph, part.component
     values = {name: _parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
     signal_symbols: dict[str, Expression] = {}
@@ -141,38 +173,44 @@ def _localize_part(
     binding = Binding(values=values, motions=motions, time=time, space=space.name, line=space.line, sides=own_sides)
     for one in grips:
         connectors.update(one.connectors)
+    return _Bound(binding, connectors, signal_symbols, grips)
+
+
+def _localize_part(
+    part: Part,
+    flat: FlatScene,
+    space: Space,
+    time: Expression,
+    table: ParameterTable,
+    modes: Mapping[str, str],
+    sides: Mapping[tuple[str, str, str], float] | None,
+    taken: Sequence[tuple[Held, LocalPart]],
+    counted: Collection[str],
+    carried: Mapping[tuple[str, str], Carried],
+) -> LocalPart:
+    graph, component = table.graph, part.component
+    symbols = _bind_part(part, flat, space, time, table, sides, taken)
+    binding, connectors = symbols.binding, symbols.connectors
     bound = bind(component, binding)  # inertia and joints say what bodies there are, and may not ask what these have
     known = {
         name: replace(one, body=carried.get((part.path, name)) or Asked(graph, f"{part.path}.{name}"))
-        for name, one in motions.items()
+        for name, one in binding.motions.items()
     }
     binding = replace(binding, motions=known)
     acting = bind(component, binding)
     mode = modes.get(part.path, component.modes[0] if component.modes else "")
-
-    def laws(kind: Any) -> list[Law]:
-        return [law for law in component.laws(kind) if law.holds_in(space.name) and law.acts_in(mode)]
-
-    def scalar_laws(kind: Any, only_in_modes: bool = False) -> tuple[Expression, ...]:
-        chosen = [law for law in laws(kind) if law.options.modes or not only_in_modes]
-        found = [call_law(part.path, law, functools.partial(_scalar, acting, law, graph)) for law in chosen]
-        return tuple(one for one in found if not one.is_zero)
-
-    def listed_laws(kind: Any, bound: Any) -> list[Any]:
-        return [one for law in laws(kind) for one in call_law(part.path, law, functools.partial(_listed, bound, law))]
-
-    potentials, switched = scalar_laws("potential"), scalar_laws("potential", only_in_modes=True)
-    constraints = [one for law in laws("constraint") for one in _local_constraints(part, law, acting, graph)]
-    inertias = listed_laws("inertia", bound)
-    lagrangians, symbols = scalar_laws("lagrangian"), [*connectors.values()]
-    check_lagrangians(part.path, lagrangians, symbols, signal_symbols.values())
-    joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws("joint"))
-    own = [symbol for joint in joints for symbol in joint.coordinates]
-    formulas = formulas_of(part, bound, own, graph) if space.name == "space" else {}
+    laws, own, linked = _Laws(part, space, mode, graph), [*connectors.values()], symbols.signal_symbols.values()
+    potentials, switched = laws.scalars(acting, "potential"), laws.scalars(acting, "potential", only_in_modes=True)
+    constraints = [one for law in laws.of("constraint") for one in _local_constraints(part, law, acting, graph)]
+    inertias, lagrangians = laws.listed(bound, "inertia"), laws.scalars(acting, "lagrangian")
+    check_lagrangians(part.path, lagrangians, own, linked)
+    joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws.of("joint"))
+    coordinates = [symbol for joint in joints for symbol in joint.coordinates]
+    formulas = formulas_of(part, bound, coordinates, graph) if space.name == "space" else {}
     # Only forces may read reactions: they are solved for together with the accelerations.
     binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
     acting = bind(component, binding)
-    dissipations, loads = scalar_laws("dissipation"), listed_laws("force", acting)
+    dissipations, loads = laws.scalars(acting, "dissipation"), laws.listed(acting, "force")
     forces: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components)]
     _check_reads(part, connectors, potentials, dissipations)
     return LocalPart(
@@ -186,12 +224,12 @@ def _localize_part(
         dissipations=dissipations,
         loads=tuple(loads),
         constraints=(*constraints, *counting_constraints(part, counted, formulas, graph)),
-        signal_symbols=signal_symbols,
-        formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in grips}},
-        borrowed={full: end for one in grips for full, end in one.borrowed.items()},
+        signal_symbols=symbols.signal_symbols,
+        formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in symbols.grips}},
+        borrowed={full: end for one in symbols.grips for full, end in one.borrowed.items()},
         switched=switched,
         lagrangians=lagrangians,
-        varying=find_varying(part.path, inertias, symbols, signal_symbols.values(), graph),
+        varying=find_varying(part.path, inertias, own, linked, graph),
         reads=_multipliers_read(part, constraints, forces, graph),
     )
 
