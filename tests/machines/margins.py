@@ -23,8 +23,9 @@ import pytest
 TESTS = Path(__file__).resolve().parent.parent
 PROPERTY = "margins"
 
-_NUMBER = r"(?:np\.float64\()?(-?\d+\.?\d*(?:e[-+]?\d+)?)\)?"
-_BELOW = re.compile(rf"(?<![\w.]){_NUMBER} <=? {_NUMBER}(?![\w.])")
+_DIGITS = r"-?\d+\.?\d*(?:e[-+]?\d+)?"
+_NUMBER = rf"((?<![\w.]){_DIGITS}|np\.float64\({_DIGITS}\))"
+_BELOW = re.compile(rf"{_NUMBER} <=? {_NUMBER}(?![\w.])")
 
 pytest.register_assert_rewrite("tests.helpers", "tests.references")
 
@@ -32,8 +33,10 @@ pytest.register_assert_rewrite("tests.helpers", "tests.references")
 def ratio_in(explanation: str) -> float | None:
     """Return the largest value / bound among the comparisons `value < bound` that an explanation shows, if any."""
     first_line = explanation.partition("\n")[0]
-    pairs = [(float(value), float(bound)) for value, bound in _BELOW.findall(first_line)]
-    return max((value / bound for value, bound in pairs if value >= 0 and bound > 0), default=None)
+    found = (
+        [float(side.removeprefix("np.float64(").rstrip(")")) for side in pair] for pair in _BELOW.findall(first_line)
+    )
+    return max((value / bound for value, bound in found if 0 <= value <= bound and bound > 0), default=None)
 
 
 def ratio_of_arrays(actual: Any, desired: Any, rtol: float, atol: float) -> float | None:
@@ -76,7 +79,11 @@ class Margins:
             item.user_properties.append((PROPERTY, dict(self.current)))
 
     def pytest_assertion_pass(self, orig: str, expl: str) -> None:
-        self.record(orig, ratio_in(expl))
+        frame: FrameType | None = sys._getframe(1)
+        while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in ("pluggy", "_pytest"):
+            frame = frame.f_back
+        if frame is not None and _is_test(frame):  # and not a plugin of pytest, whose assertions are rewritten, too
+            self.record(orig, ratio_in(expl))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Gather what a test recorded, in this process or in a worker of pytest-xdist."""

@@ -13,6 +13,7 @@ KINDS = {
     "arguments": "arguments",
     "broken": "broken",
     "files": "files",
+    "interrupts": "interrupts",
     "scenes": "scenes",
     "metamorphic": "metamorphic",
     "memory": "memory",
