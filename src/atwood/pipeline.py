@@ -25,6 +25,7 @@ from atwood.forms.starting import with_places
 from atwood.mechanics.build import Mechanism, check_closures, make_gravity
 from atwood.mechanics.carried import inertia_asked_for
 from atwood.mechanics.constraints import holds_velocities
+from atwood.mechanics.idle_spin import hold_idle_spins
 from atwood.mechanics.inertia import check_tensors
 from atwood.mechanics.orientation import body_offsets
 from atwood.model.composite import Model
@@ -211,7 +212,7 @@ def read_mechanism(
     mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links, told, t_start=flat.t_start)
     check_closures(mechanism)
     check_tensors(mechanism.locals_, table.values, mechanism.space)
-    return mechanism
+    return hold_idle_spins(mechanism)
 
 
 @takes(

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from atwood import (
-    AtwoodError,
     Component,
     ParameterError,
     Scene,
@@ -139,13 +138,6 @@ def test_a_mesh_that_is_not_closed_is_refused_with_the_part(tmp_path: Path) -> N
     with pytest.raises(ParameterError, match="not closed") as caught:
         assemble(scene)
     assert caught.value.where == "part.file"
-
-
-def test_a_bar_that_could_spin_without_inertia_is_refused() -> None:
-    scene = Scene(space="space")
-    scene.add("bar", Bar())
-    with pytest.raises(AtwoodError, match="without inertia"):
-        simulate(scene, t_end=0.1)
 
 
 # -- in scenes ----------------------------------------------------------------------------------------------------

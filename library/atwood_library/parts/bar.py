@@ -14,7 +14,8 @@ class Bar(StraightShape):
     """A slender uniform bar: ``m l^2/12`` across and nothing about its own axis.
 
     It is a rigid body with frames, where a `Rod` joins two points; and like a `Link`, but with its frame at its centre.
-    In space, what can spin about the bar's own axis without inertia is refused: a `Cylinder` has some.
+    In space its spin about its own axis has no inertia: it is left at rest where nothing acts on it, as between two
+    balls, and refused where something does. A `Cylinder` has some.
     """
 
     area: float = parameter(1e-4, unit="m^2", above=0.0, doc="Area of its section, which counts with a density only.")

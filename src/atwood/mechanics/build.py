@@ -11,13 +11,14 @@ from atwood.mechanics.constraints import constraint_values, find_constraints, le
 from atwood.mechanics.elimination import SOLVED, check_held, drop_closed, eliminate_linear
 from atwood.mechanics.equations import Equations, force_rows, motion_rows, put_in_place
 from atwood.mechanics.forces import Site, local_map
+from atwood.mechanics.idle_spin import IDLE_SPIN
 from atwood.mechanics.inertia import add_masses, check_masses
 from atwood.mechanics.kinematics import Kinematics, shapes
 from atwood.mechanics.mechanism import Mechanism, check_closures, extent, make_gravity
 from atwood.mechanics.motion import motion_in_plane, motion_in_space
 from atwood.mechanics.orientation import body_offsets
 from atwood.mechanics.read_multipliers import known_multipliers, with_known
-from atwood.mechanics.rolling import Taken, integrated, take_up
+from atwood.mechanics.rolling import Taken, integrated, take_up, without_idle_spins
 from atwood.model.component import bind
 from atwood.model.local import LocalConstraint
 from atwood.model.local_parts import multiplier_symbol
@@ -59,8 +60,10 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
     solution = eliminate_linear(mechanism, masses, forest, every, values) if forest.form == "reduced" else {}
     taken = Taken(solution, {}, (), left.on_velocities)
     if forest.form == "reduced" and mechanism.places is not None:
-        taken = take_up(mechanism, site, masses, forest, motion, solution, values, left.on_velocities)
+        others = [one for one in left.on_velocities if one[1].law is not IDLE_SPIN]
+        taken = take_up(mechanism, site, masses, forest, motion, solution, values, others)
         solution = dict(taken.solution)
+        taken = without_idle_spins(mechanism, motion.finish(solution), taken, left.on_velocities, values)
     values = [(path, c, substitute([v], solution)[0] if solution else v) for path, c, v in values if v is not SOLVED]
     state = motion.finish(solution, taken.speeds)
     values, prescribed = drop_closed(mechanism, state.coordinates, values)

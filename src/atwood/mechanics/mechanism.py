@@ -56,6 +56,8 @@ class Mechanism:
         is the value of there. One may depend on those before it.
     t_start
         When it starts, s.
+    idle_spins
+        The axis, in the axes of the body, of each body that has no inertia about it; see `idle_spin`.
     """
 
     table: ParameterTable
@@ -71,6 +73,7 @@ class Mechanism:
     places: Mapping[str, Mapping[Expression, float]] | None = None
     constants: dict[Expression, tuple[str, Expression]] = field(default_factory=dict)
     t_start: float = 0.0
+    idle_spins: Mapping[int, Vector] = field(default_factory=dict)
 
     def known_at_start(self) -> dict[Expression, float]:
         """Return the values of parameters, of time and of relations of it at the start of a run."""

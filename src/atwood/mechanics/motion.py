@@ -112,7 +112,7 @@ def _left(mechanism: Mechanism, forest: Forest, solution: Solution, solved: Solu
     every = _all_symbols(mechanism, forest)
     kept = [i for i, symbol in enumerate(every) if symbol not in solution]
     gone = {f"{c.name}'" for i, c in enumerate(forest.coordinates) if every[i] in solution}
-    gone |= {f"{speed.name.removeprefix('u:')}'" for speed in solved}
+    gone |= {f"{speed.name.removeprefix('u:')}{end}" for speed in solved for end in ("'", "")}
     kept_speeds = [i for i, one in enumerate(forest.speeds) if one.name not in gone]
     stems = [forest.speeds[i].name.removesuffix("'") for i in kept_speeds]
     u = tuple(graph.symbol(f"u:{stem}") for stem in stems)
@@ -121,14 +121,15 @@ def _left(mechanism: Mechanism, forest: Forest, solution: Solution, solved: Solu
         replace(
             one,
             coordinates=tuple(kept.index(i) for i in one.coordinates),
-            speeds=tuple(kept_speeds.index(i) for i in one.speeds),
+            speeds=tuple(kept_speeds.index(i) for i in one.speeds if i in kept_speeds),
         )
         for one in forest.charts
     )
     q = tuple(every[i] for i in kept)
     rates: dict[int, Expression] = {}
-    for chart in charts:
-        parts = chart_rates(chart, [q[i] for i in chart.coordinates], [u[i] for i in chart.speeds])
+    for chart, one in zip(charts, forest.charts, strict=True):
+        spin = [graph.symbol(f"u:{forest.speeds[i].name}") for i in one.speeds]
+        parts = chart_rates(chart, [q[i] for i in chart.coordinates], [solved.get(speed, speed) for speed in spin])
         rates.update(zip(chart.coordinates, (graph.convert(part) for part in parts), strict=True))
     own = [graph.symbol(f"u:{forest.coordinates[i].name}") for i in kept]
     return _Symbols(
@@ -222,10 +223,15 @@ def motion_in_space(mechanism: Mechanism, forest: Forest, shape_of: Mapping[int,
         left = _left(mechanism, forest, solution, speeds)
         graph = mechanism.table.graph
         stems = [one.name.removesuffix("'") for one in forest.speeds]
+        every_speed = [graph.symbol(f"u:{stem}") for stem in stems]
+        every_rate = [graph.symbol(f"a:{stem}") for stem in stems]
+        spins = {speed: value for speed, value in speeds.items() if speed not in set(left.rates)}
+        turning = substitute(list(spins.values()), dict(zip(every_speed, every_rate, strict=True)))
+        spin_rates = dict(zip(spins, turning, strict=True))  # these are linear, with coefficients of parameters
         course = Course(
             [solution.get(symbol, symbol) for symbol in every],
-            [graph.symbol(f"u:{stem}") for stem in stems],
-            [graph.symbol(f"a:{stem}") for stem in stems],
+            [spins.get(speed, speed) for speed in every_speed],
+            [spin_rates.get(speed, rate) for speed, rate in zip(every_speed, every_rate, strict=True)],
             {mechanism.time: 1.0, **dict(zip(left.coordinates, left.rates, strict=True))},
             dict(zip(left.speeds, left.accelerations, strict=True)),
         )

@@ -20,6 +20,7 @@ from atwood.mechanics.constraints import Values
 from atwood.mechanics.elimination import SOLVED, eliminate_linear
 from atwood.mechanics.equations import Integral, put_in_place
 from atwood.mechanics.forces import Site, local_map
+from atwood.mechanics.idle_spin import IDLE_SPIN, idle_speeds
 from atwood.mechanics.inertia import Masses
 from atwood.mechanics.mechanism import Mechanism, decide, extent, from_start
 from atwood.mechanics.motion import Motion, Movement
@@ -36,7 +37,7 @@ from atwood.mechanics.pfaffian import (
 from atwood.model.local import LocalConstraint
 from atwood.topology.forest import Forest
 
-__all__ = ["Taken", "integrated", "take_up"]
+__all__ = ["Taken", "integrated", "take_up", "without_idle_spins"]
 
 OnVelocities = Sequence[tuple[str, LocalConstraint]]
 
@@ -117,6 +118,30 @@ def take_up(
         integrals += [one for (members, _), one in zip(new, made, strict=True) if members[-1] in used]
         left = [one for i, one in enumerate(left) if i not in used]
     return Taken(found, {}, tuple(integrals), ())
+
+
+def without_idle_spins(
+    mechanism: Mechanism, state: Movement, taken: Taken, on_velocities: OnVelocities, values: Values
+) -> Taken:
+    """Return the same with spins that have no inertia: each takes one speed away, where nothing else is constrained.
+
+    Parameters
+    ----------
+    mechanism, state
+        The mechanism, and how it moves.
+    taken
+        What has become of the other constraints on velocities.
+    on_velocities, values
+        All constraints on velocities, and those on positions, of which those that are used up are marked.
+    """
+    idle = tuple(one for one in on_velocities if one[1].law is IDLE_SPIN)
+    if not idle:
+        return taken
+    if taken.left or any(value is not SOLVED for _, _, value in values):
+        return replace(taken, left=(*taken.left, *idle))
+    spins = idle_speeds(mechanism, state)
+    rolling = dict(zip(taken.speeds, substitute(list(taken.speeds.values()), spins), strict=True))
+    return replace(taken, speeds={**rolling, **spins})
 
 
 def _held_still(

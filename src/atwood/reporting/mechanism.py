@@ -11,6 +11,7 @@ import numpy as np
 from atwood.arguments import takes
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.frobenius import integrable_together
+from atwood.mechanics.idle_spin import IDLE_SPIN
 from atwood.model.composite import Model
 from atwood.pipeline import SCENE, assemble, assemble_flat
 from atwood.reporting.offers import Offer, find_offers
@@ -70,6 +71,9 @@ class MechanismReport:
         motions stay on surfaces.
     solved_speeds
         Rates of coordinates that constraints on velocities gave as functions of the speeds.
+    idle_spins
+        Slender bodies that could spin about their axis without inertia, and that nothing turns: they are left without
+        that spin, which is no degree of freedom.
     dependent
         With loops: the coordinates that follow from the others at the start; of orientations, the speeds that do.
     bodies, massless
@@ -130,6 +134,7 @@ class MechanismReport:
     integrated: tuple[str, ...]
     on_surfaces: tuple[str, ...]
     solved_speeds: tuple[str, ...]
+    idle_spins: tuple[str, ...]
     placement: Placement
     immobile: Immobile | None
     states: Mapping[str, int]
@@ -168,6 +173,7 @@ class MechanismReport:
             "integrated": list(self.integrated),
             "on_surfaces": list(self.on_surfaces),
             "solved_speeds": list(self.solved_speeds),
+            "idle_spins": list(self.idle_spins),
             "dependent": list(self.dependent),
             "loop_joints": list(self.loop_joints),
             "constraint_labels": list(self.constraints),
@@ -233,6 +239,7 @@ def report(scene: Model | Assembly, name: str | None = None, *, orientation: str
     dropped = list_dropped(reduced)
     gone = {one.path for one in dropped}
     names = [one.name for one in reduced.reduced.names]
+    idle = tuple(reduced.mechanism.bodies.bodies[index].name for index in reduced.mechanism.idle_spins)
     return MechanismReport(
         scene=given.flat.name,
         space=given.flat.space,
@@ -257,7 +264,10 @@ def report(scene: Model | Assembly, name: str | None = None, *, orientation: str
         repeated=start.repeated,
         integrated=_integrated(reduced),
         on_surfaces=_on_surfaces(reduced),
-        solved_speeds=reduced.reduced.solved_speeds,
+        solved_speeds=tuple(
+            one for one in reduced.reduced.solved_speeds if not one.startswith(tuple(f"{name}.spin." for name in idle))
+        ),
+        idle_spins=idle,
         placement=find_placement(reduced, start),
         immobile=find_immobile(reduced, len(reduced.reduced.speeds) - plans["reduced"].finding.rank, start),
         states={form: plan.program.size for form, plan in plans.items()},
@@ -275,7 +285,7 @@ def _integrated(reduced: Assembly) -> tuple[str, ...]:
 
 def _on_surfaces(reduced: Assembly) -> tuple[str, ...]:
     """Return the constraints on velocities that are left, if they could be integrated together."""
-    left = [one for one in reduced.reduced.constraints if one.value is None]
+    left = [one for one in reduced.reduced.constraints if one.value is None and one.key[1] != IDLE_SPIN.name]
     if not left or not integrable_together(reduced.mechanism, reduced.reduced):
         return ()
     return tuple(dict.fromkeys(f"{one.key[0]}.{one.key[1]}" for one in left))

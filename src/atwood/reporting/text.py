@@ -137,6 +137,11 @@ def _what_became(report: MechanismReport) -> Iterator[tuple[str, str]]:
     if report.on_surfaces:
         text = "integrable, so that motions stay on surfaces, but no simple integral was found"
         yield "on surfaces", f"{shorten(report.on_surfaces)}: {text}"
+    if report.idle_spins:
+        yield (
+            "without inertia",
+            f"the spin of {shorten(report.idle_spins)} about its own axis, on which nothing acts: left at rest",
+        )
     if report.solved_speeds:
         rates = (f"{name}'" for name in report.solved_speeds)
         yield "rolling", f"{shorten(rates)}: given by the other speeds, so no states of their own"
