@@ -27,8 +27,6 @@ _DIGITS = r"-?\d+\.?\d*(?:e[-+]?\d+)?"
 _NUMBER = rf"((?<![\w.]){_DIGITS}|np\.float64\({_DIGITS}\))"
 _BELOW = re.compile(rf"{_NUMBER} <=? {_NUMBER}(?![\w.])")
 
-pytest.register_assert_rewrite("tests.helpers", "tests.references")
-
 
 def ratio_in(explanation: str) -> float | None:
     """Return the largest value / bound among the comparisons `value < bound` that an explanation shows, if any."""
@@ -136,6 +134,7 @@ def _watch_comparisons(margins: Margins, patch: pytest.MonkeyPatch) -> None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
+    pytest.register_assert_rewrite("tests.helpers", "tests.references")
     parser.addoption("--margins", type=Path, help="write outcomes, and value / bound of every comparison, to this file")
 
 
