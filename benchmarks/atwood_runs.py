@@ -15,11 +15,11 @@ import numpy as np
 from mechanisms import FloatArray, Mechanism
 
 from atwood import simulate
-from atwood.solve import ida_native
-from atwood.solve.driver import Advance, SolverOptions, Statistics, Status
-from atwood.solve.explicit_scene import explicit_problem
-from atwood.solve.explicit_session import open_explicit
-from atwood.solve.problem import Plan, pack_state
+from atwood.integrators.explicit_session import open_explicit
+from atwood.integrators.ida import native as ida_native
+from atwood.integrators.protocol import Advance, SolverOptions, Statistics, Status
+from atwood.simulation.problem.explicit_scene import explicit_problem
+from atwood.simulation.problem.problem import Plan, pack_state
 
 __all__ = ["Prepared", "explicit_run", "ida_run", "ida_session", "prepare", "taylor_run", "whole_run"]
 
@@ -98,7 +98,7 @@ def explicit_run(prepared: Prepared, rtol: float) -> Run:
 
 def taylor_run(prepared: Prepared, rtol: float) -> Run:
     """Return a run with the Taylor-series method."""
-    from atwood.solve.taylor_scene import open_taylor, taylor_problem
+    from atwood.simulation.problem.taylor_scene import open_taylor, taylor_problem
 
     assembly = prepared.plan.assembly
     problem, series = explicit_problem(assembly), taylor_problem(assembly, prepared.mechanism.t_end)

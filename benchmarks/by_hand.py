@@ -13,11 +13,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
 
 __all__ = ["KERNEL", "Loop", "compiler", "load"]
 
-FloatArray = NDArray[np.float64]
 HERE = Path(__file__).resolve().parent / "hand"
 
 KERNEL = ctypes.CFUNCTYPE(c_int, *[c_void_p] * 4)

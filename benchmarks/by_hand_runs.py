@@ -14,8 +14,8 @@ import by_hand
 import numpy as np
 from mechanisms import GRAVITY, FloatArray, Mechanism
 
-from atwood.solve import native_setup
-from atwood.solve.sundials_library import library
+from atwood.integrators.ida import setup as native_setup
+from atwood.integrators.ida.library import library
 
 __all__ = ["PLAIN", "IdaRun", "Run", "Tuning", "explicit_run", "ggl_order", "reference", "tuned"]
 

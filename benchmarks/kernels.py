@@ -16,9 +16,9 @@ import peers
 from timing import best_of, options, peer, print_table, ratio, save
 
 from atwood import Model, assemble
+from atwood.codegen import compile_native, compile_program
 from atwood.expr import Program
 from atwood.forms.accelerations import acceleration_program
-from atwood.kernels import compile_native, compile_program
 from atwood_library.scenes import Chain, DoublePendulum, SimplePendulum
 
 STATES = 64

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood import Model
+from atwood.arrays import FloatArray
 from atwood_library.scenes import Chain, DoublePendulum, SimplePendulum
 
 __all__ = ["GRAVITY", "Mechanism", "chain", "double_pendulum", "pendulum"]
 
-FloatArray = NDArray[np.float64]
 GRAVITY = 9.81
 
 

@@ -16,8 +16,8 @@ from timing import best_of, options, peer, print_table, ratio, save
 
 import atwood_library as lib
 from atwood import Assembly, Scene, assemble
+from atwood.codegen import compile_native
 from atwood.forms.accelerations import acceleration_program
-from atwood.kernels import compile_native
 
 MASS, LENGTH, MOMENTS = 1.3, 0.4, (0.02, 0.03, 0.01)
 CENTER = (0.01, -0.02, -0.2)

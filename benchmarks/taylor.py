@@ -20,8 +20,8 @@ from timing import at_error, best_of, options, peer, print_table, ratio, save
 
 from atwood import assemble, simulate
 from atwood.forms.accelerations import acceleration_program
-from atwood.solve.taylor_native import CompiledRecurrences
-from atwood.solve.taylor_scene import recurrences
+from atwood.integrators.taylor.native import CompiledRecurrences
+from atwood.simulation.problem.taylor_scene import recurrences
 from atwood_library.scenes import Chain, DoublePendulum
 
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)

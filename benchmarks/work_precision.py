@@ -23,7 +23,7 @@ from mechanisms import FloatArray, Mechanism, chain, double_pendulum
 from timing import at_error, options, peer, print_table, ratio, save
 
 from atwood.errors import AtwoodError
-from atwood.solve.options import SOLVERS
+from atwood.simulation.problem.options import SOLVERS
 
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import atwood
 from atwood import Scene
-from atwood.view import plot_mechanism
+from atwood.plotting import plot_mechanism
 from atwood_library import Ground, PointMass, Rod
 
 scene = Scene()

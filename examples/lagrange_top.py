@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import atwood
-from atwood.view import plot_on_sphere
+from atwood.plotting import plot_on_sphere
 from atwood_library.scenes import LagrangeTop
 
 MOTIONS = {

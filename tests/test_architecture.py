@@ -44,5 +44,5 @@ def test_every_module_of_the_framework_has_a_place_in_the_layers() -> None:
 
 
 def test_the_solver_library_is_loaded_only_when_a_run_starts() -> None:
-    done = run_python("-c", "import sys, atwood.solve.ida_sundae; print('sksundae' in sys.modules)")
+    done = run_python("-c", "import sys, atwood.integrators.ida.sundae; print('sksundae' in sys.modules)")
     assert done.stdout.strip() == "False", done.stderr

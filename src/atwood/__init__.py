@@ -22,7 +22,7 @@ from atwood.errors import (
     UnsupportedError,
     UsageError,
 )
-from atwood.expr.functions import (
+from atwood.expr.core.functions import (
     Scalar,
     absolute,
     acos,
@@ -47,15 +47,16 @@ from atwood.expr.functions import (
     tan,
     tanh,
 )
-from atwood.expr.functions import solve as solve_linear  # `atwood.solve` is the package of solvers
-from atwood.expr.graph import Expression
-from atwood.expr.operations import ExternalFunction
-from atwood.model.component import Component
-from atwood.model.composite import Model, connect
-from atwood.model.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
-from atwood.model.contributions import BodyInertia, Load, Placement, PointInertia
-from atwood.model.fields import parameter, signal
-from atwood.model.laws import (
+from atwood.expr.core.functions import solve as solve_linear  # a law would read `solve` as anything
+from atwood.expr.core.graph import Expression
+from atwood.expr.core.operations import ExternalFunction
+from atwood.model.compose.composite import Model, connect
+from atwood.model.compose.scene import Scene
+from atwood.model.declare.component import Component
+from atwood.model.declare.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
+from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.fields import parameter, signal
+from atwood.model.declare.laws import (
     constraint,
     dissipation,
     event,
@@ -66,25 +67,24 @@ from atwood.model.laws import (
     observable,
     potential,
 )
-from atwood.model.outline import Outline
-from atwood.model.rotation import FREE, Rotation, normals, turn
-from atwood.model.scene import Scene
-from atwood.model.vector import Vector, as_vector, cross, dot, norm
+from atwood.model.values.outline import Outline
+from atwood.model.values.rotation import FREE, Rotation, normals, turn
+from atwood.model.values.vector import Vector, as_vector, cross, dot, norm
 
 if TYPE_CHECKING:
     from atwood.checking import CheckReport, check
-    from atwood.expr.formula import Formula, formula
-    from atwood.model.store import from_data, load_scene, save_scene, to_data
+    from atwood.expr.formulas.formula import Formula, formula
+    from atwood.model.compose.serialization import from_data, load_scene, save_scene, to_data
     from atwood.pipeline import Assembly, assemble, simulate
+    from atwood.plotting.drawing import animate, plot_mechanism
+    from atwood.plotting.plots.precision import plot_comparison
+    from atwood.plotting.plots.quantities import plot
+    from atwood.plotting.plots.sweep import plot_sweep
     from atwood.reporting import MechanismReport, report
     from atwood.result.files import SavedResult, load_result, save_result
     from atwood.result.result import Result
-    from atwood.study.compare import Comparison, ComparisonRow, compare
-    from atwood.study.sweep import Sweep, sweep
-    from atwood.view.drawing import animate, plot_mechanism
-    from atwood.view.plot import plot
-    from atwood.view.precision import plot_comparison
-    from atwood.view.sweep import plot_sweep
+    from atwood.study.comparison.compare import Comparison, ComparisonRow, compare
+    from atwood.study.sweeps.sweep import Sweep, sweep
 
     __version__: str
 
@@ -197,29 +197,29 @@ _LATER = {
     "CheckReport": "atwood.checking",
     "Comparison": "atwood.study",
     "ComparisonRow": "atwood.study",
-    "Formula": "atwood.expr.formula",
+    "Formula": "atwood.expr.formulas.formula",
     "MechanismReport": "atwood.reporting",
     "Result": "atwood.result.result",
     "SavedResult": "atwood.result.files",
     "Sweep": "atwood.study",
-    "animate": "atwood.view",
+    "animate": "atwood.plotting",
     "assemble": "atwood.pipeline",
     "check": "atwood.checking",
     "compare": "atwood.study",
-    "formula": "atwood.expr.formula",
-    "from_data": "atwood.model.store",
+    "formula": "atwood.expr.formulas.formula",
+    "from_data": "atwood.model.compose.serialization",
     "load_result": "atwood.result.files",
-    "load_scene": "atwood.model.store",
-    "plot": "atwood.view",
-    "plot_comparison": "atwood.view",
-    "plot_mechanism": "atwood.view",
-    "plot_sweep": "atwood.view",
+    "load_scene": "atwood.model.compose.serialization",
+    "plot": "atwood.plotting",
+    "plot_comparison": "atwood.plotting",
+    "plot_mechanism": "atwood.plotting",
+    "plot_sweep": "atwood.plotting",
     "report": "atwood.reporting",
     "save_result": "atwood.result.files",
-    "save_scene": "atwood.model.store",
+    "save_scene": "atwood.model.compose.serialization",
     "simulate": "atwood.pipeline",
     "sweep": "atwood.study",
-    "to_data": "atwood.model.store",
+    "to_data": "atwood.model.compose.serialization",
 }
 """Names whose modules are imported when they are first used; each also stands in `__all__` and above."""
 

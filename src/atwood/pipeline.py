@@ -17,25 +17,25 @@ from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.consistency.check import check_laws, check_names
 from atwood.errors import StartError
 from atwood.expr import Expression, Graph
-from atwood.expr.relations import TimeRelations
+from atwood.expr.core.relations import TimeRelations
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.forms.source import Source
 from atwood.forms.starting import with_places
 from atwood.mechanics.build import Mechanism, check_closures, make_gravity
-from atwood.mechanics.carried import inertia_asked_for
-from atwood.mechanics.constraints import holds_velocities
-from atwood.mechanics.idle_spin import hold_idle_spins
-from atwood.mechanics.inertia import check_tensors
-from atwood.mechanics.orientation import body_offsets
-from atwood.model.composite import Model
-from atwood.model.flatten import FlatScene, flatten
-from atwood.model.local import LocalPart, ParameterTable, localize
-from atwood.model.space import make_space
+from atwood.mechanics.constraints.idle_spin import hold_idle_spins
+from atwood.mechanics.constraints.values import holds_velocities
+from atwood.mechanics.dynamics.carried_inertia import inertia_asked_for
+from atwood.mechanics.dynamics.inertia import check_tensors
+from atwood.mechanics.kinematics.orientation import body_offsets
+from atwood.model.compose.composite import Model
+from atwood.model.local.flatten import FlatScene, flatten
+from atwood.model.local.laws import LocalPart, ParameterTable, localize
+from atwood.model.values.space import make_space
 from atwood.result.result import Result
-from atwood.solve.options import RunOptions
-from atwood.solve.run import run, run_out_of_time
-from atwood.solve.run_arguments import (
+from atwood.simulation.dynamics.line_signs import actual_sides, sides_differ
+from atwood.simulation.initialization.start import Start, find_start
+from atwood.simulation.problem.arguments import (
     FORM,
     LEVEL,
     LIMITS,
@@ -49,8 +49,8 @@ from atwood.solve.run_arguments import (
     STRUCTURE,
     T_END,
 )
-from atwood.solve.sides import actual_sides, sides_differ
-from atwood.solve.start import Start, find_start
+from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.run.run import run, run_out_of_time
 from atwood.topology.bodies import find_bodies
 from atwood.topology.charts import Orientation, check_orientation
 from atwood.topology.graph import build_graph

@@ -361,7 +361,7 @@ def test_ctrl_c_shows_and_saves_what_is_done(tmp_path: Path) -> None:
         "import os, signal, threading\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it\n"
         "from atwood.cli import main\n"
-        "from atwood.solve.explicit_session import ExplicitSession\n"
+        "from atwood.integrators.explicit_session import ExplicitSession\n"
         "inner, timers = ExplicitSession.sample, []\n"
         "def sample(*arguments):\n"
         "    if not timers:  # once it takes steps, however long it took to get there\n"

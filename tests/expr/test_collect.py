@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 
 from atwood import expr as ex
-from atwood.expr.collect import collect, cost
+from atwood.expr.simplify.collect import collect, cost
 
 from . import graphs
 

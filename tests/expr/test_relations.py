@@ -12,8 +12,8 @@ import pytest
 from atwood import absolute, acos, asin, atan, atan2, cos, maximum, minimum, select, sign, sin, sqrt, tan
 from atwood.errors import AtwoodError
 from atwood.expr import Graph, evaluate
-from atwood.expr.functions import floor
-from atwood.expr.relations import TimeRelations, values_just_after
+from atwood.expr.core.functions import floor
+from atwood.expr.core.relations import TimeRelations, values_just_after
 
 
 def formula(t: Any, depth: int, draw: random.Random) -> Any:

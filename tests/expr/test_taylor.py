@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from numpy.testing import assert_allclose
 
 from atwood import expr as ex
+from atwood.codegen.python.backend import compile_program
 from atwood.errors import UnsupportedError
-from atwood.expr.taylor import TaylorPrograms, taylor_programs
-from atwood.kernels.python_backend import compile_program
+from atwood.expr.series.taylor import TaylorPrograms, taylor_programs
 
 from .graphs import follow, recipes
 

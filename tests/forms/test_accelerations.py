@@ -10,7 +10,7 @@ import pytest
 from atwood import Component, Model, Scene
 from atwood.expr import Graph
 from atwood.forms.accelerations import AccelerationProgram, acceleration_program
-from atwood.mechanics.augmented import (
+from atwood.mechanics.dynamics.augmented import (
     SymmetricSystem,
     back_substitute,
     difference,

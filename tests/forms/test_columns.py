@@ -8,8 +8,8 @@ import pytest
 from atwood import simulate
 from atwood.forms import derivative
 from atwood.pipeline import assemble
-from atwood.solve.balance import balance_of
-from atwood.solve.columns import columns_of, masses_at
+from atwood.simulation.dynamics.balance import balance_of
+from atwood.simulation.dynamics.columns import columns_of, masses_at
 from atwood_library.scenes import Chain
 
 from ..helpers.nets import spring_net

@@ -7,7 +7,7 @@ import pytest
 
 from atwood import Scene, assemble
 from atwood.expr import evaluate
-from atwood.expr.collect import cost
+from atwood.expr.simplify.collect import cost
 from atwood_library import Ground, Link, Universal, Weld
 
 SIMPLE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)

@@ -22,10 +22,11 @@ from atwood import (
     dot,
     parameter,
 )
-from atwood.expr.graph import Graph
-from atwood.expr.program import Program
+from atwood.codegen.llvm import engine as llvm_engine
+from atwood.codegen.python import backend as python_backend
+from atwood.expr.core.graph import Graph
+from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
-from atwood.kernels import llvm_engine, python_backend
 from atwood.pipeline import assemble, assemble_flat, simulate
 from atwood_library import Ground, Link, Pivot, PointMass, Rod, Rope, Spring
 from atwood_library.scenes import SCENES, Atwood, Chain, DoublePendulum
@@ -45,7 +46,7 @@ def counting(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, int]]:
 
     with monkeypatch.context() as patch:
         patch.setattr(python_backend, "_execute", counted("Python", python_backend._execute))
-        for module in ("atwood.kernels.llvm_build", "atwood.kernels.llvm_engine"):
+        for module in ("atwood.codegen.llvm.build", "atwood.codegen.llvm.engine"):
             patch.setattr(f"{module}.compile_text", counted("machine code", llvm_engine.compile_text))
             patch.setattr(f"{module}.load_code", counted("loaded", llvm_engine.load_code))
         patch.setattr(Program, "__post_init__", counted("programs", Program.__post_init__))

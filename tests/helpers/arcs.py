@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from atwood import Result
-from atwood.solve.collocation import find_arc
-from atwood.solve.projection import project_safely
-from atwood.solve.record import Segment
+from atwood.simulation.problem.projection import project_safely
+from atwood.simulation.run.record import Segment
+from atwood.simulation.singular.collocation import find_arc
 
 __all__ = ["by_arcs"]
 

@@ -15,7 +15,7 @@ from atwood.expr import Expression, OutputGroup, Program, atan2, cos, sin, subst
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.forms.program import state_groups
-from atwood.mechanics.equations import Equations
+from atwood.mechanics.dynamics.equations import Equations
 from atwood.pipeline import assemble
 from atwood.topology.charts import Chart
 from atwood.topology.forest import Coordinate

@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood import Model, Result, Scene
+from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.pipeline import assemble, simulate
-from atwood.solve.problem import Plan, make_plan, pack_state
-from atwood.solve.start import Start, find_start
+from atwood.simulation.initialization.start import Start, find_start
+from atwood.simulation.problem.problem import Plan, make_plan, pack_state
 from atwood_library.scenes import SCENES
-
-FloatArray = NDArray[np.float64]
 
 FORMS = ("reduced", "dae")
 

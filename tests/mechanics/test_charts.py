@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 
 from atwood.expr import Graph, evaluate, jvp
-from atwood.mechanics.charts import BASES, chart_axes, chart_margin, chart_quaternion, chart_rates
-from atwood.solve.charts import _coordinates, _matrix, _quaternion
+from atwood.mechanics.kinematics.orientation_coordinates import (
+    BASES,
+    chart_axes,
+    chart_margin,
+    chart_quaternion,
+    chart_rates,
+)
+from atwood.simulation.dynamics.orientation_coordinates import _coordinates, _matrix, _quaternion
 from atwood.topology.charts import ORIENTATIONS, Chart, check_orientation
 
 from ..references.rotations import about, cross_matrix, from_quaternion

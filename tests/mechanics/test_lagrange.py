@@ -4,15 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from atwood.mechanics.power import applied_power
-from atwood.solve.reactions import accelerations_and_multipliers, maximal_state
+from atwood.arrays import FloatArray
+from atwood.mechanics.outputs.power import applied_power
+from atwood.simulation.dynamics.reactions import accelerations_and_multipliers, maximal_state
 from atwood_library.scenes import SCENES
 
 from ..helpers.runs import FORMS, Prepared, difference_quotient, moved, nearby_states, prepare
 
-FloatArray = NDArray[np.float64]
 EVERY_SCENE_AND_FORM = [(name, form) for name in SCENES for form in FORMS]
 
 
@@ -115,7 +114,7 @@ def test_power_balance_at_any_state(name: str, form: str) -> None:
 
 
 def _drive_force(prepared: Prepared, q: FloatArray, u: FloatArray, path: str) -> float:
-    from atwood.solve.reactions import ReactionSolver
+    from atwood.simulation.dynamics.reactions import ReactionSolver
 
     solver = ReactionSolver(prepared.assembly, prepared.time, q, u)
     values, _ = solver.at(np.array([prepared.time]), q[:, None], u[:, None])

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import atwood as aw
-from atwood.model.flatten import flatten
+from atwood.model.local.flatten import flatten
 
 from .things import (
     Bar,

@@ -15,12 +15,12 @@ import atwood as aw
 import atwood_library
 from atwood.consistency.trials import Body
 from atwood.expr import Graph, evaluate
-from atwood.model.component import Binding, bind
-from atwood.model.connectors import Frame, Motion
-from atwood.model.contributions import BodyInertia, Load, Placement, PointInertia
-from atwood.model.laws import scalars
-from atwood.model.space import FIXED_AXES, make_space, planar_axes
-from atwood.model.units import parse_si_unit
+from atwood.model.declare.component import Binding, bind
+from atwood.model.declare.connectors import Frame, Motion
+from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.laws import scalars
+from atwood.model.values.space import FIXED_AXES, make_space, planar_axes
+from atwood.model.values.units import parse_si_unit
 
 ROOT = Path(atwood_library.__file__).parent
 TETRAHEDRON = Path(__file__).parent / "tetrahedron.stl"

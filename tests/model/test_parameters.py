@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import atwood as aw
-from atwood.expr.graph import Graph
+from atwood.expr.core.graph import Graph
 
 from .things import Bar, Bob, HeavyBob, Pendulum, Push, Row
 

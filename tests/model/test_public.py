@@ -7,9 +7,9 @@ import pytest
 
 import atwood
 from atwood.expr import Graph
-from atwood.model.flatten import flatten
-from atwood.model.local import ParameterTable, localize
-from atwood.model.space import make_space
+from atwood.model.local.flatten import flatten
+from atwood.model.local.laws import ParameterTable, localize
+from atwood.model.values.space import make_space
 
 from .things import Bob
 

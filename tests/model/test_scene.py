@@ -3,7 +3,7 @@ import math
 import pytest
 
 import atwood as aw
-from atwood.model.flatten import flatten
+from atwood.model.local.flatten import flatten
 
 from .things import Bob, Hook, Outer, Pendulum, TwoPendulums, data_of, two_pendulums
 

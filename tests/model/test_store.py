@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 import atwood as aw
 from atwood.expr import Graph, evaluate, select
-from atwood.model.flatten import flatten
-from atwood.model.timefunction import StoredFunction, write_function
+from atwood.model.declare.time_functions import StoredFunction, write_function
+from atwood.model.local.flatten import flatten
 from atwood_library.scenes import SCENES as LIBRARY_SCENES
 
 from . import things

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from atwood import DeclarationError, ParameterError
-from atwood.model.units import parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
+from atwood.model.values.units import parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
 
 EXPONENTS = st.tuples(*[st.integers(-4, 4)] * 4)
 

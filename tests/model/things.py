@@ -4,8 +4,8 @@ from itertools import pairwise
 from typing import Any
 
 import atwood as aw
-from atwood.model.flatten import FlatScene, flatten
-from atwood.model.timefunction import write_function
+from atwood.model.declare.time_functions import write_function
+from atwood.model.local.flatten import FlatScene, flatten
 
 
 class Bob(aw.Component):

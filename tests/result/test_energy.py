@@ -13,7 +13,7 @@ from atwood import Component, Point, Result, Scalar, Scene, connector, external,
 from atwood.errors import ResultError
 from atwood.expr import ExternalFunction
 from atwood.result.work import integral_in_steps, integral_of_samples, nodes_between
-from atwood.solve.retrace import run_again, times_of_steps
+from atwood.simulation.run.retrace import run_again, times_of_steps
 from atwood_library.scenes import SCENES
 
 from ..helpers.runs import FORMS

@@ -11,7 +11,7 @@ from atwood import Component, Scene, sin
 from atwood.errors import AtwoodError, ParameterError, SolveError, StartError, TopologyError
 from atwood.pipeline import assemble, simulate
 from atwood.reporting import report
-from atwood.solve.immobile import Immobile
+from atwood.simulation.initialization.mobility import Immobile
 from atwood_library import (
     Bar,
     Cylindrical,
@@ -271,7 +271,6 @@ def test_a_bent_bricard_is_a_structure() -> None:
         ({f"body.x_axis.{c}": 0.0 for c in "xyz"}, "body.x_axis.x", "cannot all hold"),
         ({"body.theta": 0.5, "body.z_axis.z": 0.1}, "body.z_axis.z", "theta = 0.5 makes it 0.877583"),
         ({"body.quaternion.w": 0.0}, "body.quaternion.w", "no such quantity"),
-        ({"body.position.x": 1e200}, "Scene", "beyond what can be computed"),
     ],
 )
 def test_orientations_and_places_that_mean_nothing(start: dict[str, float], where: str, text: str, form: str) -> None:

@@ -7,8 +7,8 @@ import pytest
 
 import atwood_library as lib
 from atwood import Scene, compare, report, simulate, sweep
-from atwood.solve.start import find_start
-from atwood.solve.turning import turning_of
+from atwood.simulation.dynamics.kinematic_map import turning_of
+from atwood.simulation.initialization.start import find_start
 
 from ..helpers.runs import FORMS, prepare
 
@@ -125,7 +125,7 @@ def test_orientations_are_compared_by_their_axes() -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_a_rough_run_goes_on_although_coordinates_shrink(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The size of a quaternion means nothing: one that has strayed is put back, and the motion goes on."""
-    from atwood.solve.turning import Turning
+    from atwood.simulation.dynamics.kinematic_map import Turning
 
     strayed: list[bool] = []
     strays = Turning.strays

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from atwood import Result, Scene, report, simulate
-from atwood.solve.balance import balance_of
-from atwood.solve.reactions import maximal_state
+from atwood.simulation.dynamics.balance import balance_of
+from atwood.simulation.dynamics.reactions import maximal_state
 from atwood_library.scenes import SCENES, Bricard, FourBarRow
 
 from ..helpers.arcs import by_arcs

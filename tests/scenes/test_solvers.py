@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from atwood import UsageError, simulate
-from atwood.solve.sundials_library import available
+from atwood.integrators.ida.library import available
 from atwood_library.scenes import SCENES
 
 from ..helpers.runs import EVERYDAY

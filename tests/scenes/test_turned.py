@@ -28,9 +28,9 @@ from atwood import (
     sqrt,
 )
 from atwood.pipeline import assemble
-from atwood.solve.problem import make_plan
-from atwood.solve.reactions import ReactionSolver
-from atwood.solve.start import find_start, own_state
+from atwood.simulation.dynamics.reactions import ReactionSolver
+from atwood.simulation.initialization.start import find_start, own_state
+from atwood.simulation.problem.problem import make_plan
 from atwood_library import Disc, Ground, Link, Pivot, RigidBody, Rod, RotaryDrive, Spherical, Weld
 
 FORMS = ("reduced", "dae")

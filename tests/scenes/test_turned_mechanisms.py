@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from atwood import Component, Scene
-from atwood.model.flatten import flatten
+from atwood.model.local.flatten import flatten
 from atwood.pipeline import assemble
-from atwood.solve.problem import make_plan
-from atwood.solve.reactions import ReactionSolver
-from atwood.solve.start import find_start, own_state
+from atwood.simulation.dynamics.reactions import ReactionSolver
+from atwood.simulation.initialization.start import find_start, own_state
+from atwood.simulation.problem.problem import make_plan
 from atwood_library import Ground, Link, Pivot, Weld
 from atwood_library.scenes import Bricard, FlyballGovernor, FourBarRow, SpatialSliderCrank, UniversalShaft
 

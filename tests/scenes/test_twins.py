@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from atwood.arrays import FloatArray
 from atwood.pipeline import simulate
 from atwood_library.scenes import DoublePendulum, PendulumOnCart
 
-FloatArray = NDArray[np.float64]
 G = 9.81
 
 

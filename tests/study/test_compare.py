@@ -12,10 +12,10 @@ from atwood import Scene, SolveError, UsageError, connect
 from atwood.pipeline import simulate
 from atwood.result.result import Result
 from atwood.study import Comparison, compare
-from atwood.study.verdict import judge
+from atwood.study.comparison.verdict import judge
 from atwood_library import Ground, Mass1D, PointMass, Rod, Rope, Spring
 
-compare_module = importlib.import_module("atwood.study.compare")
+compare_module = importlib.import_module("atwood.study.comparison.compare")
 
 
 class Pendulum(Scene):

@@ -23,9 +23,10 @@ from atwood import (
     simulate,
     sweep,
 )
-from atwood.solve.options import RunOptions
-from atwood.study import sweep_batch, sweep_runs
-from atwood.study.cases import make_cases
+from atwood.simulation.problem.options import RunOptions
+from atwood.study.sweeps import batch as sweep_batch
+from atwood.study.sweeps import runs as sweep_runs
+from atwood.study.sweeps.cases import make_cases
 from atwood_library import Ground, PointMass, Rod, Rope
 from atwood_library.scenes import SCENES, Chain, DoublePendulum, FourBar
 
@@ -33,7 +34,7 @@ from atwood_library.scenes import SCENES, Chain, DoublePendulum, FourBar
 def one_by_one(monkeypatch: pytest.MonkeyPatch, *arguments: Any, **options: Any) -> Any:
     """Return a sweep all of whose runs are made by themselves."""
     with monkeypatch.context() as patch:
-        patch.setattr(sys.modules["atwood.study.sweep"], "why_not_batched", lambda order: "a test wants it so")
+        patch.setattr(sys.modules["atwood.study.sweeps.sweep"], "why_not_batched", lambda order: "a test wants it so")
         found = sweep(*arguments, **options)
     assert found.statistics.batched == 0
     return found

@@ -6,14 +6,14 @@ from collections.abc import Iterable
 from typing import Any
 
 from atwood.consistency.trials import Pose, Trial
-from atwood.model.component import Component
-from atwood.model.connectors import Frame, Groove, JointCoordinate, Point, Shaft, Slide, connector
-from atwood.model.contributions import BodyInertia, Placement, PointInertia
-from atwood.model.fields import parameter
-from atwood.model.laws import Law, constraint, inertia, joint, observable
-from atwood.model.rotation import normals, turn
-from atwood.model.scene import Scene
-from atwood.model.vector import Vector, as_vector, dot
+from atwood.model.compose.scene import Scene
+from atwood.model.declare.component import Component
+from atwood.model.declare.connectors import Frame, Groove, JointCoordinate, Point, Shaft, Slide, connector
+from atwood.model.declare.contributions import BodyInertia, Placement, PointInertia
+from atwood.model.declare.fields import parameter
+from atwood.model.declare.laws import Law, constraint, inertia, joint, observable
+from atwood.model.values.rotation import normals, turn
+from atwood.model.values.vector import Vector, as_vector, dot
 
 __all__ = ["on_bench"]
 

@@ -15,11 +15,11 @@ from atwood.consistency.check import contradictions
 from atwood.consistency.names import wrong_names
 from atwood.consistency.trials import make_trial
 from atwood.errors import AtwoodError, UsageError
-from atwood.model.component import Component
-from atwood.model.composite import Model
-from atwood.model.flatten import Part
-from atwood.model.outline import Outline
-from atwood.model.space import Space, make_space
+from atwood.model.compose.composite import Model
+from atwood.model.declare.component import Component
+from atwood.model.local.flatten import Part
+from atwood.model.values.outline import Outline
+from atwood.model.values.space import Space, make_space
 
 __all__ = ["check"]
 

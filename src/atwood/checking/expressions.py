@@ -12,13 +12,13 @@ from atwood.checking.report import Finding
 from atwood.consistency.joints import Unknown
 from atwood.consistency.trials import Trial
 from atwood.expr import Expression, Graph, evaluate
-from atwood.mechanics.forces import slopes_of
-from atwood.model.connectors import JointCoordinate
-from atwood.model.flatten import FlatScene, Part
-from atwood.model.laws import Law
-from atwood.model.local import LocalPart, ParameterTable, localize
-from atwood.model.rotation import from_axes
-from atwood.model.vector import Vector
+from atwood.mechanics.dynamics.forces import slopes_of
+from atwood.model.declare.connectors import JointCoordinate
+from atwood.model.declare.laws import Law
+from atwood.model.local.flatten import FlatScene, Part
+from atwood.model.local.laws import LocalPart, ParameterTable, localize
+from atwood.model.values.rotation import from_axes
+from atwood.model.values.vector import Vector
 
 __all__ = ["wrong_on_expressions"]
 

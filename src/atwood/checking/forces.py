@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from atwood.checking.report import Finding
 from atwood.consistency.joints import Unknown, attempt
 from atwood.consistency.trials import Pose, Trial, nudged
-from atwood.model.connectors import Motion
-from atwood.model.contributions import Load
-from atwood.model.laws import Law
-from atwood.model.vector import Vector, cross
+from atwood.model.declare.connectors import Motion
+from atwood.model.declare.contributions import Load
+from atwood.model.declare.laws import Law
+from atwood.model.values.vector import Vector, cross
 
 __all__ = ["Wrench", "energy_forces", "in_motion", "load_forces", "ways", "wrong_forces"]
 

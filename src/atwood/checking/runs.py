@@ -11,8 +11,8 @@ from atwood.checking.bench import on_bench
 from atwood.checking.report import Finding
 from atwood.consistency.trials import Trial
 from atwood.errors import AtwoodError, ParameterError, SolveError, StartError, TopologyError
-from atwood.model.connectors import Frame, Shaft
-from atwood.model.units import parse_unit
+from atwood.model.declare.connectors import Frame, Shaft
+from atwood.model.values.units import parse_unit
 from atwood.pipeline import simulate
 from atwood.result.result import Result
 

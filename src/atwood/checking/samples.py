@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from atwood.errors import AtwoodError, UsageError
-from atwood.model.component import Component
-from atwood.model.fields import MISSING, ParameterSpec
-from atwood.model.flatten import Part
+from atwood.model.declare.component import Component
+from atwood.model.declare.fields import MISSING, ParameterSpec
+from atwood.model.local.flatten import Part
 
 __all__ = ["Sample", "as_part", "in_space", "samples_of"]
 

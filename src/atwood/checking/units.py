@@ -13,13 +13,13 @@ from typing import Any
 
 from atwood.checking.report import Finding
 from atwood.consistency.trials import Body, Trial
-from atwood.model.component import Binding, bind
-from atwood.model.connectors import JointCoordinate, Motion, Slide
-from atwood.model.contributions import BodyInertia, Load, Placement, PointInertia
-from atwood.model.laws import Law, scalars
-from atwood.model.rotation import Rotation
-from atwood.model.units import Exponents, parse_unit
-from atwood.model.vector import Vector
+from atwood.model.declare.component import Binding, bind
+from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
+from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.laws import Law, scalars
+from atwood.model.values.rotation import Rotation
+from atwood.model.values.units import Exponents, parse_unit
+from atwood.model.values.vector import Vector
 
 __all__ = ["wrong_units"]
 

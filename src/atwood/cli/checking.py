@@ -65,8 +65,8 @@ def _components(target: str) -> list[Any]:
 
 def _defined(module: ModuleType) -> dict[str, Any]:
     """Return the components that a module itself defines: classes, and objects that have values."""
-    from atwood.model.component import Component
-    from atwood.model.composite import Model
+    from atwood.model.compose.composite import Model
+    from atwood.model.declare.component import Component
 
     found: dict[str, Any] = {}
     for name, value in vars(module).items():

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from atwood.study import Comparison, ComparisonRow
-from atwood.study.compare import RELATIVE
+from atwood.study.comparison.compare import RELATIVE
 
 __all__ = ["CompareRequest", "compare_scene"]
 
@@ -45,11 +45,11 @@ def compare_scene(request: CompareRequest) -> None:
         What was asked for.
     """
     if request.plot is not None:
-        from atwood.view.canvas import check_picture
+        from atwood.plotting.canvas import check_picture
 
         check_picture(request.plot)
     scene, name = prepare(request.scene, request.settings, request.starts)
-    from atwood.study.compare import TOLERANCES, compare
+    from atwood.study.comparison.compare import TOLERANCES, compare
 
     with _progress(request.progress) as progress:
         found = compare(

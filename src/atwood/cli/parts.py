@@ -11,7 +11,7 @@ from atwood.cli.output import console, print_json
 from atwood.errors import UsageError, near_matches, suggestion
 
 if TYPE_CHECKING:
-    from atwood.model.component import Component
+    from atwood.model.declare.component import Component
 
 __all__ = ["library_parts", "list_parts", "looks_like_a_part", "show_part"]
 
@@ -25,7 +25,7 @@ def looks_like_a_part(text: str) -> bool:
 
 def library_parts() -> dict[str, type[Component]]:
     """Return the parts that the installed libraries offer, by name, in the order of where they are defined."""
-    from atwood.model.component import Component
+    from atwood.model.declare.component import Component
 
     found: dict[str, type[Component]] = {}
     for library in all_libraries():
@@ -151,7 +151,7 @@ def _tables(kind: type[Component]) -> Iterator[tuple[str, list[dict[str, str]]]]
 
 def _own_parts(kind: type[Component]) -> Iterator[dict[str, str]]:
     """Yield the parts of a part that is made of others; their quantities are read as ``part.quantity``."""
-    from atwood.model.composite import Model
+    from atwood.model.compose.composite import Model
 
     if issubclass(kind, Model):
         for name, part in kind().parts.items():
@@ -171,8 +171,8 @@ def _quantities(kind: type[Component]) -> Iterator[dict[str, str]]:
 
 def _value(one: Any) -> str:
     """Return the default of a parameter as a reader writes it."""
-    from atwood.model.deferred import Deferred
-    from atwood.model.fields import MISSING
+    from atwood.model.declare.fields import MISSING
+    from atwood.model.declare.parameter_expressions import Deferred
 
     if one.default is MISSING:
         return "required"

@@ -63,7 +63,7 @@ def run_scene(request: RunRequest) -> None:
 
     assembly = assemble(scene, form=request.form, level=request.level, orientation=request.orientation, name=name)
     if request.view is not None:
-        from atwood.view.camera import check_view
+        from atwood.plotting.camera import check_view
 
         check_view(assembly.mechanism.space.name, request.view)
     t_start, t_end = assembly.flat.t_start, assembly.flat.t_end if request.t_end is None else request.t_end
@@ -130,14 +130,14 @@ def _check_files(request: RunRequest) -> None:
 
         check_target(request.save)
     if request.plot is not None:
-        from atwood.view.canvas import check_picture
+        from atwood.plotting.canvas import check_picture
 
         check_picture(request.plot)
     if request.view is not None and request.draw is None:
         raise UsageError("there is nothing to draw", where="--view", advice="Say where to with --draw FILE.")
     if request.draw is not None:
-        from atwood.view.camera import as_camera
-        from atwood.view.canvas import ANIMATED, SUFFIXES, check_picture
+        from atwood.plotting.camera import as_camera
+        from atwood.plotting.canvas import ANIMATED, SUFFIXES, check_picture
 
         check_picture(request.draw, (*SUFFIXES, *ANIMATED))
         as_camera(request.view)
@@ -145,8 +145,8 @@ def _check_files(request: RunRequest) -> None:
 
 def _draw(result: Result, file: Path, view: str | None) -> None:
     """Draw the mechanism at a few times, or moving; the suffix says which."""
-    from atwood.view import animate, plot_mechanism
-    from atwood.view.canvas import ANIMATED
+    from atwood.plotting import animate, plot_mechanism
+    from atwood.plotting.canvas import ANIMATED
 
     if file.suffix.lower() in ANIMATED:
         animate(result, file, view=view)

@@ -19,7 +19,7 @@ from atwood.cli.output import warn
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
 
 if TYPE_CHECKING:
-    from atwood.model.composite import Model
+    from atwood.model.compose.composite import Model
 
 __all__ = ["bundled_scenes", "find_scene", "pairs", "prepare", "warn_of_radians"]
 
@@ -93,7 +93,7 @@ def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[
     settings, starts
         Parameters and start values as ``path=value``.
     """
-    from atwood.model.scene import Scene
+    from atwood.model.compose.scene import Scene
 
     scene, name = find_scene(text)
     for path, value in pairs(settings, "--set"):
@@ -126,8 +126,8 @@ def warn_of_radians(scene: Model, path: str, values: Iterable[object], option: s
     option
         Where they were given.
     """
-    from atwood.model.flatten import unit_at
-    from atwood.model.units import split_quantity
+    from atwood.model.local.flatten import unit_at
+    from atwood.model.values.units import split_quantity
 
     owner, _, name = path.rpartition(".")
     if option in ("--set", "--vary"):
@@ -180,7 +180,7 @@ def _only_scene(file: Path) -> tuple[Model, str]:
 
 def _candidates(module: ModuleType) -> Mapping[str, Any]:
     """Return the scenes that a module itself defines."""
-    from atwood.model.scene import Scene
+    from atwood.model.compose.scene import Scene
 
     return {
         name: value
@@ -205,7 +205,7 @@ def _functions(module: ModuleType) -> list[str]:
 
 
 def _as_scene(value: Any, file: Path, where: str) -> Model:
-    from atwood.model.composite import Model
+    from atwood.model.compose.composite import Model
 
     if callable(value) and not isinstance(value, Model):
         with _placing_errors(file):

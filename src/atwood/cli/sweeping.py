@@ -160,11 +160,11 @@ def _number(part: str, text: str, option: str) -> float:
 def _check_files(request: SweepRequest) -> None:
     """Refuse files that could not be written before any work is done."""
     if request.save is not None:
-        from atwood.study.sweep_files import check_sweep_target
+        from atwood.study.sweeps.files import check_sweep_target
 
         check_sweep_target(request.save)
     if request.plot is not None:
-        from atwood.view.canvas import check_picture
+        from atwood.plotting.canvas import check_picture
 
         check_picture(request.plot)
 

@@ -11,10 +11,10 @@ from atwood.consistency.joints import Unknown, wrong_joint, wrong_rates
 from atwood.consistency.names import wrong_names
 from atwood.consistency.trials import Trial, make_trial
 from atwood.errors import DeclarationError
-from atwood.model.component import Component
-from atwood.model.flatten import Part
-from atwood.model.laws import Law
-from atwood.model.space import Space
+from atwood.model.declare.component import Component
+from atwood.model.declare.laws import Law
+from atwood.model.local.flatten import Part
+from atwood.model.values.space import Space
 
 __all__ = ["check_laws", "check_names", "contradictions"]
 

@@ -20,10 +20,10 @@ from atwood.consistency.trials import (
 )
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
-from atwood.model.connectors import Motion
-from atwood.model.laws import Law, scalars
-from atwood.model.rotation import FREE
-from atwood.model.vector import Vector
+from atwood.model.declare.connectors import Motion
+from atwood.model.declare.laws import Law, scalars
+from atwood.model.values.rotation import FREE
+from atwood.model.values.vector import Vector
 
 __all__ = ["Unknown", "attempt", "wrong_joint", "wrong_rates"]
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from atwood.consistency.sources import contradiction_at
 from atwood.errors import DeclarationError, suggestion
-from atwood.model.component import Component
-from atwood.model.laws import Law
+from atwood.model.declare.component import Component
+from atwood.model.declare.laws import Law
 
 __all__ = ["wrong_names"]
 

@@ -6,7 +6,7 @@ import inspect
 from pathlib import Path
 from typing import Any
 
-from atwood.model.component import Component
+from atwood.model.declare.component import Component
 
 __all__ = ["contradiction_at", "line_of"]
 

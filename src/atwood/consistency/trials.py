@@ -12,14 +12,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from atwood.model.component import Binding, Component, bind
-from atwood.model.connectors import Frame, JointCoordinate, Motion
-from atwood.model.contributions import Placement
-from atwood.model.flatten import Part
-from atwood.model.laws import Law
-from atwood.model.rotation import FREE, IDENTITY, Axes, Rotation, as_rotation, transposed
-from atwood.model.space import FIXED_AXES, Space, planar_axes
-from atwood.model.vector import ZERO, Vector, dot, norm
+from atwood.model.declare.component import Binding, Component, bind
+from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
+from atwood.model.declare.contributions import Placement
+from atwood.model.declare.laws import Law
+from atwood.model.local.flatten import Part
+from atwood.model.values.rotation import FREE, IDENTITY, Axes, Rotation, as_rotation, transposed
+from atwood.model.values.space import FIXED_AXES, Space, planar_axes
+from atwood.model.values.vector import ZERO, Vector, dot, norm
 
 __all__ = ["STEP", "Pose", "Trial", "make_trial", "rate_of", "rotation_between"]
 

@@ -1,7 +1,7 @@
 """The expression graph: arithmetic, derivatives, sparsity, operation counts, and the road to and from sympy."""
 
-from atwood.expr.affine import affine_coefficients
-from atwood.expr.analysis import (
+from atwood.expr.core.affine import affine_coefficients
+from atwood.expr.core.analysis import (
     count_operations,
     dependencies,
     depends_on,
@@ -9,9 +9,8 @@ from atwood.expr.analysis import (
     live,
     substitute,
 )
-from atwood.expr.collect import collect
-from atwood.expr.derivatives import SparseMatrix, jacobian, jvp, sweeps_exceed, vjp
-from atwood.expr.functions import (
+from atwood.expr.core.derivatives import SparseMatrix, jacobian, jvp, sweeps_exceed, vjp
+from atwood.expr.core.functions import (
     Scalar,
     absolute,
     acos,
@@ -37,10 +36,11 @@ from atwood.expr.functions import (
     tan,
     tanh,
 )
-from atwood.expr.graph import Expression, Graph
-from atwood.expr.operations import ExternalFunction
-from atwood.expr.program import InputGroup, OutputGroup, Program
-from atwood.expr.sympy_bridge import from_sympy, to_sympy, to_sympy_shared
+from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.operations import ExternalFunction
+from atwood.expr.core.program import InputGroup, OutputGroup, Program
+from atwood.expr.formulas.sympy_bridge import from_sympy, to_sympy, to_sympy_shared
+from atwood.expr.simplify.collect import collect
 
 __all__ = [
     "Expression",

@@ -28,10 +28,10 @@ from atwood.expr import (
     solve,
     substitute,
 )
-from atwood.expr.collect import cost
+from atwood.expr.simplify.collect import cost
 from atwood.forms.places import to_maximal
 from atwood.forms.program import rates_are_speeds, state_groups
-from atwood.mechanics.augmented import (
+from atwood.mechanics.dynamics.augmented import (
     Step,
     SymmetricSystem,
     back_substitute,
@@ -41,7 +41,7 @@ from atwood.mechanics.augmented import (
     minimum_degree,
     place_differences,
 )
-from atwood.mechanics.equations import Equations
+from atwood.mechanics.dynamics.equations import Equations
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly

@@ -8,13 +8,14 @@ from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood.arguments import BY_PATH, optional, takes
+from atwood.arrays import FloatArray
+from atwood.codegen import BoundKernel, CompiledProgram, compile_program
 from atwood.errors import ParameterError, UsageError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program
-from atwood.expr.collect import collect
-from atwood.expr.relations import Relation, values_just_after
+from atwood.expr.core.relations import Relation, values_just_after
+from atwood.expr.simplify.collect import collect
 from atwood.forms.dae import dae_form, keep_constraints
 from atwood.forms.places import with_reactions
 from atwood.forms.program import (
@@ -29,12 +30,11 @@ from atwood.forms.reduced import reduced_form
 from atwood.forms.shared import Shared
 from atwood.forms.source import Source, no_start_quantity
 from atwood.forms.starting import moved_to
-from atwood.kernels import BoundKernel, CompiledProgram, compile_program
 from atwood.mechanics.build import Mechanism, build_equations
-from atwood.mechanics.equations import Equations
-from atwood.mechanics.observables import Observable, Reaction, energies, list_reactions
-from atwood.mechanics.reading import observe
-from atwood.model.flatten import FlatScene, flatten
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.outputs.observables import Observable, Reaction, energies, list_reactions
+from atwood.mechanics.outputs.reading import observe
+from atwood.model.local.flatten import FlatScene, flatten
 from atwood.topology.charts import Orientation
 from atwood.topology.forest import grow_forest
 
@@ -43,7 +43,6 @@ __all__ = ["Assembly", "FormName"]
 FormName = Literal["reduced", "dae"]
 Coordinates = Literal["reduced", "regular", "dae"]
 """Those of the reduced form, the same with quaternions for orientations, and those of the dae form."""
-FloatArray = NDArray[np.float64]
 
 _BY_HAND = 12
 """Up to so many coordinates the equations are rewritten; beyond, the recursion is shorter than any closed form."""

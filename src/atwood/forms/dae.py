@@ -8,7 +8,7 @@ from dataclasses import replace
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, substitute
 from atwood.forms.program import FormProgram, Level, either_sign, kinematic_rows, make_form_program
-from atwood.mechanics.equations import Equations
+from atwood.mechanics.dynamics.equations import Equations
 
 __all__ = ["LEVELS", "dae_form", "keep_constraints"]
 

@@ -12,8 +12,8 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.forms.program import state_groups
-from atwood.mechanics.equations import Equations
-from atwood.mechanics.release import release_program
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.outputs.internal_reactions import release_program
 
 __all__ = ["event_program"]
 

@@ -11,15 +11,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from atwood.arrays import IndexArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian
 from atwood.forms.program import either_sign, rate_symbols, rows_along_speeds
-from atwood.mechanics.equations import Equations
+from atwood.mechanics.dynamics.equations import Equations
 
 __all__ = ["LoopProgram", "loop_program"]
-
-IntArray = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -41,11 +39,11 @@ class LoopProgram:
     """
 
     stack: Program
-    slope_rows: IntArray
-    slope_columns: IntArray
+    slope_rows: IndexArray
+    slope_columns: IndexArray
     derivatives: Program
-    rows: IntArray
-    columns: IntArray
+    rows: IndexArray
+    columns: IndexArray
     coordinates: int
     speeds: int
     values: int

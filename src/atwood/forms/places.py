@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 from atwood.expr import Expression, OutputGroup, Program, substitute
 from atwood.forms.program import state_groups
-from atwood.mechanics.equations import Equations
-from atwood.mechanics.read_multipliers import with_known
+from atwood.mechanics.constraints.read_multipliers import with_known
+from atwood.mechanics.dynamics.equations import Equations
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly

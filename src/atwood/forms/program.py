@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
 from atwood.expr import (
     Expression,
     InputGroup,
@@ -24,7 +25,7 @@ from atwood.expr import (
     substitute,
 )
 from atwood.forms.derivative import Derivative, derive, directions, is_too_long
-from atwood.mechanics.equations import Equations
+from atwood.mechanics.dynamics.equations import Equations
 from atwood.topology.charts import Chart
 
 __all__ = [
@@ -42,7 +43,6 @@ __all__ = [
     "state_groups",
 ]
 
-FloatArray = NDArray[np.float64]
 Level = Literal["", "ggl", "index1", "index1-projected"]
 
 

@@ -11,7 +11,7 @@ from collections.abc import Collection, Sequence
 
 from atwood.expr import Expression, jacobian, solve
 from atwood.forms.program import FormProgram, either_sign, kinematic_rows, make_form_program, rows_along_speeds
-from atwood.mechanics.equations import Equations
+from atwood.mechanics.dynamics.equations import Equations
 from atwood.topology.groups import connected_groups
 
 __all__ = ["reduced_form"]

@@ -14,9 +14,9 @@ from typing import Any, TypeVar
 
 from atwood.expr import Expression
 from atwood.mechanics.build import Mechanism, check_closures
-from atwood.mechanics.orientation import body_offsets
-from atwood.model.flatten import FlatScene, Part
-from atwood.model.local import LocalPart
+from atwood.mechanics.kinematics.orientation import body_offsets
+from atwood.model.local.flatten import FlatScene, Part
+from atwood.model.local.laws import LocalPart
 from atwood.topology.sides import find_sides
 
 __all__ = ["DECIDED", "Shared", "Slot", "decided_alike", "find_slots", "with_values_of"]

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from atwood.errors import StartError, UsageError, suggestion, suggestion_in_parts
 from atwood.expr import Expression
-from atwood.model.composite import Model
-from atwood.model.flatten import FlatScene
-from atwood.model.scene import Scene
+from atwood.model.compose.composite import Model
+from atwood.model.compose.scene import Scene
+from atwood.model.local.flatten import FlatScene
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
-    from atwood.mechanics.observables import Observable
+    from atwood.mechanics.outputs.observables import Observable
 
 __all__ = ["Assemble", "Source", "no_start_quantity"]
 
@@ -42,7 +42,7 @@ class Source:
     assemble
         How scenes are assembled.
     places
-        Gives where a scene starts, as `atwood.mechanics.mechanism.Mechanism` has it.
+        Gives where a scene starts, as `atwood.mechanics.kinematics.mechanism.Mechanism` has it.
     scene
         A copy of the scene, which nobody else changes; None if there were only its leaves.
     """

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from atwood.expr import Expression
 from atwood.forms.shared import DECIDED, Shared, decided_alike, with_values_of
-from atwood.mechanics.mechanism import Mechanism, started_at
-from atwood.model.flatten import FlatScene
+from atwood.mechanics.kinematics.mechanism import Mechanism, started_at
+from atwood.model.local.flatten import FlatScene
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
@@ -44,7 +44,7 @@ def with_places(assembly: Assembly, places: Mapping[str, Mapping[Expression, flo
     assembly
         The scene as its start was found.
     places
-        See `atwood.mechanics.mechanism.Mechanism`.
+        See `atwood.mechanics.kinematics.mechanism.Mechanism`.
     """
     shared, decisions = _beside(assembly.shared), assembly.mechanism.decisions
     shared.get("starting", lambda: (assembly.shared, decisions))

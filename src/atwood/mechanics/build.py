@@ -7,22 +7,22 @@ from dataclasses import replace
 
 from atwood.errors import DeclarationError
 from atwood.expr import Expression, Graph, depends_on, live, substitute
-from atwood.mechanics.constraints import constraint_values, find_constraints, levels, velocity_levels
-from atwood.mechanics.elimination import SOLVED, check_held, drop_closed, eliminate_linear
-from atwood.mechanics.equations import Equations, force_rows, motion_rows, put_in_place
-from atwood.mechanics.forces import Site, local_map
-from atwood.mechanics.idle_spin import IDLE_SPIN
-from atwood.mechanics.inertia import add_masses, check_masses
-from atwood.mechanics.kinematics import Kinematics, shapes
-from atwood.mechanics.mechanism import Mechanism, check_closures, extent, make_gravity
-from atwood.mechanics.motion import motion_in_plane, motion_in_space
-from atwood.mechanics.orientation import body_offsets
-from atwood.mechanics.read_multipliers import known_multipliers, with_known
-from atwood.mechanics.rolling import Taken, integrated, take_up, without_idle_spins
-from atwood.model.component import bind
-from atwood.model.local import LocalConstraint
-from atwood.model.local_parts import multiplier_symbol
-from atwood.model.vector import Vector
+from atwood.mechanics.constraints.elimination import SOLVED, check_held, drop_closed, eliminate_linear
+from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
+from atwood.mechanics.constraints.read_multipliers import known_multipliers, with_known
+from atwood.mechanics.constraints.rolling import Taken, integrated, take_up, without_idle_spins
+from atwood.mechanics.constraints.values import constraint_values, find_constraints, levels, velocity_levels
+from atwood.mechanics.dynamics.equations import Equations, force_rows, motion_rows, put_in_place
+from atwood.mechanics.dynamics.forces import Site, local_map
+from atwood.mechanics.dynamics.inertia import add_masses, check_masses
+from atwood.mechanics.kinematics.mechanism import Mechanism, check_closures, extent, make_gravity
+from atwood.mechanics.kinematics.motion import motion_in_plane, motion_in_space
+from atwood.mechanics.kinematics.orientation import body_offsets
+from atwood.mechanics.kinematics.positions import Kinematics, shapes
+from atwood.model.declare.component import bind
+from atwood.model.local.laws import LocalConstraint
+from atwood.model.local.parts import multiplier_symbol
+from atwood.model.values.vector import Vector
 from atwood.topology.forest import Forest
 
 __all__ = ["Mechanism", "build_equations", "check_closures", "extent", "make_gravity", "resolve_signals"]

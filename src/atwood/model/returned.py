@@ -7,9 +7,9 @@ from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError
 from atwood.expr import Expression, Graph
-from atwood.model.contributions import Load, Placement, PointInertia
-from atwood.model.laws import Law
-from atwood.model.vector import Vector
+from atwood.model.declare.contributions import Load, Placement, PointInertia
+from atwood.model.declare.laws import Law
+from atwood.model.values.vector import Vector
 
 __all__ = ["call_law", "listed", "not_evaluated", "one_scalar"]
 

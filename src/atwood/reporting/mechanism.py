@@ -10,9 +10,10 @@ import numpy as np
 
 from atwood.arguments import takes
 from atwood.forms.assembly import Assembly
-from atwood.mechanics.frobenius import integrable_together
-from atwood.mechanics.idle_spin import IDLE_SPIN
-from atwood.model.composite import Model
+from atwood.linalg.matrices import scaled, to_array
+from atwood.mechanics.constraints.frobenius import integrable_together
+from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
+from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble, assemble_flat
 from atwood.reporting.offers import Offer, find_offers
 from atwood.reporting.parts import (
@@ -28,14 +29,13 @@ from atwood.reporting.parts import (
     list_parameters,
     list_ties,
 )
-from atwood.solve.immobile import Immobile, find_immobile
-from atwood.solve.matrices import scaled, to_array
-from atwood.solve.placement import Placement, find_placement
-from atwood.solve.problem import Plan, make_plan
-from atwood.solve.rank import FREE, row_scales
-from atwood.solve.run_arguments import NAME, ORIENTATION
-from atwood.solve.scales import motion_names
-from atwood.solve.start import Start, find_start, own_state, settle
+from atwood.simulation.dynamics.rank import FREE, row_scales
+from atwood.simulation.dynamics.scales import motion_names
+from atwood.simulation.initialization.mobility import Immobile, find_immobile
+from atwood.simulation.initialization.report import Placement, find_placement
+from atwood.simulation.initialization.start import Start, find_start, own_state, settle
+from atwood.simulation.problem.arguments import NAME, ORIENTATION
+from atwood.simulation.problem.problem import Plan, make_plan
 
 __all__ = [
     "BodyEntry",

@@ -8,26 +8,25 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from atwood.analysis.symmetry import Symmetry, find_symmetries
+from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
-from atwood.mechanics.orientation import node_axes, spin_in_world
-from atwood.model.flatten import FlatScene
-from atwood.model.vector import Vector
+from atwood.linalg.matrices import scaled
+from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
+from atwood.model.local.flatten import FlatScene
+from atwood.model.values.vector import Vector
 from atwood.pipeline import assemble_flat
-from atwood.solve.balance import balance_of
-from atwood.solve.matrices import scaled
-from atwood.solve.problem import make_plan
-from atwood.solve.rank import independent_rows
-from atwood.solve.scales import motion_scales
-from atwood.solve.start import Start, find_start, own_state
-from atwood.solve.symmetry import Symmetry, find_symmetries
+from atwood.simulation.dynamics.balance import balance_of
+from atwood.simulation.dynamics.rank import independent_rows
+from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.initialization.start import Start, find_start, own_state
+from atwood.simulation.problem.problem import make_plan
 
 __all__ = ["Offer", "find_offers"]
 
-FloatArray = NDArray[np.float64]
 
 _SAME = 1e-8
 """Relative to the scene's sizes: how well place, speed and acceleration at the start must agree in both spaces."""

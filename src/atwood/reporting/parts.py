@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.build import Mechanism
-from atwood.model.composite import Model
-from atwood.model.local import LocalPart
-from atwood.model.scene import Scene
+from atwood.model.compose.composite import Model
+from atwood.model.compose.scene import Scene
+from atwood.model.local.laws import LocalPart
 from atwood.topology.forest import Forest
 from atwood.topology.graph import Joint
 

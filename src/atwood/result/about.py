@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from atwood.integrators.ida.library import available, library
 from atwood.result.result import Result
-from atwood.solve.sundials_library import available, library
 
 __all__ = ["describe_run", "solver_name", "versions"]
 

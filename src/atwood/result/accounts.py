@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
 from atwood.expr import Program, depends_on, substitute
 from atwood.forms.assembly import Assembly
-from atwood.mechanics.equations import Constraint, Equations
-from atwood.mechanics.moving import MovingMass, moving_masses
-from atwood.mechanics.power import applied_power, switched_energy
+from atwood.mechanics.dynamics.equations import Constraint, Equations
+from atwood.mechanics.outputs.moving_inertia import MovingMass, moving_masses
+from atwood.mechanics.outputs.power import applied_power, switched_energy
 from atwood.result.energy import Motion, Piece
-from atwood.solve.record import Segment
+from atwood.simulation.run.record import Segment
 
 __all__ = ["DrivePower", "account", "power_into"]
 
-FloatArray = NDArray[np.float64]
 
 DrivePower = Callable[[Segment], FloatArray]
 """Gives the power of constraints that move with time."""

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
+
 __all__ = ["EnergyLedger", "Piece", "exchange", "make_ledger"]
 
-FloatArray = NDArray[np.float64]
 
 _SHARE = 1e-6
 """Of the kinetic energy: no less counts as exchanged, since steady motion has errors of rounding, too."""
@@ -74,7 +75,7 @@ class EnergyLedger:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Velocities that share a matrix of masses; see `atwood.mechanics.moving.MovingMass`.
+    """Velocities that share a matrix of masses; see `atwood.mechanics.outputs.moving_inertia.MovingMass`.
 
     Attributes
     ----------

@@ -22,18 +22,16 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood.arguments import FILE, check, instance, takes
+from atwood.arrays import FloatArray
 from atwood.errors import ResultError, UsageError, suggestion_in_parts
 from atwood.files import check_directory, check_readable, write_atomically
-from atwood.model.quantities import PATH, PATHS
+from atwood.model.declare.quantities import PATH, PATHS
 from atwood.result.about import describe_run
 from atwood.result.result import Result, output_number
 
 __all__ = ["SavedResult", "load_result", "save_result"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

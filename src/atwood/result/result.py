@@ -13,30 +13,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arguments import FILE, check, instance, takes, whole
+from atwood.arrays import FloatArray
 from atwood.errors import ResultError, suggestion_in_parts
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
-from atwood.model.quantities import PATH, PATHS, Quantity
+from atwood.integrators.protocol import Statistics
+from atwood.model.declare.quantities import PATH, PATHS, Quantity
 from atwood.result.accounts import account
 from atwood.result.angles import unwrap
 from atwood.result.energy import EnergyLedger
 from atwood.result.work import find_ledger
-from atwood.solve.charts import Restated
-from atwood.solve.driver import Statistics
-from atwood.solve.immobile import Immobile, find_immobile
-from atwood.solve.modes import Happening
-from atwood.solve.passage import Passage
-from atwood.solve.placement import Placement, find_placement
-from atwood.solve.problem import Plan
-from atwood.solve.projection import misses_of
-from atwood.solve.reactions import ReactionSolver
-from atwood.solve.record import Segment
-from atwood.solve.run import Run
-from atwood.solve.start import Start
+from atwood.simulation.dynamics.orientation_coordinates import Restated
+from atwood.simulation.dynamics.reactions import ReactionSolver
+from atwood.simulation.events.modes import Happening
+from atwood.simulation.initialization.mobility import Immobile, find_immobile
+from atwood.simulation.initialization.report import Placement, find_placement
+from atwood.simulation.initialization.start import Start
+from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.projection import misses_of
+from atwood.simulation.run.record import Segment
+from atwood.simulation.run.run import Run
+from atwood.simulation.singular.crossing import Passage
 
 __all__ = ["Result", "output_number"]
 
-FloatArray = NDArray[np.float64]
 
 _LONGER = "Give it more time; or assemble the scene first, and hand the assembly to several runs."
 
@@ -397,4 +397,4 @@ class Result:
             Where to save the picture; its suffix says how.
         """
         # Views stand above results and are never imported from here, only looked up when a picture is wanted.
-        return import_module("atwood.view.plot").plot(self, paths, file)
+        return import_module("atwood.plotting.plots.quantities").plot(self, paths, file)

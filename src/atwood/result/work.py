@@ -8,14 +8,14 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
 from atwood.result.accounts import DrivePower, power_into
 from atwood.result.energy import EnergyLedger, Piece, make_ledger
-from atwood.solve.retrace import run_again, times_of_steps
-from atwood.solve.run import Run
+from atwood.simulation.run.retrace import run_again, times_of_steps
+from atwood.simulation.run.run import Run
 
 __all__ = ["find_ledger", "integral_in_steps", "integral_of_samples", "nodes_between"]
 
-FloatArray = NDArray[np.float64]
 
 _CLEAR, _PART = 0.01, 0.1
 """Of the tolerance, and of the drift: an error of the work that is smaller than either of them hides nothing."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from atwood.arguments import real, show
+from atwood.arrays import FloatArray
 from atwood.errors import ParameterError
 
 __all__ = ["checked_array", "checked_number", "checked_rotation", "symmetric_part", "verify_moments"]
 
-FloatArray = NDArray[np.float64]
 
 _SYMMETRY = 1e-9
 """How far opposite elements of an inertia may be apart, relative to its largest one."""

@@ -9,17 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from atwood.arguments import show
+from atwood.arrays import FloatArray, IntArray
 from atwood.errors import ParameterError
 from atwood.solids.shells import check_overlap, check_shells, signed_volume, split_shells
 from atwood.solids.welding import weld
 
 __all__ = ["TriangleMesh", "closed_mesh"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _WELD = 1e-6
 """Vertices that are this close, relative to the size of the mesh, are one, where exact equality leaves the mesh open.

@@ -11,15 +11,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from atwood.arguments import check, instance, number, takes
+from atwood.arrays import FloatArray
 from atwood.errors import ParameterError
 from atwood.solids.checks import checked_array, checked_number, checked_rotation, symmetric_part, verify_moments
 
 __all__ = ["MassProperties", "combine", "point_mass", "subtract"]
 
-FloatArray = NDArray[np.float64]
 
 _NOTHING_LEFT = 1e-9
 """A body of which holes leave less than this part has nothing left."""

@@ -11,7 +11,6 @@ import math
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood.arguments import check, one_of, real, show, takes_names
 from atwood.errors import ParameterError
@@ -29,7 +28,6 @@ __all__ = [
     "tube",
 ]
 
-FloatArray = NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
 
 

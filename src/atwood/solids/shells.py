@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray, IntArray
 from atwood.errors import ParameterError
 
 __all__ = ["check_overlap", "check_shells", "signed_volume", "split_shells", "winding_number"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _PROBES = 7
 """How many triangles of a shell are asked on which side of the other shells they are."""

@@ -10,14 +10,13 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood.arguments import FILE, takes
+from atwood.arrays import FloatArray
 from atwood.errors import ParameterError
 
 __all__ = ["read_stl"]
 
-FloatArray = NDArray[np.float64]
 
 _HEADER = 84
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

@@ -5,12 +5,10 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray, IntArray
 
 __all__ = ["weld"]
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 def weld(points: FloatArray, distance: float) -> tuple[FloatArray, IntArray]:

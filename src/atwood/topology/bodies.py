@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from atwood.expr import Expression, Scalar, depends_on, is_zero
-from atwood.model.laws import Kind
-from atwood.model.local import LocalConstraint, LocalPart
+from atwood.model.declare.laws import Kind
+from atwood.model.local.laws import LocalConstraint, LocalPart
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
 
 __all__ = ["Bodies", "Body", "RigidStep", "find_bodies"]

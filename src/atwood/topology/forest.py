@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from atwood.expr import Expression
-from atwood.model.local import LocalPart
-from atwood.model.space import Space
+from atwood.model.local.laws import LocalPart
+from atwood.model.values.space import Space
 from atwood.topology.bodies import Bodies, reads_position
 from atwood.topology.charts import Chart, Orientation, coordinates_of
 from atwood.topology.graph import Joint, MechanismGraph, unit_of

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from atwood.errors import ConnectError, DeclarationError, suggestion
 from atwood.expr import Expression, depends_on
-from atwood.model.connectors import Frame, JointCoordinate
-from atwood.model.flatten import FlatScene
-from atwood.model.local import LocalJoint, LocalPart
-from atwood.model.rotation import FREE, Rotation
+from atwood.model.declare.connectors import Frame, JointCoordinate
+from atwood.model.local.flatten import FlatScene
+from atwood.model.local.laws import LocalJoint, LocalPart
+from atwood.model.values.rotation import FREE, Rotation
 from atwood.topology.groups import connected_groups
 
 if TYPE_CHECKING:

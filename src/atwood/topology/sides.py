@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from atwood.expr import Expression, evaluate
-from atwood.model.flatten import FlatScene
-from atwood.model.local import LocalPart
-from atwood.model.space import Space
-from atwood.model.vector import Vector, dot
+from atwood.model.local.flatten import FlatScene
+from atwood.model.local.laws import LocalPart
+from atwood.model.values.space import Space
+from atwood.model.values.vector import Vector, dot
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 

@@ -1,0 +1,223 @@
+"""From programs to loaded machine code, by way of the cache."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from atwood.clock import within_time
+from atwood.codegen.cache import Cache, default_cache, make_key
+from atwood.codegen.llvm.engine import (
+    LoadedCode,
+    compile_text,
+    load_code,
+    require_symbols,
+    sincos_name,
+    target_description,
+)
+from atwood.codegen.llvm.module import CodeOptions, ModuleText, Part, write_module
+from atwood.errors import UnsupportedError
+from atwood.expr.core.operations import ExternalFunction
+
+__all__ = ["GENERATORS", "Built", "Failures", "build_code", "default_options", "hash_of_generators"]
+
+_GENERATOR = 1
+"""Counts changes to the generated code that do not show in `GENERATORS`."""
+
+GENERATORS = (
+    "llvm/build.py",
+    "llvm/engine.py",
+    "llvm/layout.py",
+    "llvm/linear_systems.py",
+    "llvm/module.py",
+    "llvm/routine.py",
+    "llvm/text.py",
+    "llvm/unit.py",
+)
+"""The files, by their place in the room of the code generators, on which the machine code of a program depends.
+
+What other modules write is handed over as text, which is part of the key by itself.
+"""
+
+_SMALL = 20_000
+"""Beyond so many nodes LLVM's quickest level is used: it takes a sixth of the time, for code that is a tenth slower."""
+
+
+class Failures(threading.local):
+    """The exception that a function in Python raised inside compiled code, in each thread.
+
+    Attributes
+    ----------
+    error
+        The exception, or None.
+    """
+
+    error: BaseException | None = None
+
+    def take(self) -> BaseException | None:
+        """Return the exception and forget it."""
+        error, self.error = self.error, None
+        return error
+
+
+@dataclass(frozen=True)
+class Built:
+    """Code that is ready to be called.
+
+    Attributes
+    ----------
+    code
+        The functions in memory.
+    scratch
+        The length of the scratch array that they need.
+    from_cache
+        Whether nothing had to be compiled.
+    failures
+        What functions in Python raised, if the code calls any.
+    """
+
+    code: LoadedCode
+    scratch: int
+    from_cache: bool
+    failures: Failures | None
+
+
+def default_options(parts: Sequence[Part]) -> CodeOptions:
+    """Return how to compile programs of this size on this machine."""
+    size = sum(part.program.size for part in parts)
+    return CodeOptions(level=1 if size <= _SMALL else 0, sincos=sincos_name())
+
+
+def build_code(
+    parts: Sequence[Part],
+    options: CodeOptions,
+    *,
+    more: str = "",
+    exports: Sequence[str] = (),
+    library: Sequence[str] = (),
+    cached: bool = True,
+) -> Built:
+    """Compile programs, or take them from the cache.
+
+    Parameters
+    ----------
+    parts
+        The programs.
+    options
+        How to compile them.
+    more
+        Further functions in LLVM's language that call these.
+    exports
+        The names of those functions.
+    library
+        The functions of the C library that they call.
+    cached
+        Whether to use the cache.  Programs that call functions in Python are never kept: their names do not say
+        what they do.
+    """
+    return within_time(lambda: _build(parts, options, more, exports, library, cached))
+
+
+def _build(
+    parts: Sequence[Part],
+    options: CodeOptions,
+    more: str,
+    exports: Sequence[str],
+    library: Sequence[str],
+    cached: bool,
+) -> Built:
+    names = [*exports, *(name for part in parts for name in (part.name, f"{part.name}_prologue"))]
+    has_externals = any(node.operation == "external" for part in parts for node in part.program.nodes)
+    store = default_cache() if cached and not has_externals else None
+    key = _key(parts, options, more) if store else ""
+    if store is not None:
+        found = _from_cache(store, key, names)
+        if found is not None:
+            return found
+    module = write_module(parts, options, more)
+    functions = (*module.library, *library)
+    code = compile_text(module.text, options.level)
+    failures = Failures() if module.externals else None
+    callbacks = _callbacks(module, failures) if failures is not None else {}
+    addresses = {name: ctypes.cast(call, ctypes.c_void_p).value or 0 for name, call in callbacks.items()}
+    loaded = load_code(code, names, require_symbols(functions) | addresses, tuple(callbacks.values()))
+    if store is not None:
+        about = {"scratch": module.scratch, "library": functions}
+        store.write(key, json.dumps(about).encode() + b"\n" + code)
+    return Built(loaded, module.scratch, False, failures)
+
+
+def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
+    """Return what the cache holds, or None if it holds nothing that can be used."""
+    content = store.read(key)
+    if content is None:
+        return None
+    line, _, code = content.partition(b"\n")
+    try:
+        about = json.loads(line)
+        loaded = load_code(code, names, require_symbols(about["library"]), ())
+        return Built(loaded, int(about["scratch"]), True, None)
+    except (ValueError, KeyError, TypeError, RuntimeError, UnsupportedError):
+        return None
+
+
+def _key(parts: Sequence[Part], options: CodeOptions, more: str) -> str:
+    programs = [(part.name, part.program.digest, part.positions, part.lanes, part.packed) for part in parts]
+    return make_key([_GENERATOR, hash_of_generators(), programs, options, more, target_description()])
+
+
+@cache
+def hash_of_generators(room: Path = Path(__file__).parents[1]) -> str:
+    """Return a hash of the files that write code, so that no change to them goes unnoticed.
+
+    Parameters
+    ----------
+    room
+        The folder of the code generators.
+
+    Raises
+    ------
+    UnsupportedError
+        If one of them cannot be read: machine code of another version could then be taken for that of this one.
+    """
+    total = sha256()
+    for name in GENERATORS:
+        try:
+            total.update((room / name).read_bytes())
+        except OSError as error:
+            raise UnsupportedError(
+                f"the source of a code generator cannot be read: {error}",
+                where=name,
+                advice="Install atwood with its sources, or switch the cache of machine code off: ATWOOD_CACHE=0.",
+            ) from error
+    return total.hexdigest()
+
+
+def _callbacks(module: ModuleText, failures: Failures) -> dict[str, Any]:
+    """Return the functions in Python as functions in C."""
+    found: dict[str, Any] = {}
+    for position, (function, count) in enumerate(module.externals):
+        signature = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * count)
+        found[f"external.{position}"] = signature(_guard(function, failures))
+    return found
+
+
+def _guard(function: ExternalFunction, failures: Failures) -> Callable[..., float]:
+    """Return a function that raises nothing: an exception cannot pass through compiled code."""
+    call = function.function
+
+    def guarded(*arguments: float) -> float:
+        try:
+            return float(call(*arguments))
+        except BaseException as error:
+            failures.error = error
+            return float("nan")
+
+    return guarded

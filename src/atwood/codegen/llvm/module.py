@@ -1,0 +1,289 @@
+"""A module in LLVM's language from programs: a function for each chunk, and one that calls them in turn.
+
+Every function of a program has one signature in C::
+
+    int kernel(const double *const *inputs, const double *derived, double *scratch, double *const *outputs);
+
+with a pointer for each input and output group, and returns 1 if a result is not finite (or the results are so large
+that their sum is not), else 0.  ``derived`` is what the program's second function computes once a run from the
+parameters::
+
+    void prologue(const double *parameters, double *derived, double *scratch);
+
+No array may overlap another.  Nothing is kept between calls, so that many threads can call one function at once,
+each with arrays of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from atwood.codegen.llvm.layout import Body, Layout, lay_out, main_body, prologue_body
+from atwood.codegen.llvm.linear_systems import ROUTINES, Solver
+from atwood.codegen.llvm.text import LIBRARY_FUNCTIONS, Needs, Writer
+from atwood.codegen.llvm.unit import opening, write_unit
+from atwood.errors import UnsupportedError
+from atwood.expr.core.graph import Expression
+from atwood.expr.core.operations import ExternalFunction
+from atwood.expr.core.program import Program
+
+__all__ = ["CodeOptions", "ModuleText", "Part", "write_module"]
+
+_ARGUMENTS = (
+    "ptr noalias readonly %inputs, ptr noalias readonly %derived, ptr noalias %scratch, ptr noalias readonly %outputs"
+)
+_STORES = 300
+"""So many results that are inputs or constants are stored in one function: more, and LLVM takes far longer for them."""
+
+_PASSED = "ptr %inputs, ptr %derived, ptr %scratch, ptr %outputs"
+
+
+@dataclass(frozen=True)
+class CodeOptions:
+    """What the generated code depends on besides the program.
+
+    Attributes
+    ----------
+    longest_chunk
+        The number of operations in one function.
+    level
+        How hard LLVM works on the machine code, from 0 to 3.
+    sincos
+        The C library's function for sine and cosine together, empty where it has none.
+    contract
+        Whether a product and a sum may become one operation, which rounds once: faster, but the last digits are then
+        not those of every other machine.
+    """
+
+    longest_chunk: int = 150
+    level: int = 1
+    sincos: str = ""
+    contract: bool = False
+
+
+@dataclass(frozen=True)
+class ModuleText:
+    """A module in LLVM's language.
+
+    Attributes
+    ----------
+    text
+        The module.
+    scratch
+        The length of the scratch array that suits all its functions.
+    library
+        The functions of the C library that it calls.
+    externals
+        The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
+    """
+
+    text: str
+    scratch: int
+    library: tuple[str, ...]
+    externals: tuple[tuple[ExternalFunction, int], ...]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One program of a module.
+
+    Attributes
+    ----------
+    name
+        Its functions are called ``name`` and ``name_prologue``.
+    program
+        What it computes.
+    positions
+        Where all results go in the arrays of their groups, if not one after the other.
+    lanes
+        So many neighbouring places of the groups in `packed` are stored at once, those without a result as zero, where
+        one function computes all: whoever reads them at once need not wait until each has arrived in memory.
+    packed
+        The output groups for which this is wanted; their arrays are aligned and padded to it.
+    """
+
+    name: str
+    program: Program
+    positions: tuple[int, ...] | None = None
+    lanes: int = 1
+    packed: tuple[int, ...] = ()
+
+
+def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "") -> ModuleText:
+    """Write the two functions of each program.
+
+    Parameters
+    ----------
+    programs
+        What to compute.
+    options
+        What the code depends on.
+    more
+        Further functions, already written, that call these.
+
+    Raises
+    ------
+    UnsupportedError
+        If there is an operation without machine code.
+    """
+    needs = Needs()
+    parts: list[str] = []
+    scratch = 0
+    for part in programs:
+        name, program = part.name, part.program
+        bodies = ((name, main_body(program, part.positions)), (f"{name}_values", prologue_body(program)))
+        for function, body in bodies:
+            layout = lay_out(body, options.longest_chunk)
+            scratch = max(scratch, layout.scratch)
+            try:
+                whole = part if function == name and len(layout.chunks) == 1 else None
+                parts.extend(_write_function(function, body, layout, options, needs, whole))
+            except UnsupportedError as error:
+                raise UnsupportedError(error.message, where=program.name) from None
+        parts.append(_write_prologue(name))
+    if options.contract:
+        parts = [_contracted(text) for text in parts]
+    parts.append(more)
+    if needs.elimination:
+        parts.append(ROUTINES)
+    parts.extend(_declarations(needs, options.sincos))
+    return ModuleText("\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals))
+
+
+def _contracted(text: str) -> str:
+    """Return code in which products and sums may become one operation."""
+    for operation in ("fadd", "fsub", "fmul", "fneg"):
+        text = text.replace(f"= {operation} double", f"= {operation} contract double")
+    return text
+
+
+def _write_function(
+    name: str, body: Body, layout: Layout, options: CodeOptions, needs: Needs, whole: Part | None = None
+) -> list[str]:
+    """Write the chunks of a body, and the function that calls them; `whole` says how the only chunk stores results."""
+    places = {node.index: (pointer, k) for pointer, nodes in body.given for k, node in enumerate(nodes)}
+    places |= {index: ("scratch", slot) for index, slot in layout.slots.items()}
+    targets: dict[int, list[tuple[str, int]]] = {}
+    results: dict[int, Expression] = {}
+    for node, pointer, position in body.results:
+        targets.setdefault(node.index, []).append((pointer, position))
+        results[node.index] = node
+    held = frozenset(f"out{group}" for group in whole.packed) if whole is not None else frozenset()
+    solver = Solver(layout.regions)
+    parts: list[str] = []
+    computed = {node.index for chunk in layout.chunks for unit in chunk for node in unit}
+    passed_on = [
+        (node, target) for index, node in results.items() if index not in computed for target in targets[index]
+    ]
+    cuts = range(0, len(passed_on), _STORES) if len(passed_on) > _STORES else ()
+    pieces = [passed_on[k : k + _STORES] for k in cuts]
+    alone = len(layout.chunks) == 1 and not pieces
+    for number, chunk in enumerate(layout.chunks):
+        writer = Writer(places, options.sincos, needs, held if alone else frozenset())
+        solver.start_chunk()
+        for unit in chunk:
+            write_unit(writer, solver, unit)
+            for node in unit:
+                if node.index in layout.slots:
+                    writer.store(writer.value(node), "scratch", layout.slots[node.index])
+                if node.index in results:
+                    _write_result(writer, node, targets[node.index])
+        if number == len(layout.chunks) - 1 and not pieces:
+            for node in (one for index, one in results.items() if index not in computed):
+                _write_result(writer, node, targets[node.index])
+        if alone:
+            if whole is not None:
+                _pack(writer, whole.lanes)
+            return [_as_function(name, writer)]
+        parts.append(_as_chunk(f"{name}.{number}", writer))
+    for piece in pieces:
+        writer = Writer(places, options.sincos, needs, frozenset())
+        for node, target in piece:
+            _write_result(writer, node, [target])
+        parts.append(_as_chunk(f"{name}.{len(parts)}", writer))
+    parts.append(_write_calls(name, len(parts)))
+    return parts
+
+
+def _write_result(writer: Writer, node: Expression, targets: Sequence[tuple[str, int]]) -> None:
+    value = writer.value(node)
+    for pointer, position in targets:
+        writer.store(value, pointer, position)
+    writer.check(value)
+
+
+def _pack(writer: Writer, lanes: int) -> None:
+    """Store what was held back, neighbouring results at once."""
+    kind = f"<{lanes} x double>"
+    vectors: dict[tuple[str, int], dict[int, str]] = {}
+    for value, pointer, position in writer.kept:
+        vectors.setdefault((pointer, position // lanes), {})[position % lanes] = value
+    for (pointer, block), values in vectors.items():
+        vector = "zeroinitializer"
+        for lane, value in sorted(values.items()):
+            vector = writer.put(f"insertelement {kind} {vector}, double {value}, i32 {lane}")
+        address = writer.address(pointer, block * lanes)
+        writer.lines.append(f"  store {kind} {vector}, ptr {address}, align {8 * lanes}")
+
+
+def _as_chunk(name: str, writer: Writer) -> str:
+    """Return a chunk as a function of its own, which returns the sum of its results."""
+    checked = writer.checked()
+    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *opening(writer)]
+    return "\n".join([*start, *writer.lines, f"  ret double {checked}", "}"])
+
+
+def _as_function(name: str, writer: Writer) -> str:
+    """Return the only chunk of a body as the whole function."""
+    checked = writer.checked()
+    start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *opening(writer)]
+    return "\n".join([*start, *writer.lines, *_ending(checked)])
+
+
+def _ending(checked: str) -> list[str]:
+    """Return the end of a function: 1 if the sum of all results is not finite."""
+    return [
+        f"  %nothing = fsub double {checked}, {checked}",
+        "  %undefined = fcmp une double %nothing, 0.0",
+        "  %code = zext i1 %undefined to i32",
+        "  ret i32 %code",
+        "}",
+    ]
+
+
+def _write_calls(name: str, count: int) -> str:
+    """Write the function that calls all chunks of a body."""
+    lines = [f"define i32 @{name}({_ARGUMENTS}) #0 {{"]
+    total = "0.0"
+    for k in range(count):
+        lines.append(f"  %c{k} = call double @{name}.{k}({_PASSED})")
+        lines.append(f"  %s{k} = fadd double {total}, %c{k}")
+        total = f"%s{k}"
+    return "\n".join([*lines, *_ending(total)])
+
+
+def _write_prologue(name: str) -> str:
+    """Write the function that computes what depends on parameters alone."""
+    return f"""define void @{name}_prologue(ptr noalias %parameters, ptr noalias %derived, ptr noalias %scratch) #0 {{
+  %inputs = alloca ptr
+  %outputs = alloca ptr
+  store ptr %parameters, ptr %inputs
+  store ptr %derived, ptr %outputs
+  %code = call i32 @{name}_values(ptr %inputs, ptr null, ptr %scratch, ptr %outputs)
+  ret void
+}}"""
+
+
+def _declarations(needs: Needs, sincos: str) -> list[str]:
+    """Return the declarations of what the module calls."""
+    arguments = dict(LIBRARY_FUNCTIONS.values())
+    lines = ["declare double @llvm.sqrt.f64(double)", "declare double @llvm.fabs.f64(double)"]
+    for name in sorted(needs.library):
+        if name == sincos:
+            lines.append(f"declare void @{name}(double, ptr, ptr) #0")
+        else:
+            lines.append(f"declare double @{name}({', '.join(['double'] * arguments[name])}) #0")
+    for position, (_, count) in enumerate(needs.externals):
+        lines.append(f"declare double @external.{position}({', '.join(['double'] * count)}) #0")
+    return [*lines, "attributes #0 = { nounwind }", "!0 = !{}"]

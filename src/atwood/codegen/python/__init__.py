@@ -1,0 +1,1 @@
+"""Programs as plain Python and NumPy: the reference for machine code."""

@@ -1,0 +1,1 @@
+"""Functions with the C signatures of SUNDIALS IDA, as machine code."""

@@ -1,0 +1,200 @@
+"""Residual, Jacobian and error weights of a mechanism with loops as IDA calls them, for any choice of coordinates."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from atwood.codegen.llvm.build import Built, build_code, default_options
+from atwood.codegen.llvm.module import Part
+from atwood.codegen.sundials.null_space import ATTENTION, FIELDS, LIMIT, RATE, LoopShape, loop_text
+from atwood.codegen.sundials.text import SundialsLayout, sundials_layout
+from atwood.errors import KernelEvaluationError, UsageError
+from atwood.expr.core.program import Program
+
+__all__ = ["LoopCallbacks", "LoopData", "compile_loop_callbacks"]
+
+
+_PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
+_EXPORTS = ("ida_residual", "ida_jacobian", "ida_weights")
+
+
+def compile_loop_callbacks(
+    stack: Program,
+    derivatives: Program,
+    slope: tuple[ArrayLike, ArrayLike],
+    pattern: tuple[ArrayLike, ArrayLike],
+    shape: LoopShape,
+    sparse: bool = False,
+    *,
+    cache: bool = True,
+    layout: SundialsLayout | None = None,
+) -> LoopCallbacks:
+    """Compile what the reduced form of a mechanism with loops is made of to functions that IDA calls.
+
+    Parameters
+    ----------
+    stack
+        Program of (t, y, y') with kinematic rows, balances, constraints, their rates, and their slopes.
+    derivatives
+        Program of (t, y, y', cj, multipliers) with the entries of the derivatives of all but the slopes.
+    slope, pattern
+        Row and column of each slope, and of each derivative.
+    shape
+        How many there are of each.
+    sparse
+        Whether IDA's matrix is sparse; its pattern is full.
+    cache
+        Whether to use the cache on disk.
+    layout
+        Where SUNDIALS' structures have their arrays; by default as in the libraries that scikit-sundae ships.
+
+    Raises
+    ------
+    UsageError
+        If the programs have other inputs or outputs than these.
+    """
+    slope_rows, slope_columns, rows, columns = (np.asarray(x, dtype=np.int64).ravel() for x in (*slope, *pattern))
+    _check(stack, [1, shape.size, shape.size], shape.stack + len(slope_rows))
+    _check(derivatives, [1, shape.size, shape.size, 1, shape.rates], len(rows))
+    placed = np.concatenate([np.arange(shape.stack), shape.stack + slope_rows * shape.speeds + slope_columns])
+    parts = [
+        Part("residual", stack, tuple(placed.tolist())),
+        Part("jacobian", derivatives, tuple((columns * shape.stack + rows).tolist())),
+    ]
+    more = loop_text(layout or sundials_layout(), shape, sparse)
+    built = build_code(parts, default_options(parts), more=more, exports=_EXPORTS, cached=cache)
+    return LoopCallbacks(stack, derivatives, shape, built)
+
+
+class _Pointers(ctypes.Structure):
+    _fields_ = tuple((name, ctypes.c_void_p) for name in FIELDS)
+
+
+@dataclass(frozen=True, eq=False)
+class LoopData:
+    """The user's data of the callbacks of one session; it must live as long as IDA may call.
+
+    Attributes
+    ----------
+    address
+        What IDA is given as the user's data.
+    choice
+        Which coordinates are dependent, as lists of numbers; may be changed between two steps.
+    """
+
+    address: int
+    choice: NDArray[np.int64]
+    _pointers: _Pointers
+    _arrays: dict[str, NDArray[np.generic]]
+
+    @property
+    def bytes(self) -> int:
+        """How long the user's data are; they hold nothing but pointers."""
+        return ctypes.sizeof(self._pointers)
+
+    def set_weights(self, relative: ArrayLike, absolute: ArrayLike) -> None:
+        """Make the error weights ``1 / (relative[i] |y[i]| + absolute[i])``."""
+        self._arrays["relative"][:] = relative
+        self._arrays["absolute"][:] = absolute
+
+    @property
+    def rate(self) -> float:
+        """The factor cj of the last Jacobian."""
+        return float(self._arrays["state"][RATE])
+
+    def take_attention(self) -> bool:
+        """Return whether a Jacobian found the choice to be a poor one since this was last asked."""
+        state = self._arrays["state"]
+        found, state[ATTENTION] = bool(state[ATTENTION]), 0.0
+        return found
+
+
+class LoopCallbacks:
+    """Residual, Jacobian and error weights as IDA calls them, for any choice of dependent coordinates.
+
+    Residual and Jacobian return 1 (recoverable) where a value is not finite. The weights return -1, at which IDA
+    hands over what it has, where a weight is not positive or the last Jacobian found the choice to be a poor one.
+
+    Parameters
+    ----------
+    stack, derivatives
+        What they are made of.
+    shape
+        How many there are of each.
+    built
+        The code.
+
+    Attributes
+    ----------
+    residual_address, jacobian_address, weights_address
+        The addresses of the functions.
+    from_cache
+        Whether nothing had to be compiled.
+    """
+
+    def __init__(self, stack: Program, derivatives: Program, shape: LoopShape, built: Built) -> None:
+        self.programs = {"residual": stack, "jacobian": derivatives}
+        self.shape = shape
+        self.built = built
+        self.from_cache = built.from_cache
+        self.residual_address, self.jacobian_address, self.weights_address = (
+            built.code.addresses[name] for name in _EXPORTS
+        )
+
+    def bind(self, parameter_values: ArrayLike, choice: ArrayLike, sizes: ArrayLike, limit: float) -> LoopData:
+        """Return the user's data for values of the parameters; each run needs its own.
+
+        Parameters
+        ----------
+        parameter_values
+            The values in the order of the programs' parameters.
+        choice
+            Which coordinates are dependent, as the lists that `LoopShape.choice` names.
+        sizes
+            The size of each speed.
+        limit
+            How much of a dependent coordinate one of the independent ones may move, both by their sizes, before the
+            choice counts as poor.
+
+        Raises
+        ------
+        KernelEvaluationError
+            If the number of values is wrong.
+        """
+        values = np.array(parameter_values, dtype=float)
+        arrays: dict[str, NDArray[np.generic]] = {"scratch": np.empty(self.built.scratch)}
+        for name, program in self.programs.items():
+            count = len(program.parameters)
+            if values.shape != (count,):
+                raise KernelEvaluationError(
+                    f"needs {count} parameter values but got an array of shape {values.shape}", where=program.name
+                )
+            derived = np.empty(len(program.prologue))
+            prologue = _PROLOGUE(self.built.code.addresses[f"{name}_prologue"])
+            prologue(values.ctypes.data, derived.ctypes.data, arrays["scratch"].ctypes.data)
+            arrays[f"derived_{name}"] = derived
+        chosen = np.array(choice, dtype=np.int64)
+        arrays["choice"] = chosen
+        arrays["relative"], arrays["absolute"] = np.zeros(self.shape.size), np.ones(self.shape.size)
+        arrays["work"], arrays["sizes"] = np.zeros(self.shape.work["end"]), np.array(sizes, dtype=float)
+        arrays["state"] = state = np.zeros(3)
+        state[LIMIT] = limit
+        if chosen.shape != (self.shape.choice["end"],) or arrays["sizes"].shape != (self.shape.speeds,):
+            raise UsageError("the choice or the sizes have another length than the mechanism")
+        pointers = _Pointers(*[arrays[name].ctypes.data for name in FIELDS])
+        return LoopData(ctypes.addressof(pointers), chosen, pointers, arrays)
+
+
+def _check(program: Program, inputs: Sequence[int], outputs: int) -> None:
+    found = [len(group.symbols) for group in program.inputs]
+    results = [len(group.expressions) for group in program.outputs]
+    if found != list(inputs) or results != [outputs]:
+        raise UsageError(
+            f"needs input groups of {list(inputs)} and one output group of {outputs}, not {found} and {results}",
+            where=program.name,
+        )

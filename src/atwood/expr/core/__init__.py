@@ -1,0 +1,1 @@
+"""Nodes, local algebra, operations, derivatives, programs, and questions about expressions."""

@@ -1,0 +1,212 @@
+"""Questions about expressions: what they depend on, what they cost, what they are worth.
+
+Every traversal goes over indices in order, never by recursion.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+from atwood.clock import check_time
+from atwood.errors import AtwoodError
+from atwood.expr.core import algebra
+from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.operations import BINARY, LEAVES, UNARY, UNCOUNTED, solve_or_nan
+
+
+def live(outputs: Iterable[Expression | float]) -> list[Expression]:
+    """Return every node that the outputs need, themselves included, arguments before users.
+
+    Parameters
+    ----------
+    outputs
+        Expressions of one graph; numbers among them are passed over.
+    """
+    check_time()
+    found: dict[int, Expression] = {}
+    stack = [output for output in outputs if isinstance(output, Expression)]
+    for output in stack:
+        if output.graph is not stack[0].graph:
+            raise AtwoodError("the outputs belong to different graphs")
+    while stack:
+        node = stack.pop()
+        if node.index not in found:
+            found[node.index] = node
+            stack.extend(node.arguments)
+    return [found[index] for index in sorted(found)]
+
+
+def dependents(nodes: Sequence[Expression], roots: Iterable[Expression]) -> set[int]:
+    """Return the indices of the nodes that depend on a root, roots among them included.
+
+    Parameters
+    ----------
+    nodes
+        Nodes in topological order, as from :func:`live`.
+    roots
+        The expressions to depend on.
+    """
+    result = {root.index for root in roots}
+    for node in nodes:
+        if node.index not in result:
+            for argument in node.arguments:
+                if argument.index in result:
+                    result.add(node.index)
+                    break
+    return result
+
+
+def dependencies(outputs: Sequence[Expression | float], symbols: Sequence[Expression]) -> list[frozenset[Expression]]:
+    """Return, for each output, which of the given symbols it depends on."""
+    bits = {symbol.index: 1 << position for position, symbol in enumerate(symbols)}
+    for node in live(outputs):
+        mask = bits.get(node.index, 0)
+        for argument in node.arguments:
+            mask |= bits[argument.index]
+        bits[node.index] = mask
+    masks = [bits[output.index] if isinstance(output, Expression) else 0 for output in outputs]
+    return [frozenset(symbol for i, symbol in enumerate(symbols) if mask >> i & 1) for mask in masks]
+
+
+def depends_on(expression: Expression | float, symbols: Collection[Expression]) -> bool:
+    """Return whether an expression depends on any of the symbols."""
+    wanted = {symbol.index for symbol in symbols}
+    return any(node.index in wanted for node in live([expression]))
+
+
+def varying(nodes: Sequence[Expression], parameters: Iterable[Expression]) -> set[int]:
+    """Return the indices of the nodes that need something besides constants and parameters."""
+    fixed = {parameter.index for parameter in parameters}
+    result: set[int] = set()
+    for node in nodes:
+        if node.operation == "symbol":
+            if node.index not in fixed:
+                result.add(node.index)
+        elif node.index not in fixed:
+            for argument in node.arguments:
+                if argument.index in result:
+                    result.add(node.index)
+                    break
+    return result
+
+
+def count_operations(outputs: Sequence[Expression | float], parameters: Collection[Expression] = ()) -> dict[str, int]:
+    """Return how many operations of each kind one evaluation of the outputs takes.
+
+    Parameters
+    ----------
+    outputs
+        The expressions to evaluate together; what they share counts once.
+    parameters
+        Symbols that keep their value for a run.  What depends on nothing but these and constants is computed once
+        a run and does not count.
+
+    Returns
+    -------
+    dict
+        Counts by the name of the operation, such as ``{"add": 2, "sin": 1}``, without those that are zero.
+    """
+    nodes = live(outputs)
+    needed = varying(nodes, parameters)
+    counts = Counter(node.operation for node in nodes if node.index in needed and node.operation not in UNCOUNTED)
+    return dict(sorted(counts.items()))
+
+
+def substitute(
+    outputs: Sequence[Expression | float], mapping: Mapping[Expression, Expression | float]
+) -> list[Expression]:
+    """Replace expressions by others and simplify what follows from it.
+
+    Parameters
+    ----------
+    outputs
+        The expressions to rewrite.
+    mapping
+        What to replace, usually symbols, and by what.  All replacements happen at once.
+    """
+    if not outputs:
+        return []
+    graph = _graph_of(outputs, mapping)
+    nodes = live(outputs)
+    replaced = {old.index: graph.convert(new) for old, new in mapping.items()}
+    touched = dependents(nodes, mapping)
+    unknowns: dict[int, list[Expression]] = {}
+    for node in nodes:
+        index = node.index
+        if index not in touched or index in replaced:
+            continue
+        if node.operation == "component":
+            replaced[index] = unknowns[node.arguments[0].index][node.payload]
+            continue
+        arguments = [replaced.get(argument.index, argument) for argument in node.arguments]
+        if node.operation == "solve":
+            split = node.payload**2
+            unknowns[index] = algebra.solve(arguments[:split], arguments[split:])
+            replaced[index] = node
+        else:
+            replaced[index] = algebra.build(graph, node.operation, arguments, node.payload)
+    converted = [graph.convert(output) for output in outputs]
+    return [replaced.get(output.index, output) for output in converted]
+
+
+def _graph_of(outputs: Sequence[Expression | float], mapping: Mapping[Expression, Expression | float]) -> Graph:
+    for value in (*outputs, *mapping):
+        if isinstance(value, Expression):
+            return value.graph
+    raise AtwoodError("there is no expression among the outputs")
+
+
+def evaluate(
+    outputs: Sequence[Expression | float],
+    values: Mapping[Expression, float] | Mapping[str, float] | Mapping[Expression | str, float],
+) -> list[float]:
+    """Return the values of expressions, one node at a time: the reference for compiled programs.
+
+    Parameters
+    ----------
+    outputs
+        The expressions to evaluate.
+    values
+        The value of every symbol that they need, by symbol or by name.
+
+    Returns
+    -------
+    list of float
+        The values, with ``nan`` and infinities as in IEEE arithmetic.
+    """
+    by_name = {key: float(value) for key, value in values.items() if isinstance(key, str)}
+    known = {key.index: float(value) for key, value in values.items() if isinstance(key, Expression)}
+    unknowns: dict[int, list[float]] = {}
+    for node in live(outputs):
+        if node.index in known:
+            continue
+        if node.operation == "symbol":
+            if node.name not in by_name:
+                raise AtwoodError(f"no value was given for the symbol {node.name}")
+            known[node.index] = by_name[node.name]
+        elif node.operation == "solve":
+            data = [known[argument.index] for argument in node.arguments]
+            split = node.payload**2
+            unknowns[node.index] = solve_or_nan(node.payload, data[:split], data[split:])
+            known[node.index] = 0.0
+        elif node.operation == "component":
+            known[node.index] = unknowns[node.arguments[0].index][node.payload]
+        else:
+            known[node.index] = _value_of(node, known)
+    return [known[output.index] if isinstance(output, Expression) else float(output) for output in outputs]
+
+
+def _value_of(node: Expression, known: Mapping[int, float]) -> float:
+    """Return the value of one node from those of its arguments."""
+    operation = node.operation
+    if operation in LEAVES:
+        return node.value
+    data = [known[argument.index] for argument in node.arguments]
+    if operation in UNARY:
+        return UNARY[operation](data[0])
+    if operation in BINARY:
+        return BINARY[operation](data[0], data[1])
+    if operation == "select":
+        return data[1] if data[0] != 0.0 else data[2]
+    return float(node.payload.function(*data))

@@ -1,0 +1,399 @@
+"""Derivatives of expressions, as expressions: forward, reverse, and sparse Jacobians.
+
+Every operation of one or two arguments is described once, by the product of a number ``t`` with each of its
+partial derivatives.  The forward sweep adds these products up over the arguments; the reverse sweep hands them
+back to the arguments.  Where a sum can share a division, or a selection, the forward sweep has a rule of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from atwood.errors import AtwoodError
+from atwood.expr.core import algebra
+from atwood.expr.core.algebra import add, component, divide, multiply, negate, select, subtract, unary
+from atwood.expr.core.analysis import dependents, live
+from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.operations import LEAVES, PIECEWISE_CONSTANT
+
+_Rule = Callable[[Expression, Expression], Expression]
+
+
+class SparseMatrix(NamedTuple):
+    """The entries of a matrix that are not structurally zero, column after column, rows ascending in each.
+
+    Attributes
+    ----------
+    rows, columns
+        The position of each entry.
+    entries
+        The entries.
+    """
+
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    entries: tuple[Expression, ...]
+
+
+def _square(a: Expression) -> Expression:
+    return multiply(a, a)
+
+
+def _one_minus_square(a: Expression) -> Expression:
+    return subtract(a.graph.one, _square(a))
+
+
+def _half(t: Expression) -> Expression:
+    return multiply(t.graph.constant(0.5), t)
+
+
+_UNARY_RULES: dict[str, _Rule] = {
+    "neg": lambda n, t: negate(t),
+    "sqrt": lambda n, t: divide(_half(t), n),
+    "sin": lambda n, t: multiply(unary("cos", n.arguments[0]), t),
+    "cos": lambda n, t: negate(multiply(unary("sin", n.arguments[0]), t)),
+    "tan": lambda n, t: multiply(add(n.graph.one, _square(n)), t),
+    "asin": lambda n, t: divide(t, unary("sqrt", _one_minus_square(n.arguments[0]))),
+    "acos": lambda n, t: negate(divide(t, unary("sqrt", _one_minus_square(n.arguments[0])))),
+    "atan": lambda n, t: divide(t, add(n.graph.one, _square(n.arguments[0]))),
+    "exp": lambda n, t: multiply(n, t),
+    "log": lambda n, t: divide(t, n.arguments[0]),
+    "sinh": lambda n, t: multiply(unary("cosh", n.arguments[0]), t),
+    "cosh": lambda n, t: multiply(unary("sinh", n.arguments[0]), t),
+    "tanh": lambda n, t: multiply(_one_minus_square(n), t),
+    "absolute": lambda n, t: multiply(unary("sign", n.arguments[0]), t),
+}
+
+
+def _base_rule(n: Expression, t: Expression) -> Expression:
+    """Return t times the derivative of ``a ** b`` by a."""
+    a, b = n.arguments
+    lowered = algebra.power(a, subtract(b, n.graph.one))
+    return multiply(multiply(b, lowered), t)
+
+
+def _radius_square(n: Expression) -> Expression:
+    y, x = n.arguments
+    return add(_square(y), _square(x))
+
+
+def _first_if(operation: str) -> _Rule:
+    """Return the rule for the first argument of a minimum or maximum."""
+    return lambda n, t: select(_chooses_first(n, operation), t, n.graph.zero)
+
+
+def _second_if(operation: str) -> _Rule:
+    """Return the rule for the second argument of a minimum or maximum."""
+    return lambda n, t: select(_chooses_first(n, operation), n.graph.zero, t)
+
+
+def _chooses_first(n: Expression, operation: str) -> Expression:
+    a, b = n.arguments
+    return algebra.less_equal(a, b) if operation == "minimum" else algebra.less_equal(b, a)
+
+
+_BINARY_RULES: dict[str, tuple[_Rule, _Rule]] = {
+    "add": (lambda n, t: t, lambda n, t: t),
+    "sub": (lambda n, t: t, lambda n, t: negate(t)),
+    "mul": (lambda n, t: multiply(n.arguments[1], t), lambda n, t: multiply(n.arguments[0], t)),
+    "div": (lambda n, t: divide(t, n.arguments[1]), lambda n, t: negate(multiply(divide(t, n.arguments[1]), n))),
+    "pow": (_base_rule, lambda n, t: multiply(multiply(n, unary("log", n.arguments[0])), t)),
+    "atan2": (
+        lambda n, t: divide(multiply(n.arguments[1], t), _radius_square(n)),
+        lambda n, t: negate(divide(multiply(n.arguments[0], t), _radius_square(n))),
+    ),
+    "minimum": (_first_if("minimum"), _second_if("minimum")),
+    "maximum": (_first_if("maximum"), _second_if("maximum")),
+}
+
+
+def _partial(n: Expression, position: int, t: Expression) -> Expression:
+    """Return t times the partial derivative of a node by one of its arguments."""
+    operation = n.operation
+    if operation in _UNARY_RULES:
+        return _UNARY_RULES[operation](n, t)
+    if operation in _BINARY_RULES:
+        return _BINARY_RULES[operation][position](n, t)
+    if operation in PIECEWISE_CONSTANT:
+        return n.graph.zero
+    if operation == "select":
+        if position == 0:
+            return n.graph.zero
+        zero = n.graph.zero
+        return select(n.arguments[0], t, zero) if position == 1 else select(n.arguments[0], zero, t)
+    if operation == "external":
+        known = n.payload.derivatives
+        derivative = None if known is None else known[position]
+        if derivative is None:
+            raise AtwoodError(
+                f"the derivative of the external function by argument {position + 1} is needed but not known",
+                where=n.payload.name,
+                advice="Give the ExternalFunction its derivatives.",
+            )
+        return multiply(algebra.external(derivative, n.arguments), t)
+    raise AtwoodError(f"the operation {operation} has no derivative rule")
+
+
+def _tangent(n: Expression, tangents: Mapping[int, Expression]) -> Expression | None:
+    """Return the derivative of a node from those of its arguments; None for a structural zero."""
+    operation = n.operation
+    arguments = n.arguments
+    moving = [(k, tangents[a.index]) for k, a in enumerate(arguments) if a.index in tangents]
+    if not moving or operation in PIECEWISE_CONSTANT:
+        return None
+    zero = n.graph.zero
+    if operation == "select":
+        a, b = (tangents.get(argument.index, zero) for argument in arguments[1:])
+        return select(arguments[0], a, b)
+    if len(moving) == 2 and operation == "mul" and arguments[0] is arguments[1]:
+        return multiply(n.graph.constant(2.0), multiply(arguments[0], moving[0][1]))
+    if len(moving) == 2 and operation == "div":
+        return divide(subtract(moving[0][1], multiply(n, moving[1][1])), arguments[1])
+    if len(moving) == 2 and operation == "atan2":
+        turn = subtract(multiply(arguments[1], moving[0][1]), multiply(arguments[0], moving[1][1]))
+        return divide(turn, _radius_square(n))
+    if len(moving) == 2 and operation in ("minimum", "maximum"):
+        return select(_chooses_first(n, operation), moving[0][1], moving[1][1])
+    total = zero
+    for position, t in moving:
+        total = add(total, _partial(n, position, t))
+    return total
+
+
+def _solve_tangent(n: Expression, tangents: Mapping[int, Expression]) -> list[Expression]:
+    """Return the derivatives of the unknowns of ``A x = b``, from ``A dx = db - dA x``."""
+    size = n.payload
+    zero = n.graph.zero
+    right = []
+    for i in range(size):
+        total = tangents.get(n.arguments[size * size + i].index, zero)
+        for j in range(size):
+            moved = tangents.get(n.arguments[size * i + j].index)
+            if moved is not None:
+                total = subtract(total, multiply(moved, component(n, j)))
+        right.append(total)
+    return algebra.solve(n.arguments[: size * size], right)
+
+
+def _sweep(nodes: Sequence[Expression], seeds: Mapping[int, Expression]) -> dict[int, Expression]:
+    """Return the derivatives of nodes in topological order, by index, without structural zeros."""
+    tangents = {index: seed for index, seed in seeds.items() if not seed.is_zero}
+    unknowns: dict[int, list[Expression]] = {}
+    for node in nodes:
+        index = node.index
+        operation = node.operation
+        if operation in LEAVES or index in seeds:
+            continue
+        if operation == "component":
+            parts = unknowns.get(node.arguments[0].index)
+            derivative = None if parts is None else parts[node.payload]
+        elif operation == "solve":
+            if any(argument.index in tangents for argument in node.arguments):
+                unknowns[index] = _solve_tangent(node, tangents)
+            continue
+        else:
+            derivative = _tangent(node, tangents)
+        if derivative is not None and not derivative.is_zero:
+            tangents[index] = derivative
+    return tangents
+
+
+def jvp(outputs: Sequence[Expression | float], tangents: Mapping[Expression, Expression | float]) -> list[Expression]:
+    """Return the derivatives of expressions along a direction, by one forward sweep.
+
+    Parameters
+    ----------
+    outputs
+        What to differentiate.
+    tangents
+        The rate of each independent expression, usually a symbol; what is not named stays fixed.  An expression
+        that is named is taken as independent, whatever it is made of.
+
+    Returns
+    -------
+    list of Expression
+        One derivative for each output; the constant 0 where the output does not move.
+    """
+    graph = _graph_of(outputs, tangents)
+    seeds = {key.index: graph.convert(rate) for key, rate in tangents.items()}
+    moved = _sweep(live(outputs), seeds)
+    return [moved.get(output.index, graph.zero) if isinstance(output, Expression) else graph.zero for output in outputs]
+
+
+def vjp(
+    outputs: Sequence[Expression | float],
+    cotangents: Sequence[Expression | float],
+    wrt: Sequence[Expression],
+) -> list[Expression]:
+    """Return the gradient of ``sum(cotangent * output)``, by one reverse sweep.
+
+    Parameters
+    ----------
+    outputs
+        What to differentiate.
+    cotangents
+        The weight of each output.
+    wrt
+        The independent expressions, usually symbols.
+
+    Returns
+    -------
+    list of Expression
+        One derivative for each entry of ``wrt``.
+    """
+    graph = _graph_of(outputs, wrt)
+    nodes = live(outputs)
+    active = dependents(nodes, wrt)
+    roots = {root.index for root in wrt}
+    weights: dict[int, Expression] = {}
+
+    def hand_back(target: Expression, amount: Expression) -> None:
+        if target.index in active and not amount.is_zero:
+            present = weights.get(target.index)
+            weights[target.index] = amount if present is None else add(present, amount)
+
+    for output, cotangent in zip(outputs, cotangents, strict=True):
+        if isinstance(output, Expression):
+            hand_back(output, graph.convert(cotangent))
+    unknowns: dict[int, dict[int, Expression]] = {}
+    for node in reversed(nodes):
+        if node.index in roots or node.operation in LEAVES:
+            continue
+        if node.operation == "solve":
+            if node.index in unknowns:
+                _solve_hand_back(node, unknowns[node.index], active, hand_back)
+            continue
+        weight = weights.get(node.index)
+        if weight is None or weight.is_zero:
+            continue
+        if node.operation == "component":
+            unknowns.setdefault(node.arguments[0].index, {})[node.payload] = weight
+            continue
+        if node.operation == "mul" and node.arguments[0] is node.arguments[1]:
+            # The factor two goes to the weight, where it may meet a constant; the sum of two halves never would.
+            hand_back(node.arguments[0], multiply(multiply(graph.constant(2.0), weight), node.arguments[0]))
+            continue
+        for position, argument in enumerate(node.arguments):
+            if argument.index in active:
+                hand_back(argument, _partial(node, position, weight))
+    return [weights.get(root.index, graph.zero) for root in wrt]
+
+
+def _solve_hand_back(
+    n: Expression,
+    weights: Mapping[int, Expression],
+    active: set[int],
+    hand_back: Callable[[Expression, Expression], None],
+) -> None:
+    """Hand the weights of the unknowns of ``A x = b`` back: ``A^T z = w``, ``z`` to b and ``-z x^T`` to A."""
+    size = n.payload
+    matrix = n.arguments[: size * size]
+    transposed = [matrix[size * j + i] for i in range(size) for j in range(size)]
+    zero = n.graph.zero
+    z = algebra.solve(transposed, [weights.get(i, zero) for i in range(size)])
+    for i in range(size):
+        hand_back(n.arguments[size * size + i], z[i])
+        for j in range(size):
+            if matrix[size * i + j].index in active:
+                hand_back(matrix[size * i + j], negate(multiply(z[i], component(n, j))))
+
+
+def jacobian(
+    outputs: Sequence[Expression | float],
+    wrt: Sequence[Expression | Mapping[Expression, Expression | float]],
+) -> SparseMatrix:
+    """Return the Jacobian without its structural zeros, by one forward sweep a column.
+
+    Each sweep visits only what depends on its column.
+
+    Parameters
+    ----------
+    outputs
+        The rows.
+    wrt
+        The columns: an expression, usually a symbol, or a direction as for :func:`jvp`, such as
+        ``{y: 1.0, y_rate: c}``.
+
+    Returns
+    -------
+    SparseMatrix
+        The entries in the order of compressed columns.
+    """
+    directions = [{column: 1.0} if isinstance(column, Expression) else column for column in wrt]
+    if not directions or not any(isinstance(output, Expression) for output in outputs):
+        return SparseMatrix((), (), ())
+    graph = _graph_of(outputs, *directions)
+    nodes = live(outputs)
+    by_index = {node.index: node for node in nodes}
+    users = _users(nodes)
+    rows_of: dict[int, list[int]] = {}
+    for row, output in enumerate(outputs):
+        if isinstance(output, Expression):
+            rows_of.setdefault(output.index, []).append(row)
+    rows: list[int] = []
+    columns: list[int] = []
+    entries: list[Expression] = []
+    for column, direction in enumerate(directions):
+        seeds = {key.index: graph.convert(rate) for key, rate in direction.items()}
+        reached = _reached(seeds, users)
+        moved = _sweep([by_index[index] for index in reached if index in by_index], seeds)
+        found = sorted((row, index) for index in reached if index in moved for row in rows_of.get(index, ()))
+        for row, index in found:
+            rows.append(row)
+            columns.append(column)
+            entries.append(moved[index])
+    return SparseMatrix(tuple(rows), tuple(columns), tuple(entries))
+
+
+def sweeps_exceed(
+    outputs: Sequence[Expression | float],
+    wrt: Sequence[Expression | Mapping[Expression, Expression | float]],
+    limit: int,
+) -> bool:
+    """Return whether the sweeps of a Jacobian visit more than a number of nodes: about as many are then made.
+
+    Parameters
+    ----------
+    outputs, wrt
+        As for `jacobian`.
+    limit
+        The number of nodes.
+    """
+    users = _users(live(outputs))
+    visited = 0
+    for column in wrt:
+        seeds = [column] if isinstance(column, Expression) else list(column)
+        visited += len(_reached({seed.index: seed for seed in seeds}, users))
+        if visited > limit:
+            return True
+    return False
+
+
+def _users(nodes: Sequence[Expression]) -> dict[int, list[int]]:
+    """Return which nodes use each node."""
+    users: dict[int, list[int]] = {}
+    for node in nodes:
+        for argument in set(node.arguments):
+            users.setdefault(argument.index, []).append(node.index)
+    return users
+
+
+def _reached(seeds: Mapping[int, Expression], users: Mapping[int, Sequence[int]]) -> list[int]:
+    """Return the sorted indices of everything that uses a seed, directly or not."""
+    found = set(seeds)
+    stack = list(seeds)
+    while stack:
+        for user in users.get(stack.pop(), ()):
+            if user not in found:
+                found.add(user)
+                stack.append(user)
+    return sorted(found)
+
+
+def _graph_of(*groups: Iterable[Expression | float]) -> Graph:
+    for group in groups:
+        for value in group:
+            if isinstance(value, Expression):
+                return value.graph
+    raise AtwoodError("there is no expression to differentiate")

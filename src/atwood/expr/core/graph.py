@@ -1,0 +1,346 @@
+"""The expression graph: nodes that are shared by construction.
+
+A :class:`Graph` owns a table of nodes.  Asking for a node that is already there returns that node, so that equal
+expressions are the same object, and common subexpressions are found when they are written down.  A node's
+``index`` counts creations; arguments exist before the nodes that use them, so sorting by index sorts
+topologically and nothing ever needs recursion.
+"""
+
+from __future__ import annotations
+
+import numbers
+from typing import TYPE_CHECKING, Any
+
+from atwood.clock import check_time
+from atwood.errors import AtwoodError
+from atwood.expr.core import algebra
+
+if TYPE_CHECKING:
+    from atwood.expr.core.relations import TimeRelations
+
+_LOOK = 256
+"""After so many new nodes the clock is looked at."""
+
+
+class Expression:
+    """One value in a graph: an operation applied to earlier values.
+
+    Made by :meth:`Graph.symbol`, :meth:`Graph.constant`, arithmetic, and the functions of
+    :mod:`atwood.expr.core.functions`; not by calling the class.  Equality and hash are those of identity: two
+    expressions of one graph that were built alike are the same object.
+
+    Attributes
+    ----------
+    graph
+        The graph that owns the node.
+    operation
+        The name of the operation, such as ``"add"``, ``"sin"`` or ``"symbol"``.
+    arguments
+        The expressions it is applied to.
+    payload
+        A constant's value, a symbol's name, the size of a linear solve, the position of a component, or the
+        :class:`~atwood.expr.core.operations.ExternalFunction`; otherwise ``None``.
+    index
+        The position in order of creation.
+    is_parametric
+        Whether it depends on constants and parameters alone, so that it is computed once a run.
+    """
+
+    __slots__ = ("arguments", "graph", "index", "is_parametric", "operation", "payload")
+
+    graph: Graph
+    operation: str
+    arguments: tuple[Expression, ...]
+    payload: Any
+    index: int
+    is_parametric: bool
+
+    def __init__(
+        self,
+        graph: Graph,
+        operation: str,
+        arguments: tuple[Expression, ...],
+        payload: Any,
+        index: int,
+        is_parametric: bool,
+    ) -> None:
+        self.graph = graph
+        self.operation = operation
+        self.arguments = arguments
+        self.payload = payload
+        self.index = index
+        self.is_parametric = is_parametric
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether this is a number."""
+        return self.operation == "constant"
+
+    @property
+    def is_symbol(self) -> bool:
+        """Whether this is a symbol."""
+        return self.operation == "symbol"
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether this is the constant 0: a structural zero."""
+        return self.operation == "constant" and self.payload == 0.0
+
+    @property
+    def value(self) -> float:
+        """The value of a constant."""
+        if self.operation != "constant":
+            raise AtwoodError(
+                f"{self!r} is not a constant and has no value yet",
+                advice="In a law, use Atwood's own functions (atwood.sqrt, atwood.select, ...) and no others.",
+            )
+        return float(self.payload)
+
+    @property
+    def name(self) -> str:
+        """The name of a symbol."""
+        if self.operation != "symbol":
+            raise AtwoodError(f"{self!r} is not a symbol and has no name")
+        return str(self.payload)
+
+    def __add__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.add(self, b)
+
+    def __radd__(self, other: object) -> Expression:
+        a = _operand(self, other)
+        return NotImplemented if a is None else algebra.add(a, self)
+
+    def __sub__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.subtract(self, b)
+
+    def __rsub__(self, other: object) -> Expression:
+        a = _operand(self, other)
+        return NotImplemented if a is None else algebra.subtract(a, self)
+
+    def __mul__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.multiply(self, b)
+
+    def __rmul__(self, other: object) -> Expression:
+        a = _operand(self, other)
+        return NotImplemented if a is None else algebra.multiply(a, self)
+
+    def __truediv__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.divide(self, b)
+
+    def __rtruediv__(self, other: object) -> Expression:
+        a = _operand(self, other)
+        return NotImplemented if a is None else algebra.divide(a, self)
+
+    def __pow__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.power(self, b)
+
+    def __rpow__(self, other: object) -> Expression:
+        a = _operand(self, other)
+        return NotImplemented if a is None else algebra.power(a, self)
+
+    def __floor__(self) -> Expression:
+        return algebra.unary("floor", self)
+
+    def __floordiv__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.unary("floor", algebra.divide(self, b))
+
+    def __mod__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        if b is None:
+            return NotImplemented
+        return algebra.subtract(self, algebra.multiply(b, algebra.unary("floor", algebra.divide(self, b))))
+
+    def __neg__(self) -> Expression:
+        return algebra.negate(self)
+
+    def __pos__(self) -> Expression:
+        return self
+
+    def __abs__(self) -> Expression:
+        return algebra.unary("absolute", self)
+
+    def __lt__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.less(self, b)
+
+    def __le__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.less_equal(self, b)
+
+    def __gt__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.less(b, self)
+
+    def __ge__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.less_equal(b, self)
+
+    def __and__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.logical("logical_and", self, b)
+
+    __rand__ = __and__
+
+    def __or__(self, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else algebra.logical("logical_or", self, b)
+
+    __ror__ = __or__
+
+    def __invert__(self) -> Expression:
+        return algebra.unary("logical_not", self)
+
+    def __bool__(self) -> bool:
+        if self.operation == "constant":
+            return bool(self.payload != 0.0)
+        raise AtwoodError(
+            f"the truth of {self!r} is not known before the program runs",
+            advice="Write select(condition, a, b) instead of if, and & | ~ instead of and, or, not.",
+        )
+
+    def __float__(self) -> float:
+        return self.value
+
+    def __copy__(self) -> Expression:
+        return self
+
+    def __deepcopy__(self, memory: object) -> Expression:
+        return self
+
+    def __repr__(self) -> str:
+        return _describe(self, 3)
+
+
+class Graph:
+    """The table of nodes that expressions live in.
+
+    Graphs do not mix: an expression of one graph cannot be combined with one of another.
+
+    Examples
+    --------
+    >>> graph = Graph()
+    >>> x = graph.symbol("x")
+    >>> 2 * x + 0 is x * 2
+    True
+
+    Attributes
+    ----------
+    relations
+        Takes up relations of functions of time alone while laws are read; None where there is no time.
+    """
+
+    __slots__ = ("_table", "nodes", "one", "relations", "zero")
+
+    def __init__(self) -> None:
+        self.relations: TimeRelations | None = None
+        self.nodes: list[Expression] = []
+        self._table: dict[tuple[Any, ...], Expression] = {}
+        self.zero = self.constant(0.0)
+        self.one = self.constant(1.0)
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    def __repr__(self) -> str:
+        return f"<Graph of {len(self.nodes)} nodes>"
+
+    def __deepcopy__(self, memory: object) -> Graph:
+        return self
+
+    def constant(self, value: float) -> Expression:
+        """Return the node of a number; there is one zero, without sign."""
+        number = float(value)
+        if number == 0.0:
+            number = 0.0
+        key = ("constant", number if number == number else "nan")
+        found = self._table.get(key)
+        return self._insert(key, "constant", (), number) if found is None else found
+
+    def symbol(self, name: str) -> Expression:
+        """Return the symbol of that name; the same name gives the same symbol."""
+        return self.node("symbol", (), name)
+
+    def parameter(self, name: str) -> Expression:
+        """Return the symbol of that name, marked as one that keeps its value for a run.
+
+        Products and sums are arranged so that what depends on parameters alone stays together.
+        """
+        key = ("symbol", (), name)
+        found = self._table.get(key)
+        return self._insert(key, "symbol", (), name, is_parameter=True) if found is None else found
+
+    def node(self, operation: str, arguments: tuple[Expression, ...], payload: Any = None) -> Expression:
+        """Return the node of an operation as it stands, without any folding."""
+        key = (operation, arguments, payload)
+        found = self._table.get(key)
+        return self._insert(key, operation, arguments, payload) if found is None else found
+
+    def find(self, operation: str, arguments: tuple[Expression, ...], payload: Any = None) -> Expression | None:
+        """Return the node of an operation if it is there already."""
+        return self._table.get((operation, arguments, payload))
+
+    def convert(self, value: Expression | float) -> Expression:
+        """Return a number as a constant of this graph, and an expression of this graph as it is."""
+        if isinstance(value, Expression):
+            if value.graph is not self:
+                raise _mixed(value)
+            return value
+        return self.constant(value)
+
+    def _insert(
+        self,
+        key: tuple[Any, ...],
+        operation: str,
+        arguments: tuple[Expression, ...],
+        payload: Any,
+        is_parameter: bool = False,
+    ) -> Expression:
+        if not len(self.nodes) % _LOOK:
+            check_time()
+        known = is_parameter or operation == "constant" or (bool(arguments) and all(a.is_parametric for a in arguments))
+        created = Expression(self, operation, arguments, payload, len(self.nodes), known)
+        self._table[key] = created
+        self.nodes.append(created)
+        return created
+
+
+def _operand(own: Expression, other: object) -> Expression | None:
+    """Return the other operand as an expression of the same graph, or None for foreign types."""
+    if isinstance(other, Expression):
+        if other.graph is not own.graph:
+            raise _mixed(other)
+        return other
+    if isinstance(other, (float, int, numbers.Real)):
+        return own.graph.constant(float(other))
+    return None
+
+
+def _mixed(stray: Expression) -> AtwoodError:
+    return AtwoodError(
+        f"{stray!r} belongs to another graph",
+        advice="Build all expressions of one program from the symbols of one Graph.",
+    )
+
+
+def _describe(expression: Expression, depth: int) -> str:
+    """Return a short text of an expression, cut off at a depth."""
+    if expression.operation == "constant":
+        return f"{expression.payload:g}"
+    if expression.operation == "symbol":
+        return str(expression.payload)
+    if depth == 0:
+        return "..."
+    inner = ", ".join(_describe(argument, depth - 1) for argument in expression.arguments[:6])
+    more = ", ..." if len(expression.arguments) > 6 else ""
+    name = expression.operation
+    if name == "external":
+        name = expression.payload.name
+    elif expression.payload is not None:
+        name = f"{name}[{expression.payload}]"
+    return f"{name}({inner}{more})"

@@ -1,0 +1,162 @@
+"""A program: outputs to be computed again and again from inputs, with parameters fixed for a run."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+from atwood.errors import AtwoodError
+from atwood.expr.core.analysis import count_operations, live, varying
+from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.operations import COMMUTATIVE
+
+
+class InputGroup(NamedTuple):
+    """Symbols that are handed over together, as one array.
+
+    Attributes
+    ----------
+    name
+        What the group is called.
+    symbols
+        The symbols, in the order of the array.
+    """
+
+    name: str
+    symbols: tuple[Expression, ...]
+
+
+class OutputGroup(NamedTuple):
+    """Expressions that are returned together, as one array.
+
+    Attributes
+    ----------
+    name
+        What the group is called.
+    expressions
+        The expressions, in the order of the array.
+    """
+
+    name: str
+    expressions: tuple[Expression, ...]
+
+
+@dataclass(frozen=True)
+class Program:
+    """Outputs as expressions of inputs and parameters; what kernels are made from.
+
+    Attributes
+    ----------
+    name
+        Named in messages about the program.
+    inputs
+        The groups of symbols that change from call to call.
+    parameters
+        The symbols that keep their value for a run.
+    outputs
+        The groups of expressions to compute.
+
+    Raises
+    ------
+    AtwoodError
+        If an output needs a symbol that is neither input nor parameter, or a symbol is listed twice.
+    """
+
+    name: str
+    inputs: tuple[InputGroup, ...]
+    parameters: tuple[Expression, ...]
+    outputs: tuple[OutputGroup, ...]
+
+    def __post_init__(self) -> None:
+        listed: set[Expression] = set()
+        for symbol in (*(symbol for group in self.inputs for symbol in group[1]), *self.parameters):
+            if not symbol.is_symbol:
+                raise AtwoodError(f"{symbol!r} is an input or parameter but not a symbol", where=self.name)
+            if symbol in listed:
+                raise AtwoodError(f"the symbol {symbol.name} is listed twice", where=self.name)
+            listed.add(symbol)
+        for group in self.outputs:
+            _check_symbols(self.name, group, listed)
+        live([*listed, *self.results])
+
+    @property
+    def results(self) -> tuple[Expression, ...]:
+        """All outputs, group after group."""
+        return tuple(expression for group in self.outputs for expression in group[1])
+
+    @cached_property
+    def graph(self) -> Graph:
+        """The graph that the program lives in."""
+        for expression in (*self.results, *self.parameters, *(s for group in self.inputs for s in group[1])):
+            return expression.graph
+        return Graph()
+
+    @cached_property
+    def nodes(self) -> tuple[Expression, ...]:
+        """Every node that the outputs need, arguments before users."""
+        return tuple(live(self.results))
+
+    @cached_property
+    def prologue(self) -> tuple[Expression, ...]:
+        """What is computed once a run: the last values that depend on parameters alone, bare parameters included.
+
+        These are the values that the rest of the program, or an output, uses directly.
+        """
+        needed = varying(self.nodes, self.parameters)
+        used = {output.index for output in self.results}
+        for node in self.nodes:
+            if node.index in needed:
+                used.update(argument.index for argument in node.arguments)
+        return tuple(
+            node for node in self.nodes if node.index in used and node.index not in needed and not node.is_constant
+        )
+
+    @cached_property
+    def operations(self) -> dict[str, int]:
+        """The operations of one evaluation, by kind; see :func:`~atwood.expr.core.analysis.count_operations`."""
+        return count_operations(self.results, self.parameters)
+
+    @property
+    def size(self) -> int:
+        """The number of nodes that the outputs need, leaves included."""
+        return len(self.nodes)
+
+    @cached_property
+    def digest(self) -> str:
+        """A hash of what the program computes, independent of the order in which it was written down."""
+        return _digest(self)
+
+
+def _check_symbols(program: str, group: OutputGroup, listed: Iterable[Expression]) -> None:
+    known = set(listed)
+    for node in live(group[1]):
+        if node.operation == "symbol" and node not in known:
+            raise AtwoodError(
+                f"the output group {group[0]} depends on the symbol {node.name}, which is no input or parameter",
+                where=program,
+                advice="Add the symbol to the inputs or parameters, or substitute it.",
+            )
+
+
+def _hash(*parts: object) -> str:
+    return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+def _digest(program: Program) -> str:
+    """Return the hash of a program from those of its nodes, each made from its arguments' hashes."""
+    known: dict[int, str] = {}
+    for node in (*live([*program.parameters, *(s for group in program.inputs for s in group[1])]), *program.nodes):
+        arguments = [known[argument.index] for argument in node.arguments]
+        if node.operation in COMMUTATIVE:
+            arguments.sort()
+        payload = node.payload.name if node.operation == "external" else node.payload
+        known[node.index] = _hash(node.operation, payload, arguments)
+    return _hash(
+        program.name,
+        [(group[0], [known[symbol.index] for symbol in group[1]]) for group in program.inputs],
+        [known[parameter.index] for parameter in program.parameters],
+        [(group[0], [known[output.index] for output in group[1]]) for group in program.outputs],
+    )

@@ -1,0 +1,1 @@
+"""Formulas for people: to and from sympy."""

@@ -1,0 +1,305 @@
+"""To sympy, for people to read, and from sympy, for laws that people write there.
+
+sympy is imported when one of these functions is called, not before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from functools import reduce
+from typing import Any, TypeAlias
+
+from atwood.errors import AtwoodError
+from atwood.expr.core import algebra
+from atwood.expr.core.analysis import live
+from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.operations import LEAVES, ExternalFunction
+
+SympyExpression: TypeAlias = Any
+"""A ``sympy.Expr``."""
+
+_LARGEST_DENOMINATOR = 64
+_TO_SYMPY = {"absolute": "Abs", "log": "log", "minimum": "Min", "maximum": "Max"}
+_FROM_SYMPY_UNARY = {"Abs": "absolute"} | {
+    name: name
+    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "sign", "floor")
+}
+
+
+def to_sympy(
+    expressions: Sequence[Expression | float], symbols: Mapping[Expression, SympyExpression] | None = None
+) -> list[SympyExpression]:
+    """Return expressions written out in full in sympy.
+
+    Parameters
+    ----------
+    expressions
+        What to translate.
+    symbols
+        What to write for some expressions, such as ``{angle: sympy.Function("q")(t)}``.  Symbols that are not
+        named become real sympy symbols of the same name.
+    """
+    return _translate(expressions, symbols or {}, None)[1]
+
+
+def to_sympy_shared(
+    expressions: Sequence[Expression | float],
+    symbols: Mapping[Expression, SympyExpression] | None = None,
+    prefix: str = "x",
+) -> tuple[list[tuple[SympyExpression, SympyExpression]], list[SympyExpression]]:
+    """Return expressions in sympy with names for what they share.
+
+    Parameters
+    ----------
+    expressions, symbols
+        As for :func:`to_sympy`.
+    prefix
+        What the names of the intermediate values begin with.
+
+    Returns
+    -------
+    replacements
+        Pairs of a name and what it stands for, in the order of computation, as ``sympy.cse`` returns them.
+    expressions
+        The expressions in terms of the names.
+    """
+    return _translate(expressions, symbols or {}, prefix)
+
+
+def _translate(
+    expressions: Sequence[Expression | float], symbols: Mapping[Expression, SympyExpression], prefix: str | None
+) -> tuple[list[tuple[SympyExpression, SympyExpression]], list[SympyExpression]]:
+    import sympy
+
+    nodes = live(expressions)
+    uses = Counter(argument.index for node in nodes for argument in node.arguments)
+    known: dict[int, SympyExpression] = {node.index: text for node, text in symbols.items()}
+    taken = {str(text) for text in symbols.values()} | {node.name for node in nodes if node.is_symbol}
+    replacements: list[tuple[SympyExpression, SympyExpression]] = []
+    for node in nodes:
+        if node.index in known:
+            continue
+        written = _write(node, [known[argument.index] for argument in node.arguments])
+        if prefix is not None and uses[node.index] > 1 and _deserves_name(node):
+            name = sympy.Symbol(_free_name(prefix, len(replacements), taken), real=True)
+            replacements.append((name, written))
+            written = name
+        known[node.index] = written
+    return replacements, [known[e.index] if isinstance(e, Expression) else _number(e) for e in expressions]
+
+
+def _deserves_name(node: Expression) -> bool:
+    """Return whether an intermediate value is worth a name: not leaves, conditions, signs or bare solves."""
+    return node.operation not in LEAVES | {"neg", "solve"} and not node.operation.startswith(("less", "logical"))
+
+
+def _free_name(prefix: str, position: int, taken: set[str]) -> str:
+    name = f"{prefix}{position}"
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
+
+
+def _number(value: float) -> SympyExpression:
+    """Return a float as an exact small fraction or multiple of pi if it is one, else as a float."""
+    import sympy
+
+    if not math.isfinite(value):
+        return sympy.nan if value != value else sympy.oo if value > 0 else -sympy.oo
+    fraction = Fraction(value).limit_denominator(_LARGEST_DENOMINATOR)
+    if float(fraction) == value:
+        return sympy.Rational(fraction.numerator, fraction.denominator)
+    turns = Fraction(value / math.pi).limit_denominator(12)
+    if turns and turns.numerator * math.pi / turns.denominator == value:
+        return sympy.Rational(turns.numerator, turns.denominator) * sympy.pi
+    return sympy.Float(value)
+
+
+def _write(node: Expression, arguments: list[SympyExpression]) -> SympyExpression:
+    """Return one node in sympy.  Conditions become sympy booleans, solves become lists of unknowns."""
+    import sympy
+
+    operation = node.operation
+    if operation == "constant":
+        return _number(node.payload)
+    if operation == "symbol":
+        return sympy.Symbol(node.payload, real=True)
+    if operation == "component":
+        return arguments[0][node.payload]
+    if operation == "external":
+        return sympy.Function(node.payload.name)(*(_as_value(argument) for argument in arguments))
+    if operation in ("logical_and", "logical_or", "logical_not"):
+        function = {"logical_and": sympy.And, "logical_or": sympy.Or, "logical_not": sympy.Not}[operation]
+        return function(*(_as_condition(argument) for argument in arguments))
+    if operation == "select":
+        condition, a, b = arguments
+        return sympy.Piecewise((_as_value(a), _as_condition(condition)), (_as_value(b), True))
+    values = [_as_value(argument) for argument in arguments]
+    if operation == "solve":
+        split = node.payload**2
+        matrix = sympy.Matrix(node.payload, node.payload, values[:split])
+        return list(matrix.LUsolve(sympy.Matrix(values[split:])))
+    simple: dict[str, Callable[..., SympyExpression]] = {
+        "add": lambda a, b: a + b,
+        "sub": lambda a, b: a - b,
+        "mul": lambda a, b: a * b,
+        "div": lambda a, b: a / b,
+        "neg": lambda a: -a,
+        "pow": lambda a, b: a**b,
+        "less": sympy.Lt,
+        "less_equal": sympy.Le,
+    }
+    function = simple.get(operation) or getattr(sympy, _TO_SYMPY.get(operation, operation))
+    return function(*values)
+
+
+def _as_value(item: SympyExpression) -> SympyExpression:
+    """Return a condition as 1 or 0, other things as they are."""
+    import sympy
+
+    if isinstance(item, (sympy.logic.boolalg.Boolean, bool)) and not isinstance(item, sympy.Symbol):
+        return sympy.Piecewise((1, item), (0, True))
+    return item
+
+
+def _as_condition(item: SympyExpression) -> SympyExpression:
+    """Return a number as the condition that it is not zero, other things as they are."""
+    import sympy
+
+    if isinstance(item, sympy.logic.boolalg.Boolean) and not isinstance(item, sympy.Symbol):
+        return item
+    return sympy.Ne(item, 0)
+
+
+def from_sympy(
+    expression: SympyExpression,
+    graph: Graph,
+    mapping: Mapping[SympyExpression | str, Expression | float] | None = None,
+    functions: Mapping[str, ExternalFunction] | None = None,
+) -> Expression:
+    """Return a sympy expression as an expression of a graph.
+
+    Parameters
+    ----------
+    expression
+        What to translate.
+    graph
+        Where to build it.
+    mapping
+        What stands for some sympy expressions, usually symbols, or for symbols of a name.  Other symbols become
+        symbols of the graph with the same name.
+    functions
+        The external functions to call for undefined sympy functions, by name.
+    """
+    import sympy
+
+    known: dict[SympyExpression, Expression] = {}
+    names: dict[str, Expression] = {}
+    for key, value in (mapping or {}).items():
+        if isinstance(key, str):
+            names[key] = graph.convert(value)
+        else:
+            known[key] = graph.convert(value)
+    start = sympy.sympify(expression)
+    stack = [(start, False)]
+    while stack:
+        item, ready = stack.pop()
+        if item in known:
+            continue
+        if ready or not item.args:
+            known[item] = _read(item, graph, known, names, functions or {})
+        else:
+            stack.append((item, True))
+            stack.extend((child, False) for child in _children(item))
+    return known[start]
+
+
+def _read(
+    item: SympyExpression,
+    graph: Graph,
+    known: Mapping[SympyExpression, Expression],
+    names: Mapping[str, Expression],
+    functions: Mapping[str, ExternalFunction],
+) -> Expression:
+    """Return one sympy node from the expressions of its arguments."""
+    if item.is_Symbol:
+        return names[item.name] if item.name in names else graph.symbol(item.name)
+    if item in (True, False):
+        return graph.constant(1.0 if item else 0.0)
+    if getattr(item, "is_number", False) and not item.args:
+        return graph.constant(float(item))
+    name = item.func.__name__
+    if name == "Piecewise":
+        return _read_piecewise(item, graph, known)
+    arguments = [known[argument] for argument in item.args]
+    if name == "Mul":
+        return _read_product(item, graph, known)
+    if name == "Add":
+        return reduce(algebra.add, arguments)
+    if name == "Pow":
+        return algebra.power(*arguments)
+    if name in _FROM_SYMPY_UNARY and len(arguments) == 1:
+        return algebra.unary(_FROM_SYMPY_UNARY[name], arguments[0])
+    if name in ("Min", "Max"):
+        operation = "minimum" if name == "Min" else "maximum"
+        return reduce(lambda a, b: algebra.binary(operation, a, b), arguments)
+    if name in _SPECIAL:
+        return _SPECIAL[name](graph, arguments)
+    if name in functions:
+        return algebra.external(functions[name], arguments)
+    raise AtwoodError(
+        f"the sympy function {name} has no counterpart in a program",
+        where=str(item)[:80],
+        advice="Rewrite it with other functions, or give an ExternalFunction for it.",
+    )
+
+
+def _read_product(item: SympyExpression, graph: Graph, known: Mapping[SympyExpression, Expression]) -> Expression:
+    """Return a product as one numerator over one denominator."""
+    above, below = graph.one, graph.one
+    for factor in item.args:
+        if factor.is_Pow and factor.exp.is_number and factor.exp.is_negative and factor.base in known:
+            below = algebra.multiply(below, algebra.power(known[factor.base], graph.constant(-float(factor.exp))))
+        else:
+            above = algebra.multiply(above, known[factor])
+    return algebra.divide(above, below)
+
+
+def _children(item: SympyExpression) -> list[SympyExpression]:
+    """Return what must be translated first; a Piecewise is taken apart into its values and conditions."""
+    if item.func.__name__ == "Piecewise":
+        return [part for pair in item.args for part in pair.args]
+    return list(item.args)
+
+
+def _read_piecewise(item: SympyExpression, graph: Graph, known: Mapping[SympyExpression, Expression]) -> Expression:
+    result = graph.constant(math.nan)
+    for value, condition in reversed(item.args):
+        result = algebra.select(known[condition], known[value], result)
+    return result
+
+
+def _equal(a: Expression, b: Expression) -> Expression:
+    return algebra.logical("logical_and", algebra.less_equal(a, b), algebra.less_equal(b, a))
+
+
+_SPECIAL: dict[str, Callable[[Graph, list[Expression]], Expression]] = {
+    "atan2": lambda g, a: algebra.binary("atan2", a[0], a[1]),
+    "cot": lambda g, a: algebra.divide(g.one, algebra.unary("tan", a[0])),
+    "sec": lambda g, a: algebra.divide(g.one, algebra.unary("cos", a[0])),
+    "csc": lambda g, a: algebra.divide(g.one, algebra.unary("sin", a[0])),
+    "Heaviside": lambda g, a: algebra.multiply(g.constant(0.5), algebra.add(g.one, algebra.unary("sign", a[0]))),
+    "StrictLessThan": lambda g, a: algebra.less(a[0], a[1]),
+    "LessThan": lambda g, a: algebra.less_equal(a[0], a[1]),
+    "StrictGreaterThan": lambda g, a: algebra.less(a[1], a[0]),
+    "GreaterThan": lambda g, a: algebra.less_equal(a[1], a[0]),
+    "Equality": lambda g, a: _equal(a[0], a[1]),
+    "Unequality": lambda g, a: algebra.unary("logical_not", _equal(a[0], a[1])),
+    "And": lambda g, a: reduce(lambda p, q: algebra.logical("logical_and", p, q), a),
+    "Or": lambda g, a: reduce(lambda p, q: algebra.logical("logical_or", p, q), a),
+    "Not": lambda g, a: algebra.unary("logical_not", a[0]),
+}

@@ -1,0 +1,1 @@
+"""Taylor coefficients of the solution of a differential equation."""

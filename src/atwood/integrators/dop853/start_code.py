@@ -1,0 +1,105 @@
+"""The start of the explicit method of order 8(5,3) in LLVM's language: rates at the start, and a first step."""
+
+from __future__ import annotations
+
+from atwood.integrators.dop853.layout import opening
+from atwood.integrators.dop853.stepping_code import ROWS, exact
+
+__all__ = ["begin_code"]
+
+
+def begin_code() -> str:
+    """Return the function that starts anew from a state: 0, or 4 where that has no finite rates.
+
+    The first step is that of `atwood.integrators.explicit_problem.first_step`.
+    """
+    return f"""define i32 @begin(ptr %session, double %t, ptr %start) #0 {{
+entry:
+{opening()}
+  store double %t, ptr %t.at
+  store double %t, ptr %t_old.at
+  store i64 0, ptr %edgy.at
+  store i64 0, ptr %calm.at
+  %bytes = mul i64 %n, 8
+  %y.index = mul i64 %m, {ROWS["y"]}
+  %y = getelementptr double, ptr %arrays, i64 %y.index
+  %old.index = mul i64 %m, {ROWS["y_old"]}
+  %y_old = getelementptr double, ptr %arrays, i64 %old.index
+  call void @llvm.memcpy.p0.p0.i64(ptr %y, ptr %start, i64 %bytes, i1 false)
+  call void @llvm.memcpy.p0.p0.i64(ptr %y_old, ptr %start, i64 %bytes, i1 false)
+  %code = call i32 @evaluate(ptr %session, double %t, i64 {ROWS["y"]}, i64 12)
+  %has_rates = icmp eq i32 %code, 0
+  br i1 %has_rates, label %choose, label %lost
+choose:
+  %given = load double, ptr %first.at
+  %horizon = load double, ptr %horizon.at
+  %longest = load double, ptr %longest.at
+  %is_near = fcmp olt double %horizon, %longest
+  %bound = select i1 %is_near, double %horizon, double %longest
+  %is_given = fcmp ogt double %given, 0.0
+  br i1 %is_given, label %told, label %estimate
+told:
+  %is_short = fcmp olt double %given, %longest
+  %shorter = select i1 %is_short, double %given, double %longest
+  br label %ready
+{_first_step()}
+ready:
+  %next = phi double [ %shorter, %told ], [ %h0, %estimate ], [ %chosen, %second ]
+  store double %next, ptr %next.at
+  ret i32 0
+lost:
+  ret i32 4
+}}"""
+
+
+def _first_step() -> str:
+    """Return the instructions that estimate the first step from the size of the first two derivatives."""
+    return f"""estimate:
+  %relative = load double, ptr %relative.at
+  %count.n = sitofp i64 %n to double
+  %s0 = call double @size0(ptr %arrays, i64 %m, double %relative)
+  %m0 = fdiv double %s0, %count.n
+  %d0 = call double @llvm.sqrt.f64(double %m0)
+  %s1 = call double @size1(ptr %arrays, i64 %m, double %relative)
+  %m1 = fdiv double %s1, %count.n
+  %d1 = call double @llvm.sqrt.f64(double %m1)
+  %moves = fcmp oge double %d0, {exact(1e-5)}
+  %turns = fcmp oge double %d1, {exact(1e-5)}
+  %ratio = fdiv double %d0, %d1
+  %is_finite = fcmp olt double %ratio, 0x7FF0000000000000
+  %both = and i1 %moves, %turns
+  %usual = and i1 %both, %is_finite
+  %part = fmul double %d0, {exact(0.01)}
+  %share = fdiv double %part, %d1
+  %guess = select i1 %usual, double %share, double {exact(1e-6)}
+  %is_within = fcmp olt double %guess, %bound
+  %h0 = select i1 %is_within, double %guess, double %bound
+  call void @euler(ptr %arrays, i64 %m, double %h0)
+  %t1 = fadd double %t, %h0
+  %probe = call i32 @evaluate(ptr %session, double %t1, i64 {ROWS["trial"]}, i64 1)
+  %s2 = call double @size2(ptr %arrays, i64 %m, double %relative)
+  %m2 = fdiv double %s2, %count.n
+  %r2 = call double @llvm.sqrt.f64(double %m2)
+  %d2 = fdiv double %r2, %h0
+  %went = icmp eq i32 %probe, 0
+  %curved = fcmp olt double %d2, 0x7FF0000000000000
+  %known = and i1 %went, %curved
+  br i1 %known, label %second, label %ready
+second:
+  %is_steeper = fcmp ogt double %d2, %d1
+  %steepest = select i1 %is_steeper, double %d2, double %d1
+  %inverse = fdiv double {exact(0.01)}, %steepest
+  %root1 = call double @llvm.sqrt.f64(double %inverse)
+  %root2 = call double @llvm.sqrt.f64(double %root1)
+  %root3 = call double @llvm.sqrt.f64(double %root2)
+  %little = fmul double %h0, {exact(1e-3)}
+  %is_tiny = fcmp ogt double %little, {exact(1e-6)}
+  %at_least = select i1 %is_tiny, double %little, double {exact(1e-6)}
+  %is_flat = fcmp ole double %steepest, {exact(1e-15)}
+  %h1 = select i1 %is_flat, double %at_least, double %root3
+  %most = fmul double %h0, {exact(100.0)}
+  %is_less = fcmp olt double %most, %h1
+  %lesser = select i1 %is_less, double %most, double %h1
+  %is_inside = fcmp olt double %lesser, %bound
+  %chosen = select i1 %is_inside, double %lesser, double %bound
+  br label %ready"""

@@ -1,0 +1,1 @@
+"""Many runs of one smooth problem in one compiled call."""

@@ -1,0 +1,212 @@
+"""Many runs of one smooth scene, one after the other in machine code; several batches can run in threads at once."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from ctypes import c_int, c_void_p
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.codegen.llvm.build import Built, build_code
+from atwood.codegen.llvm.module import CodeOptions
+from atwood.codegen.once import once
+from atwood.integrators.ensemble.code import FIELDS, batch_code
+from atwood.integrators.protocol import FloatArray
+
+__all__ = ["ENDS", "Batch", "BatchParameters", "BatchPlaces"]
+
+ENDS = {0: "reached", 1: "step limit", 2: "too small", 3: "no value between", 4: "no rates"}
+"""How a run can end."""
+
+_FIRST_BUDGET, _MOMENT = 2_000, 0.03
+"""Steps of the first call, and for about how long a call should last, in seconds, so that Ctrl-C is heard."""
+
+_NO_LIMIT = 2**62
+
+
+@dataclass(frozen=True)
+class BatchPlaces:
+    """The addresses that a batch needs of a method's session; see `atwood.integrators.ensemble.code.FIELDS`.
+
+    Attributes
+    ----------
+    begin, sample
+        Functions.
+    session
+        Their first argument.
+    limit, steps, filled, tolerance
+        Where the session keeps these.
+    counts
+        How many counts follow each other from `steps` on.
+    keep
+        Whatever must live as long as the addresses are used.
+    """
+
+    begin: int
+    sample: int
+    session: int
+    limit: int
+    steps: int
+    filled: int
+    tolerance: int
+    counts: int
+    keep: object = None
+
+
+@dataclass(frozen=True, eq=False)
+class BatchParameters:
+    """Parameters that change from run to run.
+
+    Attributes
+    ----------
+    values
+        Shape (runs, parameters).
+    prologue, derived, scratch
+        Addresses of the function that computes what depends on parameters alone, and of its arrays.
+    keep
+        Whatever must live as long as the addresses are used.
+    """
+
+    values: FloatArray
+    prologue: int
+    derived: int
+    scratch: int
+    keep: object = None
+
+
+class Batch:
+    """Runs that differ in their start, and maybe in their parameters.
+
+    Parameters
+    ----------
+    places
+        The session that takes the steps.
+    t
+        Time of the start, s.
+    times
+        Output times, rising, none before the start.
+    starts
+        Start values, shape (runs, size).
+    tolerances
+        Absolute tolerances, shape (runs, size).
+    max_steps
+        The steps that each run may take; None for no limit.
+    parameters
+        Where they change from run to run.
+
+    Attributes
+    ----------
+    values
+        Shape (runs, times, size); nan where a run did not come.
+    codes
+        How each run ended, a key of `ENDS`; -1 for what has not been run.
+    counts
+        What each run has counted, shape (runs, counts).
+    seconds
+        Time spent in the method.
+    """
+
+    def __init__(
+        self,
+        places: BatchPlaces,
+        t: float,
+        times: FloatArray,
+        starts: FloatArray,
+        tolerances: FloatArray,
+        max_steps: int | None = None,
+        parameters: BatchParameters | None = None,
+    ) -> None:
+        runs, size = starts.shape
+        self._starts, self._times = np.ascontiguousarray(starts), np.ascontiguousarray(times)
+        self._tolerances = np.ascontiguousarray(np.maximum(tolerances, np.finfo(float).tiny))
+        self.values = np.full((runs, len(times), size), np.nan)
+        self.codes = np.full(runs, -1, dtype=np.int64)
+        self._counted = np.zeros((runs, places.counts), dtype=np.int64)
+        self._first_counts = np.ctypeslib.as_array(
+            ctypes.cast(places.steps, ctypes.POINTER(ctypes.c_int64)), (places.counts,)
+        ).copy()
+        self._rates = np.empty((len(times), size))
+        self.seconds = 0.0
+        self._budget = _FIRST_BUDGET
+        given: dict[str, Any] = {
+            **{name: getattr(places, name) for name in ("begin", "sample", "session", "limit", "steps", "filled")},
+            "tolerance": places.tolerance,
+            "counts": places.counts,
+            "t": int(np.array(t, dtype=np.float64).view(np.int64)),
+            "times": self._times.ctypes.data,
+            "wanted": len(times),
+            "size": size,
+            "runs": runs,
+            "done": -1,
+            "most": _NO_LIMIT if max_steps is None else max_steps,
+            "starts": self._starts.ctypes.data,
+            "values": self.values.ctypes.data,
+            "rates": self._rates.ctypes.data,
+            "codes": self.codes.ctypes.data,
+            "counted": self._counted.ctypes.data,
+            "tolerances": self._tolerances.ctypes.data,
+        }
+        if parameters is not None:
+            rows = np.ascontiguousarray(parameters.values)
+            given |= {
+                "prologue": parameters.prologue,
+                "parameters": rows.ctypes.data,
+                "width": rows.shape[1],
+                "derived": parameters.derived,
+                "scratch": parameters.scratch,
+            }
+            self._kept: object = (places, parameters, rows)
+        else:
+            self._kept = places
+        self._job = np.array([given.get(name, 0) for name in FIELDS], dtype=np.int64)
+        self._call = _function()
+
+    @property
+    def done(self) -> int:
+        """How many runs are done."""
+        return int(self._job[_RUN])
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """What each run has counted, shape (runs, counts)."""
+        counted = self._counted[: self.done]
+        found = np.zeros_like(self._counted)
+        found[: self.done] = np.diff(counted, axis=0, prepend=self._first_counts[None, :])
+        return found
+
+    def advance(self) -> bool:
+        """Go on for a moment; return whether all runs are done."""
+        began = time.perf_counter()
+        self._job[_BUDGET] = self._budget
+        is_done: bool = self._call(self._job.ctypes.data) == 0
+        taken = time.perf_counter() - began
+        self.seconds += taken
+        if taken > 2.0 * _MOMENT:
+            self._budget = max(1, int(self._budget * _MOMENT / taken))
+        elif not is_done and taken < 0.5 * _MOMENT:
+            self._budget *= 2
+        if is_done:
+            self._clear()
+        return is_done
+
+    def _clear(self) -> None:
+        """Make nan what a run that ended early did not reach; it may have been half written."""
+        self.values[self.codes != 0] = np.nan
+
+
+_RUN, _BUDGET = FIELDS.index("run"), FIELDS.index("budget")
+
+
+@once
+def _code() -> Built:
+    return build_code([], CodeOptions(), more=batch_code(), exports=["batch"])
+
+
+@once
+def _function() -> Any:
+    """Return the function; a call lets other threads run."""
+    return ctypes.CFUNCTYPE(c_int, c_void_p)(_code().code.addresses["batch"])

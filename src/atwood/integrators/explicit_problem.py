@@ -1,0 +1,290 @@
+"""What an explicit method is given, and what takes its steps.
+
+An explicit method integrates ``y' = f(t, y)``.  A *stepper* holds the state and takes steps; everything else, such as
+output times, events and limits, is the session's, which is the same for all steppers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from math import sqrt
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from atwood.errors import UsageError
+from atwood.integrators.event_location import State
+from atwood.integrators.protocol import FloatArray, SolverOptions, Values
+
+__all__ = [
+    "CALM",
+    "EDGE",
+    "LOOSEST",
+    "STIFF",
+    "CompiledEvents",
+    "CompiledRates",
+    "Counts",
+    "ExplicitProblem",
+    "HeedingStepper",
+    "Outcome",
+    "Stepper",
+    "WatchingStepper",
+    "absolute_tolerances",
+    "first_step",
+]
+
+EDGE = 6.1
+"""Where the method stops being stable: the largest product of a step and a rate of decay."""
+
+STIFF, CALM = 15, 6
+"""So many steps at the edge of stability, with fewer than so many others in a row between, are a stiff problem."""
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledRates:
+    """The address of a compiled right-hand side, for one session.
+
+    Parameters
+    ----------
+    function
+        ``int (double t, const double *y, double *yp, void *data)``, which returns 0, or another number where a value is
+        not finite.
+    data
+        Its last argument.
+    keep
+        Whatever must live as long as the addresses are used.
+    """
+
+    function: int
+    data: int = 0
+    keep: object = None
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledEvents:
+    """The address of compiled event functions, for one session.
+
+    Parameters
+    ----------
+    function
+        ``int (double t, const double *y, const double *yp, double *values, void *data)``, called after every step. It
+        returns 0, or another number where a value is not finite or may have passed zero and come back.
+    data
+        Its last argument.
+    count
+        The number of events.
+    restart
+        ``restart(t)``: called before the first step after a start at a time.
+    keep
+        Whatever must live as long as the addresses are used.
+    """
+
+    function: int
+    data: int
+    count: int
+    restart: Callable[[float], None]
+    keep: object = None
+
+
+@dataclass(frozen=True, eq=False)
+class ExplicitProblem:
+    """The equations ``y' = f(t, y)`` of one mode.
+
+    The functions get arrays that are only valid during the call and must not be written to.  A function that has no
+    value at a state raises `~atwood.errors.KernelEvaluationError` (or an arithmetic error), or returns values that
+    are not finite: a smaller step is then tried.
+
+    Parameters
+    ----------
+    size
+        The number of unknowns.
+    rates
+        ``rates(t, y)``: the derivatives.
+    events
+        ``events(t, y, yp)``: one value per event, which happens where its value passes through zero.
+    event_count
+        The number of events.
+    event_directions
+        For each event +1 (rising values only), -1 (falling values only) or 0 (both).  Empty: all 0.
+    event_rough
+        Numbers of the events whose exact time does not matter: they happen at the end of a step.
+    compiled
+        ``compiled()``: a compiled form of `rates`.  Each session asks once, and must not share it with another one.
+    compiled_events
+        ``compiled_events()``: the same for `events`, if there is one.
+    """
+
+    size: int
+    rates: Callable[[float, FloatArray], Values]
+    events: Callable[[float, FloatArray, FloatArray], Values] | None = None
+    event_count: int = 0
+    event_directions: tuple[int, ...] = ()
+    event_rough: tuple[int, ...] = ()
+    compiled: Callable[[], CompiledRates] | None = None
+    compiled_events: Callable[[], CompiledEvents | None] | None = None
+
+    def __post_init__(self) -> None:
+        if self.size < 1:
+            raise UsageError("a problem needs at least one unknown")
+        if (self.events is None) != (self.event_count == 0):
+            raise UsageError("give both the event function and the number of events, or neither")
+        if self.event_directions and len(self.event_directions) != self.event_count:
+            raise UsageError(f"{self.event_count} events need as many directions")
+        if not set(self.event_directions) <= {-1, 0, 1}:
+            raise UsageError("an event direction is -1, 0 or +1")
+
+
+class Outcome(IntEnum):
+    """Why a stepper came back; `NOTICED` where it was asked to watch something."""
+
+    REACHED = 0
+    USED_UP = 1
+    TOO_SMALL = 2
+    NOTICED = 5
+
+
+@dataclass
+class Counts:
+    """What a stepper has done.
+
+    Attributes
+    ----------
+    steps, failures
+        Steps that were kept, and steps whose error was too large or that had no value.
+    evaluations, missing
+        Calls of the right-hand side, and those of them that gave no finite value.
+    stiff
+        How often stability, not accuracy, seemed to keep steps short: `STIFF` steps with few others between.
+    """
+
+    steps: int = 0
+    failures: int = 0
+    evaluations: int = 0
+    missing: int = 0
+    stiff: int = 0
+
+
+@runtime_checkable
+class WatchingStepper(Protocol):
+    """What a stepper has in addition if it looks for events by itself."""
+
+    def watch(self, events: CompiledEvents) -> None:
+        """Let `run` and `sample` come back with `Outcome.NOTICED` after a step in which an event may have happened."""
+        ...
+
+    def expect(self, signs: FloatArray) -> None:
+        """Say which sign each event has; where it is zero, every step is noticed."""
+        ...
+
+    def begin_of_step(self) -> float:
+        """Return the time at the begin of the last step."""
+        ...
+
+
+@runtime_checkable
+class HeedingStepper(Protocol):
+    """What a stepper has in addition if it can come back as soon as the problem seems stiff."""
+
+    def heed_stiffness(self) -> None:
+        """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
+        ...
+
+
+@runtime_checkable
+class LimitedStepper(Protocol):
+    """What a stepper has in addition if the length of its steps can be limited on the way."""
+
+    def limit_steps(self, longest: float) -> None:
+        """Take no longer steps from now on than this, nor than the options allow."""
+        ...
+
+
+class Stepper(Protocol):
+    """Takes the steps of an explicit method."""
+
+    def start(self, t: float, y: FloatArray) -> bool:
+        """Start anew from a state; return whether it has finite rates."""
+        ...
+
+    def run(self, t_stop: float, steps: int) -> Outcome:
+        """Take steps until one ends at or after a time, but no more than so many."""
+        ...
+
+    def state(self) -> State:
+        """Return time, values and rates at the end of the last step, which the caller may keep."""
+        ...
+
+    def interpolate(self, t: float) -> State:
+        """Return the state at a time within the last step."""
+        ...
+
+    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
+        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
+        ...
+
+    @property
+    def counts(self) -> Counts:
+        """What it has done so far, over all starts."""
+        ...
+
+
+LOOSEST = 1e-3
+"""The largest relative tolerance that steps are chosen by: longer steps gain energy unseen, until chains fly apart."""
+
+
+def absolute_tolerances(options: SolverOptions, size: int) -> FloatArray:
+    """Return the absolute tolerance of each unknown; nothing is divided by zero where it is zero."""
+    if isinstance(options.absolute_tolerances, float):
+        return np.full(size, max(options.absolute_tolerances, float(np.finfo(float).tiny)))
+    try:
+        given = np.broadcast_to(np.asarray(options.absolute_tolerances, dtype=np.float64), (size,))
+        return np.maximum(given, np.finfo(float).tiny)
+    except ValueError:
+        raise UsageError(f"give one absolute tolerance, or one for each of the {size} unknowns") from None
+
+
+def first_step(
+    rates: Callable[[float, FloatArray], FloatArray],
+    options: SolverOptions,
+    absolute: FloatArray,
+    t: float,
+    y: FloatArray,
+    yp: FloatArray,
+    order: int,
+) -> float:
+    """Return a first step from the size of the first two derivatives.
+
+    Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.4.
+
+    Parameters
+    ----------
+    rates
+        The right-hand side.
+    options, absolute
+        The accuracy that is asked for.
+    t, y, yp
+        The start.
+    order
+        The order of the method.
+    """
+    longest = min(options.horizon, options.max_step or np.inf)
+    if options.first_step is not None:
+        return min(options.first_step, options.max_step or np.inf)
+    weights = 1.0 / (absolute + options.relative_tolerance * np.abs(y))
+
+    def size(values: FloatArray) -> float:
+        scaled = values * weights
+        return sqrt(float(scaled.dot(scaled)) / len(scaled))
+
+    with np.errstate(all="ignore"):
+        d0, d1 = size(y), size(yp)
+        h0 = 1e-6 if not (d0 >= 1e-5 and d1 >= 1e-5 and np.isfinite(d0 / d1)) else 0.01 * d0 / d1
+        h0 = min(h0, longest)
+        d2 = size(rates(t + h0, y + h0 * yp) - yp) / h0
+    if not np.isfinite(d2):
+        return h0
+    steepest = max(d1, d2)
+    h1 = max(1e-6, 1e-3 * h0) if steepest <= 1e-15 else float((0.01 / steepest) ** (1.0 / order))
+    return min(100.0 * h0, h1, longest)

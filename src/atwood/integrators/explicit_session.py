@@ -1,0 +1,402 @@
+"""Runs with an explicit method: output times, events and limits around a stepper.
+
+Steps are chosen by their error alone.  What lies between two steps is read from the dense output, so that output
+times and events never change the solution.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from math import inf
+from typing import Literal, cast
+
+import numpy as np
+
+from atwood.errors import KernelEvaluationError, StartError, UsageError
+from atwood.integrators.event_location import ROUNDING, EventWatch, Root, State
+from atwood.integrators.explicit_problem import (
+    ExplicitProblem,
+    HeedingStepper,
+    LimitedStepper,
+    Outcome,
+    Stepper,
+    WatchingStepper,
+)
+from atwood.integrators.protocol import Advance, Budget, FloatArray, ImplicitProblem, SolverOptions, Statistics, Status
+
+__all__ = ["ExplicitSession", "open_explicit"]
+
+FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
+"""So many steps are taken before limits are looked at: at first, for one unknown, and at most."""
+
+_MOMENT = 0.02
+"""Steps are taken for about so long, in seconds, before limits are looked at and Ctrl-C is heard."""
+
+_STALLED = 50
+"""So many steps in a row that do not move the time beyond rounding are a failure."""
+
+
+Leave = Callable[[float, FloatArray], bool]
+
+
+def open_explicit(
+    problem: ExplicitProblem,
+    options: SolverOptions,
+    t: float,
+    y: FloatArray,
+    budget: Budget | None = None,
+    stepper: Literal["auto", "compiled", "reference"] = "auto",
+    leave: Leave | None = None,
+    end: float = inf,
+) -> ExplicitSession:
+    """Start a run with the explicit method of order 8(5,3).
+
+    Parameters
+    ----------
+    problem
+        The equations.
+    options
+        Accuracy; `max_order` and `linear_solver` mean nothing here, and a first step that is estimated from
+        derivatives is bounded by the horizon itself.
+    t, y
+        Start values.
+    budget
+        Limits of the session.
+    stepper
+        What takes the steps; ``"auto"`` takes compiled steps where the problem has compiled rates.
+    leave
+        Asked, with time and values, whenever stability has kept steps short for a while, whether to leave the rest to
+        an implicit method: the run then ends there with `Status.STIFF`.
+    end
+        The last time that will be asked for; events behind it are not looked for.
+    """
+    if stepper == "compiled" or (stepper == "auto" and problem.compiled is not None):
+        from atwood.integrators.dop853.native import CompiledStepper
+
+        return ExplicitSession(problem, options, CompiledStepper(problem, options), t, y, budget, leave, end)
+    from atwood.integrators.dop853.reference import ReferenceStepper
+
+    return ExplicitSession(problem, options, ReferenceStepper(problem, options), t, y, budget, leave, end)
+
+
+class ExplicitSession:
+    """A run in progress; see `~atwood.integrators.protocol.Session`.
+
+    Parameters
+    ----------
+    problem, options, t, y, budget, leave, end
+        As in `open_explicit`.
+    stepper
+        What takes the steps.
+    """
+
+    def __init__(
+        self,
+        problem: ExplicitProblem,
+        options: SolverOptions,
+        stepper: Stepper,
+        t: float,
+        y: FloatArray,
+        budget: Budget | None = None,
+        leave: Leave | None = None,
+        end: float = inf,
+    ) -> None:
+        self.budget = budget or Budget()
+        self._opened = 0.0  # when it first went on
+        self._end = end
+        self._leave, self._judged, self._is_left = leave, 0, False
+        self._size = problem.size
+        self._stepper = stepper
+        # The watch reads nothing of a problem but its events.
+        watched = cast("ImplicitProblem", problem)
+        self._watch = EventWatch(watched, options.horizon) if problem.events is not None else None
+        self._notices = self._watching_stepper(problem, stepper)
+        if leave is not None and isinstance(stepper, HeedingStepper):
+            stepper.heed_stiffness()
+        self._no_events = (0,) * problem.event_count
+        self._starts = 0
+        self._seconds = 0.0
+        self._chunk = max(1, FIRST_CHUNK // problem.size)
+        self.reinitialize(t, y)
+
+    @staticmethod
+    def _watching_stepper(problem: ExplicitProblem, stepper: Stepper) -> WatchingStepper | None:
+        """Let the stepper look for events by itself, if it can."""
+        if problem.compiled_events is None or not isinstance(stepper, WatchingStepper):
+            return None
+        events = problem.compiled_events()
+        if events is None:
+            return None
+        stepper.watch(events)
+        return stepper
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the session has cost so far, over all its restarts."""
+        counts, watch = self._stepper.counts, self._watch
+        return Statistics(
+            steps=counts.steps,
+            residual_evaluations=counts.evaluations,
+            event_evaluations=watch.evaluations if watch else 0,
+            missing_values=counts.missing,
+            reinitializations=self._starts - 1,
+            seconds=self._seconds,
+            error_test_failures=counts.failures,
+            convergence_failures=0,
+        )
+
+    @property
+    def seems_stiff(self) -> bool:
+        """Whether stability, and not accuracy, has kept steps short: an implicit method would take far fewer."""
+        return self._stepper.counts.stiff > 0
+
+    def limit_steps(self, longest: float) -> None:
+        """Take no longer steps from now on than this, nor than the options allow, if the stepper can be told so."""
+        if isinstance(self._stepper, LimitedStepper):
+            self._stepper.limit_steps(longest)
+
+    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
+        """Go on from another state; its rates follow from it."""
+        values = np.array(y, dtype=np.float64)
+        if values.shape != (self._size,):
+            raise UsageError(f"the state has {self._size} unknowns, but was given values of shape {values.shape}")
+        if not (np.isfinite(t) and np.isfinite(values).all()):
+            raise StartError(f"the start values at t = {t} are not all finite numbers")
+        if not self._stepper.start(float(t), values):
+            raise StartError(f"the right-hand side has no finite value at the start, t = {t:.9g}")
+        self._here = self._newest = self._stepper.state()
+        if self._watch is not None:
+            self._watch.restart(self._here)
+        self._root: Root | None = None
+        self._searched = self._here[0]
+        self._stalled = 0
+        self._broken = False
+        self._starts += 1
+
+    def advance(self, t_out: float) -> Advance:
+        """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
+
+        Parameters
+        ----------
+        t_out
+            Not before the time at which the last advance ended.
+        """
+        if not self._here[0] <= t_out < inf:
+            raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
+        began = time.perf_counter()
+        self._opened = self._opened or began
+        try:
+            return self._run(float(t_out))
+        except KeyboardInterrupt:
+            self._broken = True
+            return self._stopped(Status.INTERRUPTED, "interrupted")
+        except KernelEvaluationError as error:
+            self._broken = True
+            return self._stopped(Status.FAILED, str(error))
+        except BaseException:
+            self._broken = True
+            raise
+        finally:
+            self._seconds += time.perf_counter() - began
+
+    def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, Advance]:
+        """Go on through many times at once, as far as nothing stops it.
+
+        Parameters
+        ----------
+        times
+            Rising, the first not before the time at which the last advance ended.
+
+        Returns
+        -------
+        tuple
+            Values and rates at the times that were reached, one row each, and how it ended.
+        """
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        if not (len(times) and self._here[0] <= times[0] and times[-1] < inf and np.all(np.diff(times) >= 0.0)):
+            raise UsageError(f"cannot sample from t = {self._here[0]:.9g} at these times: they must rise from there")
+        values, rates = np.empty((len(times), self._size)), np.empty((len(times), self._size))
+        filled, stopped = 0, None
+        looks_itself = self._watch is None or self._notices is not None
+        if looks_itself and self.budget.poll is None and not self._broken:
+            filled, stopped = self._sample_quickly(times, values, rates)
+        if stopped is not None:
+            return values[:filled], rates[:filled], stopped
+        advance = Advance(*_copied(self._here), Status.REACHED, self._no_events)
+        while filled < len(times):
+            advance = self.advance(float(times[filled]))
+            if advance.status is not Status.REACHED:
+                break
+            values[filled], rates[filled] = advance.y, advance.yp
+            filled += 1
+        return values[:filled], rates[:filled], advance
+
+    def _sample_quickly(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> tuple[int, Advance | None]:
+        """Let the stepper go through times as long as no limit is near, and nothing happens.
+
+        Returns
+        -------
+        tuple
+            How many times it filled, and why it must end there; None if single advances can go on.
+        """
+        began = time.perf_counter()
+        self._opened = self._opened or began
+        filled = 0
+        try:
+            while filled < len(times) and self._find_root() is None:
+                is_ahead = times[-1] > self._newest[0]
+                if is_ahead and self._exceeded() is not None:
+                    break
+                if is_ahead and self._watch is not None and self._watch.is_settling:
+                    outcome = self._take(float(times[-1]), 1)
+                else:
+                    count, outcome = self._fill(times[filled:], values[filled:], rates[filled:])
+                    filled += count
+                if outcome is Outcome.TOO_SMALL:
+                    break
+        except KeyboardInterrupt:
+            self._broken = True
+            return filled, self._stopped(Status.INTERRUPTED, "interrupted")
+        except KernelEvaluationError as error:
+            self._broken = True
+            return filled, self._stopped(Status.FAILED, str(error))
+        except BaseException:
+            self._broken = True
+            raise
+        finally:
+            self._seconds += time.perf_counter() - began
+        return filled, None
+
+    def _fill(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> tuple[int, Outcome]:
+        """Let the stepper fill tables for a moment; return how many times it reached."""
+        looked = time.perf_counter()
+        self._tell_signs()
+        y, yp, outcome = self._stepper.sample(times, self._allowed())
+        self._learn(time.perf_counter() - looked, outcome)
+        count = len(y)
+        values[:count], rates[:count] = y, yp
+        self._arrive(outcome)
+        if count:
+            self._here = (float(times[count - 1]), y[-1].copy(), yp[-1].copy())
+        return count, outcome
+
+    def _take(self, t_out: float, steps: int) -> Outcome:
+        """Let the stepper take steps."""
+        looked = time.perf_counter()
+        self._tell_signs()
+        outcome = self._stepper.run(t_out, steps)
+        self._learn(time.perf_counter() - looked, outcome)
+        self._arrive(outcome)
+        return outcome
+
+    def _tell_signs(self) -> None:
+        if self._notices is not None and self._watch is not None:
+            self._notices.expect(self._watch.signs)
+
+    def _arrive(self, outcome: Outcome) -> None:
+        """Take up where the stepper came to, and up to where nothing has happened for certain."""
+        before = self._newest[0]
+        self._newest = self._stepper.state()
+        if self._watch is None:
+            self._searched = self._newest[0]
+        elif self._notices is not None and self._newest[0] > before and not self._watch.is_settling:
+            last = self._newest[0] if outcome is not Outcome.NOTICED else self._notices.begin_of_step()
+            self._searched = max(self._searched, last)
+
+    def _run(self, t_out: float) -> Advance:
+        if self._broken:
+            self.reinitialize(self._here[0], self._here[1])
+        while True:
+            root = self._find_root()
+            if root is not None and root.state[0] <= t_out:
+                self._root = None
+                self._here = root.state
+                return Advance(*_copied(root.state), Status.EVENT, root.events)
+            if t_out <= self._newest[0]:
+                self._here = self._newest if t_out == self._newest[0] else self._stepper.interpolate(t_out)
+                return Advance(*_copied(self._here), Status.REACHED, self._no_events)
+            self._here = self._newest
+            limit = self._exceeded()
+            if limit is not None:
+                return limit
+            failure = self._step(t_out)
+            if failure is not None:
+                return failure
+
+    def _find_root(self) -> Root | None:
+        """Return the first root in the part of the last step that has not been handed out."""
+        watch = self._watch
+        end = min(self._newest[0], self._end)
+        if watch is not None and self._root is None and self._searched < end:
+            self._root = watch.search(self._searched, end, self._stepper.interpolate)
+            self._searched = self._root.state[0] if self._root else end
+        return self._root
+
+    def _allowed(self) -> int:
+        """Return how many steps may be taken before the next look at limits and events."""
+        watch = self._watch
+        if self.budget.poll is not None or (watch is not None and (self._notices is None or watch.is_settling)):
+            return 1
+        if self.budget.max_steps is None:
+            return self._chunk
+        return max(0, min(self._chunk, self.budget.max_steps - self._stepper.counts.steps))
+
+    def _learn(self, seconds: float, outcome: Outcome) -> None:
+        """Come closer to a chunk that takes a moment."""
+        if seconds > 2.0 * _MOMENT:
+            self._chunk = max(1, int(self._chunk * _MOMENT / seconds))
+        elif outcome is Outcome.USED_UP and seconds < 0.5 * _MOMENT:
+            self._chunk = min(2 * self._chunk, LARGEST_CHUNK)
+
+    def _step(self, t_out: float) -> Advance | None:
+        """Take steps, and return an answer only if that failed."""
+        before, steps = self._newest[0], self._stepper.counts.steps
+        outcome = self._take(t_out, self._allowed())
+        if outcome is Outcome.TOO_SMALL:
+            self._here = self._newest
+            self._broken = True
+            reason = "the steps became too small to move the time"
+            if self._stepper.counts.missing:
+                reason += ": the right-hand side has no finite value beyond, or the solution grows without bound"
+            return self._stopped(Status.FAILED, reason)
+        taken = self._stepper.counts.steps - steps
+        if self._newest[0] - before > 4 * ROUNDING * abs(before) * taken:
+            self._stalled = 0
+        else:
+            self._stalled += taken
+        if self._stalled >= _STALLED:
+            self._here, self._broken = self._newest, True
+            return self._stopped(Status.FAILED, "the steps became too small to move the time")
+        return None
+
+    def _leaves(self) -> bool:
+        """Tell whether the rest is to be left to an implicit method."""
+        stiff = self._stepper.counts.stiff
+        if self._leave is not None and stiff > self._judged:
+            self._judged = stiff
+            self._is_left = self._leave(*self._newest[:2])
+        return self._is_left
+
+    def _exceeded(self) -> Advance | None:
+        budget, t = self.budget, self._here[0]
+        if self._leave is not None and self._leaves():
+            return self._stopped(Status.STIFF, "steps are kept short by stability alone")
+        if budget.poll is not None:
+            budget.poll(t)
+        steps = self._stepper.counts.steps
+        if budget.max_steps is not None and steps >= budget.max_steps:
+            return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
+        if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
+            return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
+        return None
+
+    def _stopped(self, status: Status, reason: str) -> Advance:
+        message = f"{reason} (at t = {self._here[0]:.9g})"
+        return Advance(*_copied(self._here), status, self._no_events, message)
+
+
+def _copied(state: State) -> State:
+    """Return a state whose arrays the caller may keep and change."""
+    t, y, yp = state
+    return t, y.copy(), yp.copy()

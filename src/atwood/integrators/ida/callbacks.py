@@ -1,0 +1,320 @@
+"""Python functions as C functions with the signatures that IDA calls.
+
+No exception may leave such a function: the C code between it and the caller knows nothing of exceptions.  So they
+are kept in the `Record`, and raised again once IDA has returned.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import signal
+import threading
+from collections.abc import Callable, Iterable
+from ctypes import c_double, c_int32, c_int64, c_void_p
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import KernelEvaluationError
+from atwood.integrators.event_location import State
+from atwood.integrators.ida.library import SundialsLibrary
+from atwood.integrators.ida.signatures import JACOBIAN, RESIDUAL, WEIGHTS
+from atwood.integrators.protocol import FloatArray, ImplicitProblem, LinearSolver
+
+__all__ = [
+    "InterruptLater",
+    "Record",
+    "address",
+    "explain",
+    "jacobian_function",
+    "residual_function",
+    "weight_function",
+]
+
+NO_VALUE = (KernelEvaluationError, ArithmeticError)
+"""What a function raises where it has no value."""
+
+GOOD, RECOVERABLE, BROKEN = 0, 1, -1
+"""What a function answers: it has a value; a smaller step may help; nothing helps."""
+
+Places = NDArray[np.intp] | slice
+
+
+@dataclass
+class Record:
+    """What happened inside the functions that IDA called.
+
+    Attributes
+    ----------
+    missing
+        How often there was no finite value.
+    complaint, equation, time
+        The last of these: in words, in which equation, and when.
+    error
+        An exception that waits to be raised again.
+    interrupted
+        Whether Ctrl-C came while Python functions were being called.
+    calls_python
+        Whether any of the functions is one of Python.
+    """
+
+    missing: int = 0
+    complaint: str = ""
+    equation: int | None = None
+    time: float = -inf
+    error: BaseException | None = None
+    interrupted: bool = False
+    calls_python: bool = False
+
+    def note(self, t: float, what: str, equation: int | None = None) -> int:
+        """Take up that there was no value, and return the answer to IDA."""
+        self.missing += 1
+        self.complaint = f"at t = {t:.9g} {what}"
+        self.equation = equation
+        self.time = t
+        return RECOVERABLE
+
+    def fail(self, error: BaseException) -> int:
+        """Keep an exception, and return the answer to IDA."""
+        self.error = error
+        return BROKEN
+
+    def raise_again(self) -> None:
+        """Raise what was kept."""
+        error, self.error = self.error, None
+        if error is not None:
+            raise error
+        if self.interrupted:
+            self.interrupted = False
+            raise KeyboardInterrupt
+
+
+class _Views:
+    """NumPy views of IDA's vectors, each made once: the vectors of a session stay where they are."""
+
+    def __init__(self, size: int, pointer_of: Callable[[int], int], writeable: bool) -> None:
+        self._size = size
+        self._pointer_of = pointer_of
+        self._writeable = writeable
+        self._made: dict[int, FloatArray] = {}
+
+    def __call__(self, vector: int) -> FloatArray:
+        view = self._made.get(vector)
+        if view is None:
+            view = _array_at(self._pointer_of(vector), self._size, c_double)
+            view.flags.writeable = self._writeable
+            self._made[vector] = view
+        return view
+
+
+def _array_at(where: int, size: int, kind: type[c_double] | type[c_int32] | type[c_int64]) -> NDArray[Any]:
+    """Return numbers in C memory as an array."""
+    memory: Any = (kind * size).from_address(where)
+    return np.frombuffer(memory, dtype=kind)
+
+
+def address(function: Any) -> int:
+    """Return the address of a C function made by ctypes."""
+    return ctypes.cast(function, c_void_p).value or 0
+
+
+def residual_function(problem: ImplicitProblem, record: Record, library: SundialsLibrary) -> Any:
+    """Return the residual as an ``IDAResFn``.
+
+    Parameters
+    ----------
+    problem
+        The equations.
+    record
+        Takes up what goes wrong.
+    library
+        SUNDIALS.
+    """
+    function, dot = problem.residual, np.dot
+    given = _Views(problem.size, library.N_VGetArrayPointer, writeable=False)
+    wanted = _Views(problem.size, library.N_VGetArrayPointer, writeable=True)
+
+    def residual(t: float, y: int, yp: int, out: int, _: int | None) -> int:
+        if record.interrupted:
+            return BROKEN
+        try:
+            values = wanted(out)
+            values[:] = function(t, given(y), given(yp))
+            if not dot(values, values) < inf:
+                finite = np.isfinite(values)
+                if not finite.all():
+                    equation = int(finite.argmin())
+                    return record.note(t, f"the residual of equation {equation} is {values[equation]}", equation)
+        except NO_VALUE as error:
+            return record.note(t, f"the residual has no value: {error}")
+        except BaseException as error:
+            return record.fail(error)
+        return GOOD
+
+    record.calls_python = True
+    return RESIDUAL(residual)
+
+
+def jacobian_function(
+    problem: ImplicitProblem, record: Record, library: SundialsLibrary, linear_solver: LinearSolver
+) -> Any:
+    """Return the Jacobian as an ``IDALsJacFn``.
+
+    Parameters
+    ----------
+    problem
+        The equations.
+    record
+        Takes up what goes wrong.
+    library
+        SUNDIALS.
+    linear_solver
+        Decides what the matrix looks like.
+    """
+    function, dot = problem.jacobian, np.dot
+    rows, columns = problem.pattern
+    given = _Views(problem.size, library.N_VGetArrayPointer, writeable=False)
+    if linear_solver == "sparse":
+        entries_of, places = _sparse_writer(problem, library)
+    else:
+        entries_of = _Views(problem.size**2, library.SUNDenseMatrix_Data, writeable=True)
+        places = columns * problem.size + rows
+
+    def jacobian(t: float, cj: float, y: int, yp: int, _: int, matrix: int, *more: int | None) -> int:
+        if record.interrupted:
+            return BROKEN
+        try:
+            entries = np.asarray(function(t, given(y), given(yp), cj), dtype=np.float64)
+            entries_of(matrix)[places] = entries
+            if not dot(entries, entries) < inf:
+                finite = np.isfinite(entries)
+                if not finite.all():
+                    equation = int(rows[finite.argmin()])
+                    return record.note(t, f"the Jacobian of equation {equation} is not finite", equation)
+        except NO_VALUE as error:
+            return record.note(t, f"the Jacobian has no value: {error}")
+        except BaseException as error:
+            return record.fail(error)
+        return GOOD
+
+    record.calls_python = True
+    return JACOBIAN(jacobian)
+
+
+def _sparse_writer(problem: ImplicitProblem, library: SundialsLibrary) -> tuple[Callable[[int], FloatArray], Places]:
+    """Return what writes the pattern into a sparse matrix and hands back the place for its entries."""
+    rows, columns = problem.pattern
+    starts = np.searchsorted(columns, np.arange(problem.size + 1))
+    made: dict[int, tuple[NDArray[Any], NDArray[Any], FloatArray]] = {}
+
+    def entries_of(matrix: int) -> FloatArray:
+        if matrix not in made:
+            made[matrix] = (
+                _array_at(library.SUNSparseMatrix_IndexValues(matrix), len(rows), library.index_type),
+                _array_at(library.SUNSparseMatrix_IndexPointers(matrix), len(starts), library.index_type),
+                _array_at(library.SUNSparseMatrix_Data(matrix), len(rows), c_double),
+            )
+        row_values, column_starts, entries = made[matrix]
+        # IDA sets the pattern to zero, too, before it asks for the matrix.
+        row_values[:] = rows
+        column_starts[:] = starts
+        return entries
+
+    return entries_of, slice(None)
+
+
+def weight_function(relative: FloatArray, absolute: FloatArray, record: Record, library: SundialsLibrary) -> Any:
+    """Return ``1 / (relative |y| + absolute)`` as an ``IDAEwtFn``.
+
+    Parameters
+    ----------
+    relative, absolute
+        For each unknown.
+    record
+        Takes up what goes wrong.
+    library
+        SUNDIALS.
+    """
+    given = _Views(len(relative), library.N_VGetArrayPointer, writeable=False)
+    wanted = _Views(len(relative), library.N_VGetArrayPointer, writeable=True)
+
+    def weights(y: int, out: int, _: int | None) -> int:
+        if record.interrupted:
+            return BROKEN
+        try:
+            allowed = relative * np.abs(given(y)) + absolute
+            if not (allowed > 0.0).all():
+                return BROKEN
+            np.divide(1.0, allowed, out=wanted(out))
+        except BaseException as error:
+            return record.fail(error)
+        return GOOD
+
+    record.calls_python = True
+    return WEIGHTS(weights)
+
+
+class InterruptLater:
+    """While this is entered, Ctrl-C makes IDA return as soon as it calls a Python function.
+
+    Otherwise the exception could arise where a C function has just called Python, and would be lost there.  A second
+    Ctrl-C is raised at once, so that a function that never returns can be left.  Only the main thread gets
+    signals, and a handler that somebody else has installed is left alone.
+
+    Parameters
+    ----------
+    record
+        Takes up that Ctrl-C came.
+    """
+
+    def __init__(self, record: Record) -> None:
+        self._record = record
+        self._installed = False
+
+    def __enter__(self) -> None:
+        if (
+            threading.current_thread() is threading.main_thread()
+            and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        ):
+            signal.signal(signal.SIGINT, self._handle)
+            self._installed = True
+
+    def __exit__(self, *_: object) -> None:
+        if self._installed:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            self._installed = False
+
+    def _handle(self, *_: object) -> None:
+        if self._record.interrupted:
+            raise KeyboardInterrupt
+        self._record.interrupted = True
+
+
+def explain(problem: ImplicitProblem, record: Record, states: Iterable[State]) -> None:
+    """Ask the Python residual what compiled functions cannot say: which equation has no value.
+
+    Parameters
+    ----------
+    problem
+        The equations.
+    record
+        Takes up the answer.
+    states
+        Where to ask; the first answer counts.
+    """
+    missing = record.missing
+    for t, y, yp in states:
+        try:
+            values = np.asarray(problem.residual(t, y, yp), dtype=np.float64)
+        except NO_VALUE as error:
+            record.note(t, f"the residual has no value: {error}")
+            break
+        finite = np.isfinite(values)
+        if not finite.all():
+            equation = int(finite.argmin())
+            record.note(t, f"the residual of equation {equation} is {values[equation]}", equation)
+            break
+    record.missing = missing

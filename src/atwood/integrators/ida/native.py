@@ -1,0 +1,416 @@
+"""SUNDIALS IDA without Python in the loop: the shared libraries driven directly.
+
+Where a problem brings compiled functions, no Python runs between outputs.  Where it has Python functions only, they
+are called back from C; the answers are the same, and every problem that the reference driver solves is solved here.
+
+IDA goes on by itself to the next output, but only for a moment at a time, so that limits and Ctrl-C have their turn.
+With events or a `~atwood.integrators.protocol.Budget.poll` it takes one step at a time.  Outputs are read from its
+interpolant and never change the steps.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import nullcontext
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from atwood.errors import KernelEvaluationError, UsageError
+from atwood.integrators.event_location import EventWatch, Root, State
+from atwood.integrators.ida.callbacks import InterruptLater, Record, explain
+from atwood.integrators.ida.library import available, why_not
+from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
+from atwood.integrators.ida.pace import FIRST_CHUNK, Pace, first_chunk
+from atwood.integrators.ida.setup import IdaTuning, prepare
+from atwood.integrators.ida.states import checked_state, copied, is_finite
+from atwood.integrators.ida.sundae import REASONS
+from atwood.integrators.protocol import (
+    Advance,
+    Budget,
+    FloatArray,
+    ImplicitProblem,
+    SolverOptions,
+    Statistics,
+    Status,
+    choose_linear_solver,
+)
+
+__all__ = ["IdaTuning", "NativeSession", "available", "open_session", "why_not"]
+
+NO_EVENT_VALUE = -10
+"""IDA's flag when the event functions did not return 0."""
+
+EVENT_REASONS = {NO_EVENT_VALUE: "an event function has no value"}
+
+
+def open_session(
+    problem: ImplicitProblem,
+    options: SolverOptions,
+    t: float,
+    y: FloatArray,
+    yp: FloatArray,
+    budget: Budget | None = None,
+    tuning: IdaTuning | None = None,
+) -> NativeSession:
+    """Start a run with SUNDIALS' own IDA.
+
+    Parameters
+    ----------
+    problem
+        The equations.
+    options
+        Accuracy and means.
+    t, y, yp
+        Consistent start values.
+    budget
+        Limits of the session.
+    tuning
+        What only this driver can set.
+
+    Returns
+    -------
+    NativeSession
+        The run, at its start.
+
+    Raises
+    ------
+    ~atwood.integrators.ida.library.SundialsMissing
+        If the libraries cannot be used; `available` tells beforehand.
+    """
+    return NativeSession(problem, options, t, y, yp, budget, tuning)
+
+
+class NativeSession:
+    """A run in progress; see `~atwood.integrators.protocol.Session`.
+
+    Its memory is freed by `close`, at the end of a ``with`` block, or when nobody refers to it any more.
+
+    Parameters
+    ----------
+    problem, options, t, y, yp, budget, tuning
+        As in `open_session`.
+    """
+
+    def __init__(
+        self,
+        problem: ImplicitProblem,
+        options: SolverOptions,
+        t: float,
+        y: FloatArray,
+        yp: FloatArray,
+        budget: Budget | None = None,
+        tuning: IdaTuning | None = None,
+    ) -> None:
+        self.budget = budget or Budget()
+        self._opened = 0.0  # when it first went on
+        self._problem = problem
+        self._horizon = options.horizon
+        self._record = Record()
+        state = checked_state(problem.size, t, y, yp)
+        linear_solver = choose_linear_solver(problem, options)
+        self._native = None if problem.native is None else problem.native(linear_solver)
+        self._memory = prepare(
+            problem, options, tuning or IdaTuning(), linear_solver, self._native, self._record, state
+        )
+        self._stop_time = None if tuning is None else tuning.stop_time
+        self._guard = self._memory.library.sparse_guard if linear_solver == "sparse" else nullcontext()
+        self._watch = EventWatch(problem, options.horizon) if problem.events is not None else None
+        # Whether IDA itself can tell in which steps something happens.
+        self._finds_events = self._native is not None and self._native.events != 0
+        self._no_events = (0,) * problem.event_count
+        self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
+        self._starts = 0
+        self._seconds = 0.0
+        self._pace = Pace(FIRST_CHUNK if self._record.calls_python else first_chunk(problem.size))
+        self._begin(state)
+
+    def __enter__(self) -> NativeSession:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free IDA's memory; the statistics stay."""
+        if not self._memory.is_closed:
+            self._earlier += self._since_start()
+            self._memory.close()
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the session has cost so far, over all its restarts."""
+        sums = self._earlier if self._memory.is_closed else self._earlier + self._since_start()
+        counted = self._native.missing_values if self._native is not None else None
+        return replace(
+            sums,
+            event_evaluations=self._watch.evaluations if self._watch else 0,
+            missing_values=self._record.missing if counted is None else counted(),
+            reinitializations=self._starts - 1,
+            seconds=self._seconds,
+        )
+
+    @property
+    def counts(self) -> Counts:
+        """What IDA has counted since its last start, with the order and the size of the last step."""
+        self._check_open()
+        return self._memory.counts()
+
+    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray) -> None:
+        """Go on from another consistent state, after an event, a change of mode, or a projection."""
+        self._check_open()
+        self._restart(checked_state(self._problem.size, t, y, yp))
+
+    def advance(self, t_out: float) -> Advance:
+        """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
+
+        Parameters
+        ----------
+        t_out
+            Not before the time at which the last advance ended.
+
+        Returns
+        -------
+        Advance
+            Where it ended and why, always with a good state.
+        """
+        self._check_open()
+        if not self._here[0] <= t_out < inf:
+            raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
+        if self._stop_time is not None and t_out > self._stop_time:
+            raise UsageError(f"cannot advance past t = {self._stop_time:.9g}, where the run must stop")
+        began = time.perf_counter()
+        self._opened = self._opened or began
+        try:
+            if not self._record.calls_python and (self._watch is None or self._finds_events):
+                return self._run(float(t_out))
+            with np.errstate(all="ignore"), InterruptLater(self._record):
+                end = self._run(float(t_out))
+                self._record.raise_again()
+                return end
+        except KeyboardInterrupt:
+            self._record.interrupted, self._stale = False, True
+            return self._stopped(Status.INTERRUPTED, "interrupted")
+        except KernelEvaluationError as error:
+            self._stale = True
+            return self._stopped(Status.FAILED, str(error))
+        except BaseException:
+            self._stale = True
+            raise
+        finally:
+            self._seconds += time.perf_counter() - began
+
+    def _check_open(self) -> None:
+        if self._memory.is_closed:
+            raise UsageError("this session has been closed")
+
+    def _restart(self, state: State) -> None:
+        self._earlier += self._since_start()
+        self._memory.y[:], self._memory.yp[:] = state[1:]
+        self._memory.begin_again(state[0])
+        self._begin(state)
+
+    def _begin(self, state: State) -> None:
+        """Set all that belongs to a start of IDA."""
+        if self._stop_time is not None:
+            self._memory.call("IDASetStopTime", self._stop_time)
+        if self._watch is not None:
+            self._watch.restart(state)
+        if self._native is not None and self._native.restart_events is not None:
+            self._native.restart_events(state[0])
+        self._here = state
+        self._newest: State | None = state  # the end of the last step, where IDA has just taken a single one
+        self._reached = state[0]
+        self._is_first = True
+        self._behind = False  # whether IDA last handed out a time before the end of its last step
+        self._root: Root | None = None
+        self._searched = state[0]
+        self._looks_on = False  # whether IDA itself looks at what is left of its last step when it goes on
+        self._pace.mark, self._pace.lap = (state[0], 0), (state[0], 0, 0)
+        self._stale = False
+        self._starts += 1
+
+    def _since_start(self) -> Statistics:
+        counts = self._memory.counts()
+        return Statistics(
+            steps=counts.steps,
+            residual_evaluations=counts.residuals,
+            jacobian_evaluations=counts.jacobians,
+            error_test_failures=counts.error_failures,
+            convergence_failures=counts.solve_failures,
+        )
+
+    def _run(self, t_out: float) -> Advance:
+        if self._stale:
+            self._restart(self._here)
+        by_steps = self.budget.poll is not None or (self._watch is not None and not self._finds_events)
+        while True:
+            is_known = self._looks_on and not self._searched < t_out <= self._reached
+            root = None if is_known else self._find_root()
+            if root is not None and root.state[0] <= t_out:
+                self._root, self._here = None, root.state
+                return Advance(*copied(root.state), Status.EVENT, root.events)
+            if t_out <= self._reached:
+                return self._arrive(t_out)
+            if by_steps:
+                self._here = self._end_of_step()
+            limit = self._exceeded()
+            if limit is not None:
+                return limit
+            failure = self._step() if by_steps or self._is_first else self._stride(t_out)
+            if failure is not None:
+                return failure
+
+    def _arrive(self, t_out: float) -> Advance:
+        if t_out > self._here[0]:
+            state = self._interpolate(t_out)
+            if not is_finite(state[1], state[2]):
+                self._stale = True
+                return self._stopped(Status.FAILED, "the solution is no longer finite")
+            self._here = state
+        return Advance(*copied(self._here), Status.REACHED, self._no_events)
+
+    def _find_root(self) -> Root | None:
+        """Return the first root in the part of the last step that has not been handed out."""
+        watch = self._watch
+        if watch is not None and self._root is None and self._searched < self._reached:
+            self._root = watch.search(self._searched, self._reached, self._interpolate)
+            self._searched = self._root.state[0] if self._root else self._reached
+        return self._root
+
+    def _interpolate(self, t: float) -> State:
+        if self._newest is not None and t == self._newest[0]:
+            return self._newest
+        flag = self._memory.interpolate(t)
+        if flag != 0:
+            raise KernelEvaluationError(f"no interpolated value at t = {t:.9g} (IDA flag {flag})")
+        return t, self._memory.y.copy(), self._memory.yp.copy()
+
+    def _end_of_step(self) -> State:
+        if self._newest is None:
+            self._newest = self._interpolate(self._reached)
+        return self._newest
+
+    def _steps(self) -> int:
+        return self._earlier.steps + self._memory.steps()
+
+    def _exceeded(self) -> Advance | None:
+        budget = self.budget
+        if budget.poll is not None:
+            budget.poll(self._here[0])
+        if budget.max_steps is not None and self._steps() >= budget.max_steps:
+            return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
+        if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
+            return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
+        return None
+
+    def _step(self) -> Advance | None:
+        """Take one internal step, and return an answer only if that failed."""
+        before = self._reached
+        flag, t = self._solve(before + self._horizon, ONE_STEP)
+        while self._behind and flag >= 0 and t <= before:
+            # IDA first hands out what it has not yet handed out of the step that it has already taken.
+            self._behind = flag == ROOT_RETURN
+            flag, t = self._solve(before + self._horizon, ONE_STEP)
+        failure = self._judge(flag, t)
+        if failure is None:
+            self._behind = flag == ROOT_RETURN
+            self._reached = self._memory.time() if self._behind else t
+            self._newest = None if self._behind else (t, self._memory.y.copy(), self._memory.yp.copy())
+        return failure
+
+    def _stride(self, t_out: float) -> Advance | None:
+        """Take steps until a time is passed or a moment is over, and return an answer only if that failed."""
+        pace, allowed = self._pace, self._pace.chunk
+        if self.budget.max_steps is not None:
+            allowed = min(allowed, self.budget.max_steps - self._steps())
+        if allowed != pace.allowed:
+            self._memory.call("IDASetMaxNumSteps", allowed)
+            pace.allowed = allowed
+        began = time.perf_counter()
+        flag, t = self._solve(t_out, TO_TIME)
+        self._newest, self._behind = None, True
+        pace.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
+        if flag >= 0:
+            self._reached = self._memory.time()
+            if self._watch is not None:
+                # IDA has looked for events: up to where it was sent, or not up to the end of a step that has one.
+                begin = self._memory.begin_of_step()
+                self._searched = max(self._searched, begin if flag == ROOT_RETURN else t)
+                self._looks_on = flag != ROOT_RETURN
+            return None
+        failure = self._judge(0 if flag == TOO_MUCH_WORK else flag, t)
+        if failure is None:
+            self._reached = self._searched = t
+            self._here = t, self._memory.y.copy(), self._memory.yp.copy()
+        return failure
+
+    def _solve(self, t_out: float, task: int) -> tuple[int, float]:
+        with self._guard:
+            flag, t = self._memory.solve(t_out, task)
+            while (flag == STOPPED_BY_WEIGHTS and self._attend(t)) or (flag == NO_EVENT_VALUE and self._noticed()):
+                if flag == NO_EVENT_VALUE and task == TO_TIME:
+                    flag = ROOT_RETURN
+                    break
+                flag, t = self._memory.solve(t_out, task)
+        self._is_first = False
+        return flag, t
+
+    def _noticed(self) -> bool:
+        """Tell whether the functions of events only said that something may have happened within a step."""
+        native = self._native
+        return native is not None and native.has_noticed is not None and native.has_noticed()
+
+    def _attend(self, t: float) -> bool:
+        """Let compiled functions that asked for it be looked at; return whether IDA can go on."""
+        native = self._native
+        if native is None or native.attend is None or native.last_rate is None:
+            return False
+        changed = native.attend(t, self._memory.y)
+        if changed:
+            self._memory.renew_factors(t, native.last_rate(), native.user_data)
+        return changed is not None
+
+    def _judge(self, flag: int, t: float) -> Advance | None:
+        """Return an answer if IDA has failed, or does not get on, after it went to a time."""
+        finite = is_finite(self._memory.y, self._memory.yp)
+        if flag < 0:
+            self._stale = True
+            if finite and t > self._here[0]:
+                self._here = t, self._memory.y.copy(), self._memory.yp.copy()
+            self._record.raise_again()
+            if self._native is not None:
+                explain(self._problem, self._record, [(self._here[0], *self._memory.last_tried()), *self._ahead()])
+            return self._stopped(
+                Status.FAILED, REASONS.get(flag) or EVENT_REASONS.get(flag, f"IDA stopped with flag {flag}")
+            )
+        if not finite:
+            self._stale = True
+            return self._stopped(Status.FAILED, "the solution is no longer finite")
+        if self._pace.stalls(t, self._memory.steps()):
+            self._stale = True
+            if self._native is not None:
+                explain(self._problem, self._record, self._ahead())
+            return self._stopped(Status.FAILED, "the steps became too small to move the time", self._pace.mark[0])
+        if self._pace.crawls(t, self._memory.steps(), self._repeated, self._horizon):
+            self._stale = True
+            return self._stopped(Status.FAILED, "rounding keeps the steps so short that the run would not end")
+        return None
+
+    def _repeated(self) -> int:
+        counts = self._memory.counts()
+        return counts.error_failures + counts.solve_failures
+
+    def _ahead(self) -> list[State]:
+        """Return states a little ahead on the tangent, where a wall that ended the run may be found."""
+        t, y, yp = self._here
+        return [(t + h, y + h * yp, yp) for h in (1e-9 * self._horizon, 1e-6 * self._horizon)]
+
+    def _stopped(self, status: Status, reason: str, since: float = inf) -> Advance:
+        """Return where the run ended, with a complaint that came after the last good step, or since a time."""
+        t, record = self._here[0], self._record
+        message, equation = f"{reason} (at t = {t:.9g})", None
+        if status is Status.FAILED and record.complaint and record.time >= min(t, since):
+            message, equation = f"{message}; {record.complaint}", record.equation
+        return Advance(*copied(self._here), status, self._no_events, message, equation)

@@ -1,0 +1,77 @@
+"""How long IDA is left alone, and whether it gets on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import inf
+
+from atwood.integrators.event_location import ROUNDING
+from atwood.integrators.ida.sundae import STALLED_STEPS
+
+__all__ = ["FIRST_CHUNK", "Pace", "first_chunk"]
+
+MOMENT = 0.02
+"""IDA is left alone for about so long, in seconds."""
+
+FIRST_CHUNK, LARGEST_CHUNK = 20, 1_000_000
+"""How many steps IDA is left alone for: at first, and at most."""
+
+_FIRST_COMPILED_CHUNK, _SMALL = 500, 40
+"""The same at first with compiled functions, up to so many unknowns; with more of them fewer."""
+
+
+_CRAWL, _REPEATED, _ENDLESS = 2000, 0.25, 1e9
+"""Steps do not get on if over so many of them such a share had to be repeated, and it would take so many to the end."""
+
+
+def first_chunk(size: int) -> int:
+    """Return how many steps IDA is left alone for at first with compiled functions of so many unknowns."""
+    return max(1, _FIRST_COMPILED_CHUNK * _SMALL // max(_SMALL, size))
+
+
+@dataclass
+class Pace:
+    """How many steps IDA is left alone for, and whether they still move the time.
+
+    Attributes
+    ----------
+    chunk
+        The number of steps.
+    allowed
+        What IDA was told last.
+    mark
+        A time, and the number of steps until then, from which it is judged whether the time still moves.
+    lap
+        The same with the number of steps that were repeated until then, from which it is judged whether the run gets
+        on.
+    """
+
+    chunk: int = FIRST_CHUNK
+    allowed: int = 0
+    mark: tuple[float, int] = field(default=(-inf, 0))
+    lap: tuple[float, int, int] = field(default=(-inf, 0, 0))
+
+    def learn(self, seconds: float, used_up: bool) -> None:
+        """Come closer to a chunk that takes a moment."""
+        if seconds > 2 * MOMENT:
+            self.chunk = max(1, int(self.chunk * MOMENT / seconds))
+        elif used_up and seconds < 0.5 * MOMENT:
+            self.chunk = min(2 * self.chunk, LARGEST_CHUNK)
+
+    def stalls(self, t: float, steps: int) -> bool:
+        """Tell whether the last steps have moved the time by no more than rounding."""
+        since, count = self.mark
+        if t - since > 4 * ROUNDING * abs(t) * (steps - count):
+            self.mark = t, steps
+            return False
+        return steps - count >= STALLED_STEPS
+
+    def crawls(self, t: float, steps: int, repeated: Callable[[], int], horizon: float) -> bool:
+        """Tell whether rounding keeps steps so short that the run would never end: every few are repeated."""
+        since, count, before = self.lap
+        if steps - count < _CRAWL:
+            return False
+        self.lap = t, steps, repeated()
+        is_endless = (t - since) * _ENDLESS < horizon * (steps - count)
+        return is_endless and self.lap[2] - before > _REPEATED * (steps - count)

@@ -1,0 +1,46 @@
+"""Small things that the native driver does with states."""
+
+from __future__ import annotations
+
+from math import inf, isfinite
+
+import numpy as np
+
+from atwood.errors import StartError, UsageError
+from atwood.integrators.event_location import State
+from atwood.integrators.protocol import FloatArray
+
+__all__ = ["checked_state", "copied", "is_finite"]
+
+
+def checked_state(size: int, t: float, y: FloatArray, yp: FloatArray) -> State:
+    """Return a state to start from, with its own arrays.
+
+    Parameters
+    ----------
+    size
+        The number of unknowns that it must have.
+    t, y, yp
+        The state.
+    """
+    state = (float(t), np.array(y, dtype=np.float64), np.array(yp, dtype=np.float64))
+    for part in state[1:]:
+        if part.shape != (size,):
+            raise UsageError(f"the state has {size} unknowns, but was given values of shape {part.shape}")
+    if not (isfinite(t) and np.isfinite(state[1]).all() and np.isfinite(state[2]).all()):
+        raise StartError(f"the start values at t = {t} are not all finite numbers")
+    return state
+
+
+def is_finite(y: FloatArray, yp: FloatArray) -> bool:
+    """Tell whether all values are finite; a sum of squares says so quickly, unless it overflows."""
+    with np.errstate(over="ignore"):
+        if np.dot(y, y) + np.dot(yp, yp) < inf:
+            return True
+    return bool(np.isfinite(y).all() and np.isfinite(yp).all())
+
+
+def copied(state: State) -> State:
+    """Return a state whose arrays the caller may keep and change."""
+    t, y, yp = state
+    return t, y.copy(), yp.copy()

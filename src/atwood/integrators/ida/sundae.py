@@ -1,0 +1,393 @@
+"""SUNDIALS IDA through scikit-sundae: the reference driver.
+
+Every residual is a call back into Python.  IDA takes one internal step at a time; what lies between two steps is
+read from its interpolant, so that outputs and events never change the steps, and so that limits, progress and
+Ctrl-C have their turn after each.
+
+Facts about scikit-sundae that this module rests on:
+
+- a callback cannot report a recoverable failure; but a residual or a Jacobian that is not a number makes Newton's
+  iteration diverge, which IDA answers with a smaller step;
+- an exception in a callback ends the call and comes out of it unchanged;
+- a ``"normal"`` step to a time inside the last internal step interpolates and evaluates nothing;
+- IDA goes on for ever with steps that are too small to change the time;
+- messages of IDA are printed, even though its flags say the same.
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from atwood.errors import KernelEvaluationError, StartError, UsageError
+from atwood.integrators.event_location import ROUNDING, EventWatch, Root, State
+from atwood.integrators.ida.quiet import without_solver_messages
+from atwood.integrators.protocol import (
+    Advance,
+    Budget,
+    FloatArray,
+    ImplicitProblem,
+    IndexArray,
+    SolverOptions,
+    Statistics,
+    Status,
+    choose_linear_solver,
+)
+
+__all__ = ["SundaeSession", "open_session"]
+
+NO_VALUE = (KernelEvaluationError, ArithmeticError)
+"""What a function raises where it has no value."""
+
+STALLED_STEPS = 50
+"""So many steps in a row that do not move the time beyond rounding are a failure."""
+
+REASONS = {
+    -2: "the tolerances ask for more accuracy than the arithmetic has",
+    -3: "the error test failed too often in a step, or the step became too small",
+    -4: "Newton's iteration failed too often in a step, or the step became too small",
+    -5: "the linear solver could not be set up",
+    -6: "the linear solver failed while factorising the Jacobian",
+    -7: "the linear solver failed",
+    -8: "the residual failed",
+    -9: "the residual has no value near here",
+    -11: "the bounds on the unknowns could not be met",
+    -12: "the residual failed at the start",
+    -14: "the residual or the linear solver failed, and smaller steps did not help",
+    -22: "the solver was given something that it cannot work with",
+    -24: "an error weight became zero: an unknown passed zero and its absolute tolerance is zero",
+}
+
+
+def open_session(
+    problem: ImplicitProblem,
+    options: SolverOptions,
+    t: float,
+    y: FloatArray,
+    yp: FloatArray,
+    budget: Budget | None = None,
+) -> SundaeSession:
+    """Start a run with scikit-sundae's IDA.
+
+    Parameters
+    ----------
+    problem
+        The equations.
+    options
+        Accuracy and means.
+    t, y, yp
+        Consistent start values.
+    budget
+        Limits of the session.
+
+    Returns
+    -------
+    SundaeSession
+        The run, at its start.
+    """
+    return SundaeSession(problem, options, t, y, yp, budget)
+
+
+@dataclass
+class _Record:
+    """What the callbacks count, and the last evaluation without a value since the last good step."""
+
+    residuals: int = 0
+    jacobians: int = 0
+    missing: int = 0
+    complaint: str = ""
+    equation: int | None = None
+
+    def note(self, t: float, what: str, equation: int | None = None) -> None:
+        self.missing += 1
+        self.complaint = f"at t = {t:.9g} {what}"
+        self.equation = equation
+
+    def clear(self) -> None:
+        self.complaint, self.equation = "", None
+
+
+class SundaeSession:
+    """A run in progress; see `~atwood.integrators.protocol.Session`.
+
+    Parameters
+    ----------
+    problem, options, t, y, yp, budget
+        As in `open_session`.
+    """
+
+    def __init__(
+        self,
+        problem: ImplicitProblem,
+        options: SolverOptions,
+        t: float,
+        y: FloatArray,
+        yp: FloatArray,
+        budget: Budget | None = None,
+    ) -> None:
+        self.budget = budget or Budget()
+        self._opened = 0.0  # when it first went on
+        self._size = problem.size
+        self._horizon = options.horizon
+        self._record = _Record()
+        self._solver = _create_solver(problem, options, self._record)
+        self._watch = EventWatch(problem, options.horizon) if problem.events is not None else None
+        self._no_events = (0,) * problem.event_count
+        self._steps = 0
+        self._starts = 0
+        self._seconds = 0.0
+        self._set_start(t, y, yp)
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the session has cost so far, over all its restarts."""
+        record, watch = self._record, self._watch
+        return Statistics(
+            steps=self._steps,
+            residual_evaluations=record.residuals,
+            jacobian_evaluations=record.jacobians,
+            event_evaluations=watch.evaluations if watch else 0,
+            missing_values=record.missing,
+            reinitializations=self._starts - 1,
+            seconds=self._seconds,
+        )
+
+    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray) -> None:
+        """Go on from another consistent state, after an event, a change of mode, or a projection."""
+        self._set_start(t, y, yp)
+
+    def advance(self, t_out: float) -> Advance:
+        """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
+
+        Parameters
+        ----------
+        t_out
+            Not before the time at which the last advance ended.
+
+        Returns
+        -------
+        Advance
+            Where it ended and why, always with a good state.
+        """
+        if not self._here[0] <= t_out < inf:
+            raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
+        began = time.perf_counter()
+        self._opened = self._opened or began
+        try:
+            with without_solver_messages(), np.errstate(all="ignore"):
+                return self._run(float(t_out))
+        except KeyboardInterrupt:
+            self._stale = True
+            return self._stopped(Status.INTERRUPTED, "interrupted")
+        except KernelEvaluationError as error:
+            self._stale = True
+            return self._stopped(Status.FAILED, str(error))
+        except BaseException:
+            self._stale = True
+            raise
+        finally:
+            self._seconds += time.perf_counter() - began
+
+    def _set_start(self, t: float, y: FloatArray, yp: FloatArray) -> None:
+        state = (float(t), np.array(y, dtype=np.float64), np.array(yp, dtype=np.float64))
+        for part in state[1:]:
+            if part.shape != (self._size,):
+                raise UsageError(f"the state has {self._size} unknowns, but was given values of shape {part.shape}")
+        if not (isfinite(t) and np.isfinite(state[1]).all() and np.isfinite(state[2]).all()):
+            raise StartError(f"the start values at t = {t} are not all finite numbers")
+        self._restart(state)
+
+    def _restart(self, state: State) -> None:
+        self._solver.init_step(*state)
+        if self._watch is not None:
+            self._watch.restart(state)
+        self._here = self._newest = state
+        self._behind = False  # whether IDA last handed out a time before the newest
+        self._root: Root | None = None
+        self._searched = state[0]
+        self._stalled = 0
+        self._stale = False
+        self._starts += 1
+
+    def _run(self, t_out: float) -> Advance:
+        if self._stale:
+            self._restart(self._here)
+        while True:
+            root = self._find_root()
+            if root is not None and root.state[0] <= t_out:
+                return self._deliver(root)
+            if t_out <= self._newest[0]:
+                self._here = self._interpolate(t_out)
+                return Advance(*_copied(self._here), Status.REACHED, self._no_events)
+            self._here = self._newest
+            limit = self._exceeded()
+            if limit is not None:
+                return limit
+            failure = self._step()
+            if failure is not None:
+                return failure
+
+    def _find_root(self) -> Root | None:
+        """Return the first root in the part of the last step that has not been handed out."""
+        watch = self._watch
+        if watch is not None and self._root is None and self._searched < self._newest[0]:
+            self._root = watch.search(self._searched, self._newest[0], self._interpolate)
+            self._searched = self._root.state[0] if self._root else self._newest[0]
+        return self._root
+
+    def _deliver(self, root: Root) -> Advance:
+        self._root = None
+        self._here = root.state
+        return Advance(*_copied(root.state), Status.EVENT, root.events)
+
+    def _interpolate(self, t: float) -> State:
+        if t == self._newest[0]:
+            return self._newest
+        result = self._solver.step(t, "normal", None)
+        if result.status < 0:
+            raise KernelEvaluationError(f"no interpolated value at t = {t:.9g} (IDA flag {result.status})")
+        self._behind = True
+        return t, result.y, result.yp
+
+    def _exceeded(self) -> Advance | None:
+        budget, t = self.budget, self._here[0]
+        if budget.poll is not None:
+            budget.poll(t)
+        if budget.max_steps is not None and self._steps >= budget.max_steps:
+            return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
+        if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
+            return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
+        return None
+
+    def _step(self) -> Advance | None:
+        """Take one internal step, and return an answer only if that failed."""
+        t_before = self._newest[0]
+        result = self._solver.step(t_before + self._horizon, "onestep", None)
+        if self._behind and result.t <= t_before:
+            # After an interpolation IDA first hands out the step that it has already taken.
+            result = self._solver.step(t_before + self._horizon, "onestep", None)
+        if result.status < 0:
+            self._stale = True
+            return self._stopped(Status.FAILED, REASONS.get(result.status, f"IDA stopped with flag {result.status}"))
+        if not isfinite(result.y.dot(result.y)) and not np.isfinite(result.y).all():
+            self._stale = True
+            return self._stopped(Status.FAILED, "the solution is no longer finite")
+        self._newest, self._behind = (result.t, result.y, result.yp), False
+        self._steps += 1
+        if result.t - t_before > 4 * ROUNDING * abs(result.t):
+            self._stalled = 0
+            if self._record.complaint:
+                self._record.clear()
+        else:
+            self._stalled += 1
+        if self._stalled >= STALLED_STEPS:
+            self._stale = True
+            return self._stopped(Status.FAILED, "the steps became too small to move the time")
+        return None
+
+    def _stopped(self, status: Status, reason: str) -> Advance:
+        t = self._here[0]
+        message, equation = f"{reason} (at t = {t:.9g})", None
+        if status is Status.FAILED and self._record.complaint:
+            message, equation = f"{message}; {self._record.complaint}", self._record.equation
+        return Advance(*_copied(self._here), status, self._no_events, message, equation)
+
+
+def _copied(state: State) -> State:
+    """Return a state whose arrays the caller may keep and change."""
+    t, y, yp = state
+    return t, y.copy(), yp.copy()
+
+
+def _create_solver(problem: ImplicitProblem, options: SolverOptions, record: _Record) -> Any:
+    """Return scikit-sundae's solver of a problem, with callbacks that count."""
+    from sksundae.ida import IDA
+
+    n = problem.size
+    rows, columns = problem.pattern
+    try:
+        tolerances = np.broadcast_to(np.asarray(options.absolute_tolerances, dtype=np.float64), (n,))
+    except ValueError:
+        raise UsageError(f"give one absolute tolerance, or one for each of the {n} unknowns") from None
+    settings: dict[str, Any] = {
+        "rtol": float(options.relative_tolerance),
+        "atol": tolerances.copy(),
+        "first_step": options.first_step or 0.0,
+        "max_step": options.max_step or 0.0,
+        "max_order": options.max_order,
+        "algebraic_idx": list(problem.algebraic) or None,
+    }
+    places: slice | IndexArray = rows * n + columns
+    if choose_linear_solver(problem, options) == "sparse":
+        settings |= {"linsolver": "sparse", "sparsity": _sparsity(problem)}
+        places = slice(None)
+    with warnings.catch_warnings():
+        # It warns that the Jacobian is taken instead of differences by the pattern, which is what is wanted.
+        warnings.simplefilter("ignore", UserWarning)
+        return IDA(_residual_callback(problem, record), jacfn=_jacobian_callback(problem, record, places), **settings)
+
+
+def _sparsity(problem: ImplicitProblem) -> Any:
+    """Return the pattern as a SciPy matrix, entry by entry in the pattern's order."""
+    from scipy.sparse import csc_matrix
+
+    rows, columns = problem.pattern
+    starts = np.searchsorted(columns, np.arange(problem.size + 1))
+    parts = (np.ones(len(rows)), rows.astype(np.int32), starts.astype(np.int32))
+    return csc_matrix(parts, shape=(problem.size, problem.size))
+
+
+def _residual_callback(problem: ImplicitProblem, record: _Record) -> Callable[..., None]:
+    function, dot, nan = problem.residual, np.dot, float("nan")
+
+    def residual(t: float, y: FloatArray, yp: FloatArray, out: FloatArray) -> None:
+        record.residuals += 1
+        if record.complaint and not np.isfinite(y).all():
+            # Newton's iteration goes on for a while after a value was missing; that says nothing new.
+            out.fill(nan)
+            return
+        try:
+            out[:] = function(t, y, yp)
+        except NO_VALUE as error:
+            record.note(t, f"the residual has no value: {error}")
+            out.fill(nan)
+            return
+        if not dot(out, out) < inf:
+            finite = np.isfinite(out)
+            if not finite.all():
+                equation = int(finite.argmin())
+                record.note(t, f"the residual of equation {equation} is {out[equation]}", equation)
+                out.fill(nan)
+
+    return residual
+
+
+def _jacobian_callback(problem: ImplicitProblem, record: _Record, places: slice | IndexArray) -> Callable[..., None]:
+    """Return the callback that writes the entries to their places in a flat view of scikit-sundae's array."""
+    function, dot, nan = problem.jacobian, np.dot, float("nan")
+    rows = problem.pattern[0]
+
+    def jacobian(t: float, y: FloatArray, yp: FloatArray, _: FloatArray, cj: float, out: FloatArray) -> None:
+        record.jacobians += 1
+        flat = out.reshape(-1)
+        try:
+            entries = np.asarray(function(t, y, yp, cj), dtype=np.float64)
+        except NO_VALUE as error:
+            record.note(t, f"the Jacobian has no value: {error}")
+            flat[places] = nan
+            return
+        flat[places] = entries
+        if not dot(entries, entries) < inf:
+            finite = np.isfinite(entries)
+            if not finite.all():
+                equation = int(rows[finite.argmin()])
+                record.note(t, f"the Jacobian of equation {equation} is not finite", equation)
+                flat[places] = nan
+
+    return jacobian

@@ -1,0 +1,369 @@
+"""What a solver driver is given, and what it gives back.
+
+A driver integrates ``F(t, y, y') = 0`` from consistent start values.  This module holds only the words that all
+drivers share: the problem, the options, the limits, and the answer of one advance.  A driver itself is a function
+with the signature of `OpenSession`.
+
+The state of a run lives in the session.  `Session.advance` goes to exactly the time asked for, or stops earlier
+for a reason that its status names; in every case it hands back a state that is part of the solution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from enum import Enum
+from typing import Any, Literal, Protocol, TypeAlias
+
+import numpy as np
+
+from atwood.arrays import FloatArray, IndexArray
+from atwood.errors import UsageError
+
+__all__ = [
+    "Advance",
+    "Budget",
+    "FloatArray",
+    "ImplicitProblem",
+    "IndexArray",
+    "LinearSolver",
+    "NativeCallbacks",
+    "OpenSession",
+    "Session",
+    "SolverOptions",
+    "Statistics",
+    "Status",
+    "choose_linear_solver",
+]
+
+Values: TypeAlias = Sequence[float] | FloatArray
+LinearSolver: TypeAlias = Literal["dense", "sparse"]
+
+SPARSE_SIZE = 90
+"""From so many unknowns on a sparse matrix pays: chains take 0.8 of the time without it at 60, and 1.6 at 120."""
+
+SPARSE_DENSITY = 0.15
+"""The largest share of entries that are not zero for which it pays."""
+
+
+@dataclass(frozen=True, eq=False)
+class NativeCallbacks:
+    """Addresses of compiled functions with SUNDIALS' own C signatures, for one session.
+
+    Residual and Jacobian return 0, or +1 where a value is not finite, which makes IDA try a smaller step.
+
+    Parameters
+    ----------
+    residual
+        An ``IDAResFn``: ``int (double t, N_Vector y, N_Vector yp, N_Vector out, void *data)``.
+    jacobian
+        An ``IDALsJacFn``: ``int (double t, double cj, N_Vector y, N_Vector yp, N_Vector out, SUNMatrix J,
+        void *data, N_Vector, N_Vector, N_Vector)``.  The matrix comes filled with zeros; a sparse one (by column)
+        has its index arrays zeroed too, so that these are written as well.
+    user_data
+        The last argument of all of them, this session's own; 0 for none.
+    weights
+        An ``IDAEwtFn``: ``int (N_Vector y, N_Vector weights, void *data)``, or 0 for none.
+    set_weights
+        ``set_weights(relative, absolute)``, called once before `weights` is used: it makes it give
+        ``1 / (relative[i] * |y[i]| + absolute[i])``.
+    events
+        An ``IDARootFn``: ``int (double t, N_Vector y, N_Vector yp, double *values, void *data)``; 0 for none.  It
+        writes the values of the problem's event functions and returns 0, or 1 where one is not finite.  It tells
+        in which steps something happens; what and when is then found out with the problem's own functions.
+    restart_events
+        ``restart_events(t)``: called before IDA starts at a time.
+    has_noticed
+        Asked where `events` did not return 0: whether that was to say that a value may have passed zero and come back
+        since they were called before, in which case they return 0 when they are called again.
+    missing_values
+        How often residual and Jacobian had no finite value so far, if somebody counts it.
+    attend
+        ``attend(t, y)``, called where `weights` have made IDA stop between two steps: None if that was not on
+        purpose, else whether the equations are written in another way from now on, at the same solution.
+    last_rate
+        The factor cj of the last Jacobian, with which it is worked out anew when the equations have changed.
+    keep
+        Whatever must live as long as the addresses are used.
+    data_bytes
+        How long what `user_data` leads to is, if it holds nothing but pointers and so may be copied; else 0.
+    """
+
+    residual: int
+    jacobian: int
+    user_data: int = 0
+    weights: int = 0
+    set_weights: Callable[[FloatArray, FloatArray], None] | None = None
+    events: int = 0
+    restart_events: Callable[[float], None] | None = None
+    has_noticed: Callable[[], bool] | None = None
+    missing_values: Callable[[], int] | None = None
+    attend: Callable[[float, FloatArray], bool | None] | None = None
+    last_rate: Callable[[], float] | None = None
+    keep: object = None
+    data_bytes: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class ImplicitProblem:
+    """The equations ``F(t, y, y') = 0`` of one mode.
+
+    The functions get arrays that are only valid during the call and must not be written to.  A function that has
+    no value at a state raises `~atwood.errors.KernelEvaluationError` (or an arithmetic error), or returns values
+    that are not finite: the solver then tries a smaller step.
+
+    Parameters
+    ----------
+    size
+        The number of unknowns and of equations.
+    residual
+        ``residual(t, y, yp)``: the values of F.
+    jacobian
+        ``jacobian(t, y, yp, cj)``: the entries of ``dF/dy + cj dF/dy'`` in the order of `pattern`.
+    pattern
+        Row and column of each entry, by column and then by row, each place once.
+    algebraic
+        The unknowns whose derivative does not appear.
+    events
+        ``events(t, y, yp)``: one value per event, which happens where its value passes through zero.
+    event_count
+        The number of events.
+    event_directions
+        For each event +1 (rising values only), -1 (falling values only) or 0 (both).  Empty: all 0.
+    event_rough
+        Numbers of the events whose exact time does not matter: they happen at the end of a step.
+    native
+        ``native(linear_solver)``: compiled forms of the residual and the Jacobian for a matrix that is dense or
+        sparse.  Each session asks once, and must not share its answer with another one.  Drivers that cannot use
+        them ignore them.
+    """
+
+    size: int
+    residual: Callable[[float, FloatArray, FloatArray], Values]
+    jacobian: Callable[[float, FloatArray, FloatArray, float], Values]
+    pattern: tuple[IndexArray, IndexArray]
+    algebraic: tuple[int, ...] = ()
+    events: Callable[[float, FloatArray, FloatArray], Values] | None = None
+    event_count: int = 0
+    event_directions: tuple[int, ...] = ()
+    event_rough: tuple[int, ...] = ()
+    native: Callable[[LinearSolver], NativeCallbacks] | None = None
+
+    def __post_init__(self) -> None:
+        if self.size < 1:
+            raise UsageError("a problem needs at least one unknown")
+        rows, columns = (np.asarray(part, dtype=np.intp) for part in self.pattern)
+        object.__setattr__(self, "pattern", (rows, columns))
+        if rows.ndim != 1 or rows.shape != columns.shape:
+            raise UsageError("the pattern needs one row and one column for each entry")
+        if rows.size and not (0 <= min(rows.min(), columns.min()) <= max(rows.max(), columns.max()) < self.size):
+            raise UsageError(f"the pattern has places outside a matrix of size {self.size}")
+        if np.any(np.diff(columns * self.size + rows) <= 0):
+            raise UsageError("the pattern must go by column and then by row, and name each place once")
+        if not all(0 <= index < self.size for index in self.algebraic):
+            raise UsageError(f"the algebraic unknowns must lie in 0..{self.size - 1}")
+        if (self.events is None) != (self.event_count == 0):
+            raise UsageError("give both the event function and the number of events, or neither")
+        if self.event_directions and len(self.event_directions) != self.event_count:
+            raise UsageError(f"{self.event_count} events need as many directions")
+        if not set(self.event_directions) <= {-1, 0, 1}:
+            raise UsageError("an event direction is -1, 0 or +1")
+
+    @property
+    def density(self) -> float:
+        """The share of the matrix that the pattern fills."""
+        return len(self.pattern[0]) / self.size**2
+
+
+@dataclass(frozen=True, eq=False)
+class SolverOptions:
+    """How accurately, and by which means.
+
+    Parameters
+    ----------
+    relative_tolerance
+        The error allowed in a step, as a share of each unknown.
+    absolute_tolerances
+        The error allowed in a step on top of that, one value for each unknown or one for all.  Unknowns that must
+        stay out of the error test, such as multipliers, get a very large one.
+    first_step
+        The first step of the run and after each `Session.reinitialize`; `None` estimates it.
+    max_step
+        The largest step; `None` for no bound.
+    max_order
+        The highest order of the method, 1 to 5.
+    linear_solver
+        ``"auto"`` takes sparse for large problems with few entries.
+    horizon
+        A typical length of the run in seconds.  An estimated first step is at most a thousandth of it.  It is an
+        option, and not taken from the first output time, so that outputs never change the solution.
+    """
+
+    relative_tolerance: float = 1e-6
+    absolute_tolerances: FloatArray | float = 1e-8
+    first_step: float | None = None
+    max_step: float | None = None
+    max_order: int = 5
+    linear_solver: Literal["auto", "dense", "sparse"] = "auto"
+    horizon: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.relative_tolerance < 1.0:
+            raise UsageError(f"the relative tolerance must lie between 0 and 1, not be {self.relative_tolerance}")
+        if not np.all(np.asarray(self.absolute_tolerances) >= 0.0):
+            raise UsageError("absolute tolerances must not be negative")
+        for name in ("first_step", "max_step", "horizon"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < np.inf:
+                raise UsageError(f"{name} must be positive and finite, not {value}")
+        if not 1 <= self.max_order <= 5:
+            raise UsageError(f"max_order must lie in 1..5, not be {self.max_order}")
+        if self.linear_solver not in ("auto", "dense", "sparse"):
+            raise UsageError(f"the linear solver is 'auto', 'dense' or 'sparse', not {self.linear_solver!r}")
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Limits of a session, looked at between internal steps.
+
+    Parameters
+    ----------
+    max_steps
+        The number of internal steps of the whole session.
+    wall_seconds
+        The time since the session first went on, whoever spends it.
+    poll
+        Called with the time reached before each internal step, for progress and cancelling.  When it raises
+        `KeyboardInterrupt` the advance ends as interrupted; any other exception passes through.
+    """
+
+    max_steps: int | None = None
+    wall_seconds: float | None = None
+    poll: Callable[[float], object] | None = None
+
+
+class Status(Enum):
+    """Why an advance ended; `STIFF` where another method was asked to take over."""
+
+    REACHED = "reached"
+    EVENT = "event"
+    FAILED = "failed"
+    STEP_LIMIT = "step_limit"
+    TIME_LIMIT = "time_limit"
+    INTERRUPTED = "interrupted"
+    STIFF = "stiff"
+
+
+@dataclass(frozen=True, eq=False)
+class Advance:
+    """Where an advance ended, and why.
+
+    Parameters
+    ----------
+    t, y, yp
+        The last good point of the solution: the time asked for, the event, or the last internal step.
+    status
+        Why it ended.
+    events
+        For each event function +1 (passed zero rising), -1 (falling) or 0 (did not happen).
+    message
+        The reason in words, where it ended neither at the time asked for nor at an event.
+    equation
+        The index of the first equation that had no finite value, where that is known to be the reason.
+    """
+
+    t: float
+    y: FloatArray
+    yp: FloatArray
+    status: Status
+    events: tuple[int, ...] = ()
+    message: str = ""
+    equation: int | None = None
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a session has cost so far; the sum of two is what both have cost.
+
+    Parameters
+    ----------
+    steps
+        Accepted internal steps.
+    residual_evaluations, jacobian_evaluations, event_evaluations
+        Calls of the problem's functions, for whatever purpose.
+    missing_values
+        Those of the calls that gave no finite value.
+    reinitializations
+        Restarts of the method.
+    seconds
+        Time spent inside `Session.advance`.
+    error_test_failures, convergence_failures
+        Steps that were repeated; `None` where a driver cannot tell.
+    """
+
+    steps: int = 0
+    residual_evaluations: int = 0
+    jacobian_evaluations: int = 0
+    event_evaluations: int = 0
+    missing_values: int = 0
+    reinitializations: int = 0
+    seconds: float = 0.0
+    error_test_failures: int | None = None
+    convergence_failures: int | None = None
+
+    def __add__(self, other: Statistics) -> Statistics:
+        sums: dict[str, Any] = {}
+        for field in fields(self):
+            mine, theirs = getattr(self, field.name), getattr(other, field.name)
+            sums[field.name] = None if mine is None or theirs is None else mine + theirs
+        return Statistics(**sums)
+
+
+class Session(Protocol):
+    """A run in progress."""
+
+    def advance(self, t_out: float) -> Advance:
+        """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
+
+        Parameters
+        ----------
+        t_out
+            Not before the time at which the last advance ended.
+        """
+        ...
+
+    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray) -> None:
+        """Go on from another consistent state, after an event, a change of mode, or a projection.
+
+        An event that the session has just reported at this time, and whose value is still about zero, does not
+        happen again.
+        """
+        ...
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the session has cost so far, over all its restarts."""
+        ...
+
+
+class OpenSession(Protocol):
+    """The signature of a driver."""
+
+    def __call__(
+        self,
+        problem: ImplicitProblem,
+        options: SolverOptions,
+        t: float,
+        y: FloatArray,
+        yp: FloatArray,
+        budget: Budget | None = None,
+    ) -> Session:
+        """Start a run from consistent values."""
+        ...
+
+
+def choose_linear_solver(problem: ImplicitProblem, options: SolverOptions) -> LinearSolver:
+    """Return the linear solver that the options and the pattern ask for."""
+    if options.linear_solver != "auto":
+        return options.linear_solver
+    return "sparse" if problem.size >= SPARSE_SIZE and problem.density < SPARSE_DENSITY else "dense"

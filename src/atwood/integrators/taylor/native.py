@@ -1,0 +1,246 @@
+"""The Taylor-series method as machine code: no Python runs between outputs.
+
+The code of the steps is the same for all systems and comes from the cache after the first time.  What a system adds is
+its recurrences, as two compiled programs.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from ctypes import c_double, c_int, c_int64, c_void_p
+from dataclasses import replace
+from itertools import accumulate
+from math import inf, log2
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from atwood.codegen.llvm.build import Built, build_code, default_options
+from atwood.codegen.llvm.module import CodeOptions, Part
+from atwood.codegen.once import once
+from atwood.errors import UsageError
+from atwood.expr.series.taylor import TaylorPrograms
+from atwood.integrators.dop853.reference import no_interpolation
+from atwood.integrators.dop853.stepping_code import WIDTH
+from atwood.integrators.event_location import State
+from atwood.integrators.explicit_problem import Counts, Outcome, absolute_tolerances
+from atwood.integrators.protocol import FloatArray, SolverOptions
+from atwood.integrators.taylor.code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
+from atwood.integrators.taylor.problem import DEFECT, FLOOR, TaylorProblem, choose_order, share_of_radius
+from atwood.integrators.taylor.stepping_code import LANES, ROWS, STRIDE, positions
+
+__all__ = ["CompiledRecurrences", "CompiledStepper"]
+
+_UNLIMITED = 2**62
+_NO_VALUE = 3
+_PACKED = (0, 1, 2)
+"""The groups of results of the program of an order whose rows lie in blocks: left, right and squares."""
+
+_LINE = 8
+"""Numbers in one line of the processor's cache: every array begins with one."""
+
+
+class CompiledRecurrences:
+    """The recurrences of a system as machine code, for any parameter values.
+
+    Parameters
+    ----------
+    programs
+        The recurrences, made for `~atwood.integrators.taylor.stepping_code.LANES`.
+    """
+
+    def __init__(self, programs: TaylorPrograms) -> None:
+        self.programs = programs
+        self.size = len(programs.start.inputs[1].symbols)
+        order = Part("order", programs.order, positions(programs.pairs, programs.squares, self.size), LANES, _PACKED)
+        parts = [Part("start", programs.start), order]
+        self.built = build_code(parts, replace(default_options(parts), contract=True))
+        self.addresses = self.built.code.addresses
+
+    def bind(self, parameter_values: ArrayLike) -> FloatArray:
+        """Return what depends on parameters alone."""
+        values = np.array(parameter_values, dtype=np.float64)
+        count = len(self.programs.start.parameters)
+        if values.shape != (count,):
+            raise UsageError(f"needs {count} parameter values, got an array of {values.shape}")
+        derived, scratch = np.empty(len(self.programs.start.prologue)), np.empty(self.built.scratch)
+        prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self.addresses["start_prologue"])
+        prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
+        return derived
+
+
+class CompiledStepper:
+    """The state of a run; see `~atwood.integrators.explicit_problem.Stepper`.
+
+    Parameters
+    ----------
+    problem
+        The recurrences.
+    options
+        The accuracy.
+    order
+        The order of the method; None takes the one that suits the tolerance.
+    """
+
+    def __init__(self, problem: TaylorProblem, options: SolverOptions, order: int | None = None) -> None:
+        if problem.compiled is None:
+            raise UsageError("there is no machine code of these recurrences")
+        recurrences, derived = problem.compiled()
+        self._size, self._options = recurrences.size, options
+        self._keep = recurrences, derived
+        chosen = choose_order(options) if order is None else order
+        self._lay_out(recurrences, derived)
+        n = self._size
+        self._arrays[ROWS["floors"]] = 1.0
+        self._arrays[ROWS["floors"], :n] = absolute_tolerances(options, n) / options.relative_tolerance
+        programs = recurrences.programs
+        self._set_count("size", n)
+        self._set_count("padded", self._arrays.shape[1])
+        self._set_count("order", chosen)
+        self._set_count("pair_blocks", -(-programs.pairs // LANES))
+        self._set_count("square_blocks", -(-programs.squares // LANES))
+        self._set("share", log2(share_of_radius(chosen, options.relative_tolerance)))
+        self._set("allowed", DEFECT * options.relative_tolerance + FLOOR)
+        self._set("longest", options.max_step or inf)
+        self._set("stop_time", problem.stop_time)
+        self._set("reach", problem.reach)
+        self._set("first", options.first_step or 0.0)
+        self._evaluate, self._run, self._interpolate, self._sample = _functions()
+
+    def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray) -> None:
+        """Find a place for everything, in one piece of memory, and write down where it is."""
+        programs, n = recurrences.programs, self._size
+        padded = -(-n // WIDTH) * WIDTH
+        known = len(programs.order.parameters)
+        pairs, squares = -(-programs.pairs // LANES), -(-programs.squares // LANES)
+        lengths = {
+            "pointers": len(POINTERS),
+            "numbers": len(NUMBERS),
+            "counts": len(COUNTS),
+            "tables": 16,
+            "values": 2 * n,
+            "known": known,
+            "spare": known,
+            "derived": len(programs.order.prologue),
+            "scratch": recurrences.built.scratch,
+            "arrays": ROWS["all"] * padded,
+            "pair_sums": pairs * LANES,
+            "square_sums": squares * LANES,
+            "table": (2 * pairs + squares) * STRIDE,
+        }
+        ends = [0, *accumulate(-(-length // _LINE) * _LINE for length in lengths.values())]
+        memory = np.zeros(ends[-1] + _LINE)
+        base = memory.ctypes.data
+        skipped = -(base // 8) % _LINE
+        memory, base = memory[skipped:], base + 8 * skipped
+        pieces = {name: memory[at : at + length] for (name, length), at in zip(lengths.items(), ends, strict=False)}
+        places = {name: base + 8 * at for name, at in zip(lengths, ends, strict=False)}
+        self._numbers, self._counts = pieces["numbers"], pieces["counts"].view(np.int64)
+        self._arrays = pieces["arrays"].reshape(ROWS["all"], padded)
+        self._values = pieces["values"].reshape(2, n)
+        self._table = pieces["table"]
+
+        def row(name: str) -> int:
+            return places["arrays"] + 8 * padded * ROWS[name]
+
+        def number(name: str) -> int:
+            return places["numbers"] + 8 * NUMBERS.index(name)
+
+        tables = pieces["tables"].view(np.uint64)
+        tables[0:2] = number("t_new"), row("new")
+        tables[2:4] = row("new_rates"), places["known"]
+        tables[4:6] = number("time"), row("trial")
+        tables[6:8] = row("trial_rates"), places["spare"]
+        tables[8:11] = places["pair_sums"], places["square_sums"], places["numbers"]
+        names = ("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out")
+        places |= {name: places["tables"] + 8 * at for name, at in zip(names, (0, 2, 4, 6, 8, 12), strict=True)}
+        code = recurrences.addresses
+        places |= {"start": code["start"], "prologue": code["order_prologue"], "recurrence": code["order"]}
+        places["start_derived"] = derived.ctypes.data
+        pieces["pointers"].view(np.uint64)[:] = [places[name] for name in POINTERS]
+        self._session, self._new = c_void_p(places["pointers"]), (places["new_in"], places["new_out"])
+        self._outputs = c_void_p(places["values"]), c_void_p(places["values"] + 8 * n)
+
+    @property
+    def counts(self) -> Counts:
+        """What it has done so far, over all starts."""
+        return Counts(*self._counts[_STEPS : _STEPS + 5].tolist())
+
+    def start(self, t: float, y: FloatArray) -> bool:
+        """Start anew from a state; return whether it has finite rates."""
+        n, arrays = self._size, self._arrays
+        for name in ("t", "t_old", "t_new"):
+            self._set(name, t)
+        self._set("last", 0.0)
+        arrays[: ROWS["y"]] = 0.0
+        self._table[:] = 0.0  # nothing that is not finite must be left
+        for name in ("y", "new"):
+            arrays[ROWS[name], :n] = y
+        arrays[0, :n] = y
+        arrays[ROWS["y_low"]] = 0.0
+        if self._evaluate(self._session, *self._new):
+            return False
+        arrays[ROWS["rates"]] = rates = arrays[ROWS["new_rates"]]
+        with np.errstate(all="ignore"):
+            steepest = float(np.max(np.abs(rates[:n]) / (arrays[ROWS["floors"], :n] + np.abs(y))))
+        longest = min(self._options.horizon, self._options.max_step or inf)
+        self._set("unit", min(longest, 1.0 / steepest if steepest > 0.0 else inf))
+        return True
+
+    def state(self) -> State:
+        """Return time, values and rates at the end of the last step."""
+        n, arrays = self._size, self._arrays
+        return float(self._numbers[_T]), arrays[ROWS["y"], :n].copy(), arrays[ROWS["rates"], :n].copy()
+
+    def run(self, t_stop: float, steps: int) -> Outcome:
+        """Take steps until one ends at or after a time, but no more than so many."""
+        self._set("stop", t_stop)
+        self._set_count("limit", int(self._counts[_STEPS]) + min(steps, _UNLIMITED))
+        return Outcome(self._run(self._session))
+
+    def interpolate(self, t: float) -> State:
+        """Return the state at a time within the last step."""
+        if self._interpolate(self._session, t, *self._outputs) or not np.isfinite(self._values).all():
+            raise no_interpolation(t)
+        return t, self._values[0].copy(), self._values[1].copy()
+
+    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
+        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        y, yp = np.empty((2, len(times), self._size))
+        self._set_count("limit", int(self._counts[_STEPS]) + min(steps, _UNLIMITED))
+        tables = (array.ctypes.data for array in (y, yp))
+        outcome = self._sample(self._session, times.ctypes.data, len(times), *tables)
+        filled = int(self._counts[COUNTS.index("filled")])
+        if outcome == _NO_VALUE:
+            raise no_interpolation(float(times[filled]))
+        return y[:filled], yp[:filled], Outcome(outcome)
+
+    def _set(self, name: str, value: float) -> None:
+        self._numbers[NUMBERS.index(name)] = value
+
+    def _set_count(self, name: str, value: int) -> None:
+        self._counts[COUNTS.index(name)] = value
+
+
+_T, _STEPS = NUMBERS.index("t"), COUNTS.index("steps")
+
+
+@once
+def _code() -> Built:
+    """Return the code of the steps."""
+    return build_code([], CodeOptions(level=2), more=step_code(), exports=FUNCTIONS)
+
+
+@once
+def _functions() -> tuple[Callable[..., int], ...]:
+    """Return the functions `evaluate`, `run`, `interpolate` and `sample`."""
+    addresses = _code().code.addresses
+    shapes = {
+        "evaluate": (c_void_p, c_void_p, c_void_p),
+        "run": (c_void_p,),
+        "interpolate": (c_void_p, c_double, c_void_p, c_void_p),
+        "sample": (c_void_p, c_void_p, c_int64, c_void_p, c_void_p),
+    }
+    return tuple(ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items())

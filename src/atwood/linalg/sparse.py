@@ -1,0 +1,208 @@
+"""Linear algebra on the entries of large matrices; imported only where there are such.
+
+Least-norm solutions come from the normal equations with a small multiple of the unit matrix added, whose influence
+later passes take out again: each multiplies what is missing in a direction by ``d / (s^2 + d)``, where s is its
+singular value (iterated regularisation, Engl, Hanke and Neubauer, Regularization of Inverse Problems, section 5.1).
+Directions in which nothing acts keep their zero.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
+from scipy.sparse.linalg import splu
+
+from atwood.arrays import FloatArray
+
+__all__ = [
+    "csr_least_norm",
+    "csr_made_of",
+    "csr_of",
+    "csr_row_sizes",
+    "csr_scaled",
+    "free_columns",
+    "rows_are_independent",
+    "smallest_direction",
+    "solve_bordered",
+    "without_inertia",
+]
+
+
+_SHARE = 1e-10
+"""What is added to the normal equations, relative to their largest diagonal entry."""
+
+_PASSES = 12
+_BLOCK = 256
+
+
+def csr_of(rows: Any, columns: Any, entries: Any, shape: tuple[int, int]) -> csr_array:
+    """Return the matrix with the given entries."""
+    values = np.asarray(entries, dtype=float)
+    return csr_array((values, (np.asarray(rows, dtype=np.int32), np.asarray(columns, dtype=np.int32))), shape=shape)
+
+
+def csr_scaled(matrix: Any, columns: FloatArray, rows: FloatArray | None) -> csr_array:
+    """Return a matrix with each column multiplied by one number, and each row divided by another."""
+    wide = csr_array(matrix @ diags_array(columns))
+    return wide if rows is None else csr_array(diags_array(1.0 / rows) @ wide)
+
+
+def csr_row_sizes(matrix: Any, scales: FloatArray) -> FloatArray:
+    """Return the largest absolute value in each row after scaling its columns."""
+    wide = abs(csr_scaled(matrix, scales, None))
+    found: FloatArray = wide.max(axis=1).toarray().ravel() if wide.nnz else np.zeros(wide.shape[0])
+    return found
+
+
+def _factorised(square: Any, share: float) -> Any:
+    """Return a solver for a symmetric matrix that is positive definite once a share of its size is added."""
+    diagonal = square.diagonal()
+    size = float(np.max(diagonal, initial=0.0)) or 1.0
+    shifted = csc_array(square + (share * size) * eye_array(square.shape[0]))
+    options = {"SymmetricMode": True}
+    return splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+
+
+def csr_least_norm(matrix: Any, right: FloatArray) -> FloatArray:
+    """Return the shortest solution of a linear system, or the best where there is none."""
+    wide = matrix.shape[0] <= matrix.shape[1]
+    across = matrix.T.tocsr()
+    solver = _factorised(matrix @ across if wide else across @ matrix, _SHARE)
+    found = np.zeros(matrix.shape[1])
+    last = np.inf
+    for _ in range(_PASSES):
+        missing = right - matrix @ found
+        gradient = across @ missing
+        size = float(np.linalg.norm(gradient))
+        if not size < 0.5 * last:
+            break
+        last = size
+        found = found + (across @ solver.solve(missing) if wide else solver.solve(gradient))
+        if size == 0.0:
+            break
+    return found
+
+
+def _row_normalised(matrix: Any) -> csr_array | None:
+    sizes = np.sqrt((matrix * matrix).sum(axis=1))
+    return None if np.any(sizes == 0.0) else csr_array(diags_array(1.0 / sizes) @ matrix)
+
+
+def rows_are_independent(matrix: Any, tolerance: float) -> bool:
+    """Return whether it is certain that no row depends on others: the smallest singular value is well above zero."""
+    if matrix.shape[0] > matrix.shape[1]:
+        return False
+    unit = _row_normalised(matrix)
+    if unit is None:
+        return False
+    value, _ = smallest_direction(unit @ unit.T.tocsr())
+    return value > max(100.0 * tolerance**2, 1e-12)
+
+
+def smallest_direction(square: Any, iterations: int = 40) -> tuple[float, FloatArray]:
+    """Return the smallest eigenvalue of a symmetric matrix without negative ones, relative to its size, and its vector.
+
+    By inverse iteration, which comes from above.
+
+    Parameters
+    ----------
+    square
+        The matrix.
+    iterations
+        At most so many.
+    """
+    n = square.shape[0]
+    size = float(np.max(square.diagonal(), initial=0.0)) or 1.0
+    solver = _factorised(square, 1e-15)
+    vector = np.cos(np.arange(n) * np.sqrt(2.0)) + 0.01  # no symmetry singles it out
+    vector /= np.linalg.norm(vector)
+    value = np.inf
+    for _ in range(iterations):
+        vector = solver.solve(vector)
+        length = float(np.linalg.norm(vector))
+        if not np.isfinite(length) or length == 0.0:
+            return 0.0, np.full(n, 1.0 / np.sqrt(n))
+        vector /= length
+        last, value = value, float(vector @ (square @ vector)) / size
+        if abs(last - value) <= 1e-2 * abs(value):
+            break
+    return max(value, 0.0), vector
+
+
+def without_inertia(mass: Any, slope: Any, sizes: FloatArray) -> FloatArray | None:
+    """Return how much each coordinate moves in a direction that nothing gives inertia to; None if there is none.
+
+    Parameters
+    ----------
+    mass
+        The mass matrix.
+    slope
+        Derivatives of the independent constraints.
+    sizes
+        Size of each coordinate.
+    """
+    weight = diags_array(sizes)
+    square = weight @ mass @ weight
+    square = square / (float(np.max(square.diagonal(), initial=0.0)) or 1.0)
+    if slope.shape[0]:
+        held = slope @ weight
+        held = diags_array(1.0 / np.maximum(csr_row_sizes(slope, sizes), 1e-300)) @ held
+        square = square + held.T @ held
+    value, vector = smallest_direction(csr_array(square))
+    return np.abs(vector) if value <= 1e-14 else None
+
+
+def csr_made_of(kept: Any, others: Any) -> FloatArray:
+    """Return how often each of some independent rows is in others, shape (others, kept)."""
+    solver = _factorised(csr_array(kept @ kept.T), 1e-15)
+    found: FloatArray = solver.solve((kept @ others.T).toarray()).T
+    return found
+
+
+def free_columns(matrix: Any) -> NDArray[np.bool_]:
+    """Return which unknowns of a linear system are not determined by it.
+
+    These have a share in its null space: ``1 - (A^+ A)_ii`` is not zero.
+    """
+    matrix = matrix.copy()
+    matrix.eliminate_zeros()
+    single = np.diff(matrix.indptr) == 1
+    own = np.unique(matrix[single].indices)  # given by themselves
+    found = np.zeros(matrix.shape[1], dtype=bool)
+    rest = np.setdiff1d(np.arange(matrix.shape[1]), own)
+    if not len(rest):
+        return found
+    left = csr_array(matrix[:, rest])
+    left = csr_array(left[np.diff(left.indptr) > 0])
+    if not left.shape[0]:
+        found[rest] = True
+        return found
+    solver = _factorised(left @ left.T.tocsr(), 1e-13)
+    for start in range(0, len(rest), _BLOCK):
+        columns = left[:, start : start + _BLOCK].toarray()
+        inside = np.einsum("ij,ij->j", columns, solver.solve(columns))
+        found[rest[start : start + _BLOCK]] = 1.0 - inside > 1e-6
+    return found
+
+
+def solve_bordered(mass: Any, slope: Any, bias: FloatArray, gamma: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Return a and lambda of ``M a + bias = G^T lambda``, ``G a + gamma = 0``; None where they are not determined."""
+    matrix = csc_array(block_array([[mass, -slope.T], [slope, None]])) if slope.shape[0] else csc_array(mass)
+    right = np.concatenate([-bias, -gamma])
+    large = abs(matrix)
+    size = np.sqrt(np.maximum(large.max(axis=1).toarray(), large.max(axis=0).toarray()).ravel())
+    size[size == 0.0] = 1.0
+    scale = diags_array(1.0 / size)
+    balanced = csc_array(scale @ matrix @ scale)
+    try:
+        solver = splu(balanced)
+    except RuntimeError:  # a pivot is exactly zero
+        return None
+    found = solver.solve(right / size)
+    if not np.all(np.isfinite(found)):
+        return None
+    found = (found + solver.solve(right / size - balanced @ found)) / size
+    return found[: len(bias)], found[len(bias) :]

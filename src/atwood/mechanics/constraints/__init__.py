@@ -1,0 +1,1 @@
+"""Constraints: values and rates, elimination, and constraints on velocities."""

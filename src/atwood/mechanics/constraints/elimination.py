@@ -1,0 +1,143 @@
+"""What constraints leave to be solved: those that are linear are used up, those that nothing can change are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+from atwood.errors import TopologyError
+from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, substitute
+from atwood.mechanics.constraints.values import Values
+from atwood.mechanics.dynamics.inertia import Masses
+from atwood.mechanics.kinematics.mechanism import CLOSES, Mechanism, decide, extent
+from atwood.model.local.laws import LocalConstraint
+from atwood.topology.forest import Forest
+
+__all__ = ["SOLVED", "check_held", "drop_closed", "eliminate_linear"]
+
+
+def check_held(
+    mechanism: Mechanism,
+    masses: Masses,
+    forest: Forest,
+    q: Sequence[Expression],
+    values: Values,
+    on_velocities: Sequence[tuple[str, LocalConstraint]],
+) -> None:
+    """Refuse a body that has no mass and that no joint or constraint holds."""
+    weightless = _weightless(mechanism, masses, forest)
+    for one in forest.attachments:
+        if one.joint is not None or not weightless.issuperset(one.coordinates):
+            continue
+        own = [q[number] for number in one.coordinates]
+        if not on_velocities and not any(depends_on(value, own) for _, _, value in values):
+            raise TopologyError(
+                "it hangs free and has no mass: a force would accelerate it without bound",
+                where=mechanism.bodies.bodies[one.body].name,
+                advice="Connect it to something that has a mass or holds it, give it a mass, or remove it.",
+            )
+
+
+class _Solved:
+    """Marks a constraint that elimination has used up."""
+
+
+SOLVED: Expression = _Solved()  # type: ignore[assignment]
+
+
+def eliminate_linear(
+    mechanism: Mechanism,
+    masses: Masses,
+    forest: Forest,
+    q: Sequence[Expression],
+    values: Values,
+    before: Mapping[Expression, Expression] | None = None,
+) -> dict[Expression, Expression]:
+    """Solve linear constraints for one coordinate each; mark them in `values`.
+
+    Coordinates of what has no mass go first, then those that were met last, so that the names that a reader expects
+    stay. What was eliminated before is given by `before`.
+    """
+    parameters = mechanism.table.values
+    weightless = _weightless(mechanism, masses, forest)
+    charts = {number for chart in forest.charts for number in chart.coordinates}
+    curved = [s for number, s in enumerate(q) if number in charts]
+    flat = [s for number, s in enumerate(q) if number not in charts]
+    solution = dict(before or {})
+    for number, (path, constraint, original) in enumerate(values):
+        value = substitute([original], solution)[0]
+        if depends_on(value, curved):
+            continue
+        free = [s for s in flat if s not in solution]
+        affine = affine_coefficients(value, free, list(parameters))
+        if affine is None:
+            continue
+        coefficients, remainder = affine
+        light = [q.index(symbol) in weightless for symbol in free]
+        index = decide(mechanism, partial(_pivot, list(coefficients), light))
+        if index is None:
+            continue
+        pivot = coefficients[index]
+        total = remainder
+        for i, coefficient in enumerate(coefficients):
+            if i != index:
+                total = total + coefficient * free[i]
+        expression = -total / pivot
+        solution = {s: substitute([e], {free[index]: expression})[0] for s, e in solution.items()}
+        solution[free[index]] = mechanism.table.graph.convert(expression)
+        values[number] = (path, constraint, SOLVED)
+    return solution
+
+
+def _pivot(coefficients: list[Expression], light: list[bool], mechanism: Mechanism) -> int | None:
+    """Return which coordinate to solve a linear constraint for: a weightless one, or the last; None if there is none.
+
+    What is smaller than a tenth of the largest coefficient is not divided by.
+    """
+    sizes = [abs(c) for c in evaluate(coefficients, mechanism.table.values)] if coefficients else []
+    largest = max(sizes, default=0.0)
+    if largest == 0.0:
+        return None
+    return max((i for i, size in enumerate(sizes) if size >= 0.1 * largest), key=lambda i: (light[i], i))
+
+
+def _weightless(mechanism: Mechanism, masses: Masses, forest: Forest) -> set[int]:
+    """Return the numbers of the coordinates that only place a body without mass."""
+    nodes = {node for one in masses.coupled for node in one.nodes}
+    nodes |= {mechanism.graph.node_of[path, one.frame.name] for path, one in masses.varying}
+    moving = {path: local for path, local in mechanism.locals_.items() if local.lagrangians}
+    nodes |= {mechanism.graph.node_of[path, name] for path, local in moving.items() for name in local.connectors}
+    massive = {mechanism.bodies.body_of[node] for node in nodes} | set(masses.bodies)
+    return {number for one in forest.attachments if one.body not in massive for number in one.coordinates}
+
+
+Prescribed = tuple[tuple[tuple[str, str, int], Expression], ...]
+
+
+def drop_closed(mechanism: Mechanism, q: Sequence[Expression], values: Values) -> tuple[Values, Prescribed]:
+    """Take out the constraints that no coordinate can change; return the rest, and those that depend on time.
+
+    Those that do not are checked here; functions of time are checked when it is known for which times.
+    """
+    kept: Values = []
+    prescribed = []
+    for path, constraint, value in values:
+        if depends_on(value, q):
+            kept.append((path, constraint, value))
+            continue
+        if depends_on(value, mechanism.relations.roots):
+            prescribed.append(((path, constraint.law.name, constraint.index), value))
+            continue
+        decide(mechanism, partial(_check_closed, f"{path}.{constraint.law.name}", value))
+    return kept, tuple(prescribed)
+
+
+def _check_closed(where: str, value: Expression, mechanism: Mechanism) -> None:
+    """Refuse a constraint between what is fixed that does not hold."""
+    (miss,) = evaluate([value], mechanism.table.values)
+    if not abs(miss) <= CLOSES * (extent(mechanism) or 1.0):
+        raise TopologyError(
+            f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
+            where=where,
+            advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
+        )

@@ -1,0 +1,219 @@
+"""Constraint forces that laws of force read, as functions of the state.
+
+Friction needs the normal force, which is known only together with the accelerations.  In maximal coordinates, where
+every joint has its multipliers, both solve ``M a - G^T lambda = -w``, ``G a = -gamma``, in which w is what is left of
+the balance of forces, and depends on some of the multipliers: z.  They solve ``z = z_0 - A w(z)``.  Where w is affine
+in z that is a linear system; else Newton's method is written out, from the multipliers without these forces on, and
+what has not converged has no value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from atwood.errors import AtwoodError, UnsupportedError
+from atwood.expr import Expression, absolute, depends_on, jacobian, select, solve, sqrt, substitute
+from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of, minimum_degree
+from atwood.mechanics.dynamics.equations import Constraint, Equations
+from atwood.mechanics.kinematics.mechanism import Mechanism
+from atwood.model.local.parts import multiplier_symbol
+
+__all__ = ["known_multipliers", "with_known"]
+
+_ITERATIONS = 6
+"""Each step squares the error; from a friction of half the normal force on, this many reach that of rounding."""
+
+_CONVERGED = 1e-9
+"""Relative to the multipliers: what is further from a solution after all steps is none."""
+
+_LARGEST_FILL = 20_000
+"""Beyond so many products the system is solved in numbers."""
+
+
+def _check_reads(mechanism: Mechanism, read: Sequence[Expression], constraints: Sequence[Constraint]) -> None:
+    """Refuse a law of force that reads a multiplier which nothing determines.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    read
+        Multipliers that laws of force read.
+    constraints
+        The constraints in maximal coordinates.
+
+    Raises
+    ------
+    UnsupportedError
+        With the path of the constraint. One that is dropped, since what it would turn needs no orientation, exerts
+        nothing.
+    """
+    graph = mechanism.table.graph
+    known = {one.multiplier for one in constraints}
+    known |= {multiplier_symbol(graph, *key) for key in mechanism.bodies.idle}
+    for symbol in read:
+        if symbol not in known:
+            raise UnsupportedError(
+                "a force reads this reaction, which nothing determines: all that the constraint joins is fixed or "
+                "prescribed",
+                where=symbol.name.removeprefix("lambda:").partition("[")[0],
+                advice="Give the part that reads it a force of its own, such as an input.",
+            )
+
+
+def known_multipliers(
+    mechanism: Mechanism, equations: Equations, read: Sequence[Expression]
+) -> dict[Expression, Expression]:
+    """Return the multipliers that forces read, in terms of time, coordinates and speeds.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    equations
+        Its equations in maximal coordinates, whose rows may depend on multipliers, with independent constraints.
+    read
+        The multipliers wanted.
+
+    Raises
+    ------
+    UnsupportedError
+        If nothing determines one of them.
+    """
+    _check_reads(mechanism, read, equations.constraints)
+    rows, speeds, accelerations = equations.rows, equations.speeds, equations.accelerations
+    constraints = equations.constraints
+    graph, n = equations.graph, len(speeds)
+    number = {one.multiplier: n + i for i, one in enumerate(constraints)}
+    wanted = [symbol for symbol in read if symbol in number]
+    known: dict[Expression, Expression] = {symbol: graph.zero for symbol in read if symbol not in number}
+    if not wanted:
+        return known
+    at_rest = dict.fromkeys(accelerations, graph.zero)
+    bias = substitute(list(rows), {**at_rest, **known})
+    stand_ins = {i: graph.symbol(f"force row {i}") for i, row in enumerate(bias) if depends_on(row, wanted)}
+    right = [-stand_ins.get(i, row) for i, row in enumerate(bias)]
+    right += [-one for one in substitute([one.second for one in constraints], at_rest)]
+    solved = _solve_system(rows, speeds, accelerations, constraints, right)
+    found = [solved[number[symbol]] for symbol in wanted]
+    forces, values = list(stand_ins.values()), [bias[i] for i in stand_ins]
+    slopes = jacobian(found, forces)
+    shares = {(r, c): e for r, c, e in zip(slopes.rows, slopes.columns, slopes.entries, strict=True)}
+    rest = substitute(found, dict.fromkeys(forces, graph.zero))
+    try:
+        found = _fixed_point(wanted, rest, shares, values)
+    except AtwoodError as error:
+        raise UnsupportedError(
+            f"a force reads a reaction that is always the same here, at which it has no slope ({error.message})",
+            where=wanted[0].name.removeprefix("lambda:").partition("[")[0],
+            advice="Round off the law there, as sqrt(n*n + a*a) instead of sqrt(n*n) with a small force a.",
+        ) from error
+    return {**known, **dict(zip(wanted, found, strict=True))}
+
+
+def _solve_system(
+    rows: Sequence[Expression],
+    speeds: Sequence[Expression],
+    accelerations: Sequence[Expression],
+    constraints: Sequence[Constraint],
+    right: Sequence[Expression],
+) -> list[Expression]:
+    """Return accelerations and multipliers for a right-hand side: written out if that is short, else in numbers."""
+    graph, n, size = rows[0].graph, len(speeds), len(right)
+    mass = jacobian(list(rows), list(accelerations))
+    slope = jacobian([one.rate for one in constraints], list(speeds))
+    full = {(r, c): e for r, c, e in zip(mass.rows, mass.columns, mass.entries, strict=True)}
+    slopes = {(n + r, c): e for r, c, e in zip(slope.rows, slope.columns, slope.entries, strict=True)}
+    upper = {(r, c): e for (r, c), e in full.items() if r <= c} | {(c, r): e for (r, c), e in slopes.items()}
+    order = [*range(n), *(i for i in minimum_degree(_after(list(upper), n, size), size) if i >= n)]
+    if all((i, i) in full for i in range(n)) and fill_of(list(upper), order) <= _LARGEST_FILL:
+        try:
+            steps = eliminate(SymmetricSystem(upper, right, [1] * n + [-1] * (size - n)), order)
+        except (AtwoodError, KeyError):  # a pivot that is always zero
+            steps = []
+        if steps:
+            known: dict[int, Expression] = {}
+            for step in reversed(steps):
+                known[step.unknown] = back_substitute(step, known)
+            return [known[i] for i in range(size)]
+    matrix = [[full.get((i, j), graph.zero) for j in range(size)] for i in range(size)]
+    for (i, j), entry in slopes.items():
+        matrix[i][j], matrix[j][i] = entry, -entry
+    return [graph.convert(one) for one in solve(matrix, list(right))]
+
+
+def _after(places: Sequence[tuple[int, int]], n: int, size: int) -> list[tuple[int, int]]:
+    """Return where constraints meet when the masses have been eliminated."""
+    near: dict[int, set[int]] = {i: {i} for i in range(n)}
+    for i, j in places:
+        if j < n:
+            near[i].add(j)
+            near[j].add(i)
+    held: dict[int, set[int]] = {}
+    for i, j in places:
+        if i < n <= j:
+            for k in near[i]:
+                held.setdefault(k, set()).add(j)
+    return [(a, b) for group in held.values() for a in group for b in group if a < b < size]
+
+
+def _fixed_point(
+    unknowns: Sequence[Expression],
+    rest: Sequence[Expression],
+    shares: Mapping[tuple[int, int], Expression],
+    forces: Sequence[Expression],
+) -> list[Expression]:
+    """Return z with ``z = rest + shares w(z)``."""
+    graph, count = rest[0].graph, len(unknowns)
+    slopes = jacobian(list(forces), list(unknowns))
+    turns = {(r, c): e for r, c, e in zip(slopes.rows, slopes.columns, slopes.entries, strict=True)}
+    is_affine = not any(depends_on(entry, list(unknowns)) for entry in turns.values())
+
+    def times(matrix: Mapping[tuple[int, int], Expression], vector: Sequence[Expression]) -> list[Expression]:
+        total = [graph.zero] * count
+        for (r, c), entry in matrix.items():
+            total[r] = total[r] + entry * vector[c]
+        return total
+
+    matrix = [[graph.one if i == j else graph.zero for j in range(count)] for i in range(count)]
+    for (r, k), share in shares.items():
+        for (k2, c), turn in turns.items():
+            if k == k2:
+                matrix[r][c] = matrix[r][c] - share * turn
+    entries = [entry for row in matrix for entry in row]
+
+    def gaps_at(values: Sequence[Expression]) -> list[Expression]:
+        """Return by how much values miss the equations."""
+        given = times(shares, substitute(list(forces), dict(zip(unknowns, values, strict=True))))
+        return [z - r - g for z, r, g in zip(values, rest, given, strict=True)]
+
+    def step(values: Sequence[Expression]) -> list[Expression]:
+        there = substitute(entries, dict(zip(unknowns, values, strict=True)))
+        rows = [there[i * count : (i + 1) * count] for i in range(count)]
+        gaps = gaps_at(values)
+        moves = [graph.convert(one) for one in solve(rows, gaps)]
+        if is_affine:
+            return [value - move for value, move in zip(values, moves, strict=True)]
+        # A solution stays where it is: where nothing presses, the size of a force has no slope.
+        is_open = sum((absolute(gap) for gap in gaps), graph.zero) > 0.0
+        return [select(is_open, value - move, value) for value, move in zip(values, moves, strict=True)]
+
+    none = [graph.zero] * count
+    if is_affine:
+        return step(none)
+    values = [-gap for gap in gaps_at(none)]
+    for _ in range(_ITERATIONS):
+        values = step(values)
+    gaps = gaps_at(values)
+    size = sum((absolute(one) for one in (*values, *rest)), graph.zero)
+    miss = sum((absolute(one) for one in gaps), graph.zero)
+    # The square root of minus one where Newton's method has not converged: no value rather than a wrong one.
+    valid = sqrt(select(miss <= _CONVERGED * size, graph.one, -graph.one))
+    return [graph.convert(value * valid) for value in values]
+
+
+def with_known(equations: Equations, read: Mapping[Expression, Expression]) -> Equations:
+    """Return equations with functions of the state in place of the multipliers that forces read."""
+    rows = tuple(substitute(list(equations.rows), dict(read)))
+    return replace(equations, rows=rows, read=dict(read), rows_with_multipliers=equations.rows)

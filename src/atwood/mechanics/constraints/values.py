@@ -1,0 +1,239 @@
+"""Constraints where their parts are: their values, and their rates as the dual of their forces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from atwood.errors import UnsupportedError
+from atwood.expr import Expression, depends_on, jvp, live, substitute
+from atwood.mechanics.dynamics.equations import Constraint, Integral, constraint_levels, put_in_place
+from atwood.mechanics.dynamics.forces import (
+    Site,
+    in_body,
+    in_coordinates,
+    is_on_velocities,
+    joint_slopes,
+    local_map,
+    rate_symbol,
+    slopes_of,
+)
+from atwood.mechanics.kinematics.mechanism import Mechanism
+from atwood.mechanics.kinematics.motion import Movement
+from atwood.mechanics.kinematics.orientation import spin_in_world
+from atwood.mechanics.kinematics.positions import Kinematics, Placements
+from atwood.model.local.laws import LocalConstraint, LocalPart
+from atwood.model.values.vector import Vector, cross
+from atwood.topology.forest import Forest
+
+__all__ = [
+    "LeftOver",
+    "Values",
+    "constraint_values",
+    "find_constraints",
+    "holds_velocities",
+    "levels",
+    "velocity_levels",
+]
+
+Values = list[tuple[str, LocalConstraint, Expression]]
+"""Constraints with the path of their part and an expression: their value, or their multiplier."""
+
+
+@dataclass(frozen=True)
+class LeftOver:
+    """The constraints that the forest does not solve.
+
+    Attributes
+    ----------
+    on_positions
+        Holonomic ones.
+    on_velocities
+        Those that hold velocities only.
+    """
+
+    on_positions: tuple[tuple[str, LocalConstraint], ...]
+    on_velocities: tuple[tuple[str, LocalConstraint], ...]
+
+
+def holds_velocities(mechanism: Mechanism) -> bool:
+    """Return whether a scene has a constraint on velocities."""
+    for local in mechanism.locals_.values():
+        if local.constraints:
+            read = {node.index for node in live([one.value for one in local.constraints])}
+            if any(symbol.index in read for symbol in local.velocities):
+                return True
+    return False
+
+
+def find_constraints(mechanism: Mechanism, forest: Forest, placements: Placements) -> LeftOver:
+    """Return the constraints that hold only if somebody sees to it, in joint coordinates where these are known.
+
+    Raises
+    ------
+    UnsupportedError
+        If one follows the output of another component.
+    """
+    positions: list[tuple[str, LocalConstraint]] = []
+    velocities: list[tuple[str, LocalConstraint]] = []
+    for path, local in mechanism.locals_.items():
+        for constraint in local.constraints:
+            if depends_on(constraint.value, list(local.signal_symbols.values())):
+                raise UnsupportedError(
+                    "a constraint cannot follow the output of another component",
+                    where=f"{path}.{constraint.law.name}",
+                    advice="Give the input as a function of time.",
+                )
+            if (path, constraint.law.name, constraint.index) in forest.solved or constraint.value.is_zero:
+                continue
+            one = in_coordinates(local, constraint, placements)
+            (velocities if is_on_velocities(local, one.value) else positions).append((path, one))
+    return LeftOver(tuple(positions), tuple(velocities))
+
+
+def constraint_values(
+    mechanism: Mechanism, site: Site, placements: Placements, left: Sequence[tuple[str, LocalConstraint]]
+) -> Values:
+    """Return the value of each constraint in terms of coordinates."""
+    still = Kinematics(placements, placements.positions, {}, {}, {}, {}, {})
+    maps = {path: local_map(site, mechanism.locals_[path], still) for path in {path for path, _ in left}}
+    return [(path, c, put_in_place(c.value, maps[path])) for path, c in left]
+
+
+def levels(
+    mechanism: Mechanism, site: Site, state: Movement, chosen: Values, placed: Sequence[Expression]
+) -> list[Constraint]:
+    """Return holonomic constraints with their time derivatives.
+
+    Parameters
+    ----------
+    mechanism, site, state
+        Where things are and how they move.
+    chosen
+        The constraints with their multipliers.
+    placed
+        Their values in terms of coordinates.
+    """
+    found = []
+    by_parts = mechanism.space.name == "space"
+    symbols = (state.coordinates, state.rates, state.speeds, state.accelerations)
+    rates, seconds = constraint_levels([] if by_parts else placed, mechanism.time, *symbols)
+    for number, ((path, one, multiplier), value) in enumerate(zip(chosen, placed, strict=True)):
+        if by_parts:
+            rate = _rate_by_slopes(site, mechanism.locals_[path], one, state.kinematics, mechanism.time)
+            second = _differentiated_twice(site, mechanism.locals_[path], one, state.kinematics, mechanism.time)
+        else:
+            rate, second = rates[number], seconds[number]
+        key = (path, one.law.name, one.index)
+        found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier))
+    return found
+
+
+def velocity_levels(
+    mechanism: Mechanism,
+    site: Site,
+    state: Movement,
+    chosen: Values,
+    signals: Mapping[Expression, Expression],
+    integrals: Mapping[tuple[str, str, int], Integral],
+) -> list[Constraint]:
+    """Return constraints on velocities with their time derivative; those that are integrals hold positions too.
+
+    Raises
+    ------
+    UnsupportedError
+        If one is not affine in the velocities.
+    """
+    found = []
+    for path, one, multiplier in chosen:
+        local = mechanism.locals_[path]
+        _check_affine(path, local, one)
+        mapping = {**local_map(site, local, state.kinematics), **signals}
+        rate = put_in_place(one.value, mapping)
+        second = _differentiated(site, local, one.value, state.kinematics, mechanism.time)
+        key = (path, one.law.name, one.index)
+        integral = integrals.get(key)
+        value = None if integral is None else integral.value
+        found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier, integral is not None))
+    return found
+
+
+def _check_affine(path: str, local: LocalPart, one: LocalConstraint) -> None:
+    velocities = [s for connector in local.connectors.values() for s in (*connector.velocity, *connector.spin)]
+    slopes = [slope for velocity in velocities for slope in jvp([one.value], {velocity: 1.0})]
+    if any(depends_on(slope, velocities) for slope in slopes):
+        raise UnsupportedError(
+            "a constraint on velocities must be linear in them",
+            where=f"{path}.{one.law.name}",
+            advice="Write it as a sum of velocities times functions of positions, angles and time.",
+        )
+
+
+def _rate_by_slopes(
+    site: Site, local: LocalPart, one: LocalConstraint, kinematics: Kinematics, time: Expression
+) -> Expression:
+    """Return the rate of a constraint: the virtual power of its force for a multiplier of one, and what time adds."""
+    graph, mapping = site.graph, local_map(site, local, kinematics)
+    (total,) = substitute(jvp([one.value], {time: 1.0}), mapping)
+    for name, slopes, turning in slopes_of(local, one.value, graph.constant(1.0)):
+        node = site.node(local.part.path, name)
+        body = site.bodies.body_of[node]
+        for slope, v in zip(substitute(slopes, mapping), kinematics.velocities[node], strict=True):
+            total = total + slope * v
+        if turning and not all(slope.is_zero for slope in turning):
+            torque = in_body(site, node, substitute(turning, mapping))
+            for t, w in zip(torque, kinematics.angular_velocities[body], strict=True):
+                total = total + t * w
+    for symbol, slope in joint_slopes(local, one.value):
+        total = total + substitute([slope], mapping)[0] * kinematics.joint_rates[symbol]
+    return total
+
+
+def _differentiated_twice(
+    site: Site, local: LocalPart, one: LocalConstraint, kinematics: Kinematics, time: Expression
+) -> Expression:
+    (rate,) = jvp([one.value], _first_directions(local, time))
+    return _differentiated(site, local, rate, kinematics, time)
+
+
+def _first_directions(local: LocalPart, time: Expression) -> dict[Expression, Expression | float]:
+    """Return how the local symbols of positions and orientations go on in time."""
+    directions: dict[Expression, Expression | float] = {time: 1.0}
+    directions.update({symbol: rate_symbol(symbol) for symbol in local.formulas})
+    for symbols in local.connectors.values():
+        directions.update(zip(symbols.position, symbols.velocity, strict=True))
+        if symbols.angle is not None and symbols.angular_speed is not None:
+            directions[symbols.angle] = symbols.angular_speed
+        if symbols.axes is not None and symbols.angular_velocity is not None:
+            for axis in symbols.axes:
+                directions.update(zip(axis, cross(symbols.angular_velocity, axis), strict=True))
+    return directions
+
+
+def _differentiated(
+    site: Site, local: LocalPart, value: Expression, kinematics: Kinematics, time: Expression
+) -> Expression:
+    """Return the time derivative of an expression of local positions, orientations and velocities, put in place."""
+    graph, path = site.graph, local.part.path
+    directions = _first_directions(local, time)
+    mapping = local_map(site, local, kinematics)
+    for symbol in local.formulas:
+        if symbol in kinematics.joint_accelerations:
+            changing = directions[rate_symbol(symbol)] = graph.symbol(f"{symbol.name}''")
+            mapping[changing] = kinematics.joint_accelerations[symbol]
+    for name, symbols in local.connectors.items():
+        node = site.node(path, name)
+        body = site.bodies.body_of[node]
+        for k, v in enumerate(symbols.velocity):
+            directions[v] = graph.symbol(f"{v.name}'")
+            mapping[graph.symbol(f"{v.name}'")] = kinematics.accelerations[node][k]
+        if symbols.spin and body in kinematics.angular_accelerations:
+            spin_rate: Sequence[Expression] = kinematics.angular_accelerations[body]
+            if len(symbols.spin) == 3:
+                turned: Vector = spin_in_world(spin_rate, kinematics.placements.axes[body])
+                spin_rate = [graph.convert(c) for c in turned]
+            for w, alpha in zip(symbols.spin, spin_rate, strict=True):
+                directions[w] = graph.symbol(f"{w.name}'")
+                mapping[graph.symbol(f"{w.name}'")] = alpha
+    (rate,) = jvp([value], directions)
+    return put_in_place(rate, mapping)

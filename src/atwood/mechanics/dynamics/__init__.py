@@ -1,0 +1,1 @@
+"""Inertia, forces and the equations of motion."""

@@ -1,0 +1,352 @@
+"""The equations of motion: d'Alembert's principle, as one reverse sweep through the velocity program.
+
+The generalized force on speed u_k is the sum over all nodes and bodies of ``(m a - F) . dv/du_k`` and
+``(J alpha - tau) dw/du_k`` (Goldstein, section 1.4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
+from atwood.mechanics.dynamics.forces import Forces, Site, constraint_forces, local_map, part_forces
+from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
+from atwood.mechanics.kinematics.body_points import arm_of
+from atwood.mechanics.kinematics.orientation import inertial_torque, torque_components
+from atwood.mechanics.kinematics.positions import BodyShape, Kinematics
+from atwood.model.declare.contributions import BodyInertia
+from atwood.model.local.laws import LocalConstraint, LocalPart
+from atwood.model.values.vector import cross
+from atwood.topology.charts import Chart
+from atwood.topology.forest import Coordinate, Forest
+
+__all__ = ["Constraint", "Equations", "Integral", "balance_rows", "inertia_forces"]
+
+
+Lifted = tuple[Mapping[int, tuple[Expression, ...]], Mapping[int, tuple[Expression, ...]]]
+"""Accelerations less that of free fall, of nodes and of reference points."""
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A constraint that is not solved by the coordinates.
+
+    Attributes
+    ----------
+    key
+        (part path, law, number within the law).
+    reaction
+        Name of the reaction that its multiplier is reported as.
+    sign
+        The reaction is `sign` times the multiplier.
+    value, rate, second
+        The residual and its first and second time derivatives; the rate is affine in the speeds. A constraint on
+        velocities that is no derivative of one on positions has no value: then the rate is its residual.
+    multiplier
+        The symbol of the multiplier.
+    holonomic
+        Whether it holds positions, and not only velocities.
+    """
+
+    key: tuple[str, str, int]
+    reaction: str
+    sign: float
+    value: Expression | None
+    rate: Expression
+    second: Expression
+    multiplier: Expression
+    holonomic: bool = True
+
+    @property
+    def label(self) -> str:
+        """Path of the constraint, for messages and reports."""
+        path, law, number = self.key
+        is_one_of_several = "." in self.reaction or self.reaction.endswith(f"_{number + 1}")
+        return f"{path}.{law}" + (f"[{number}]" if is_one_of_several else "")
+
+
+@dataclass(frozen=True)
+class Integral:
+    """A constraint on positions that one on velocities, or several, turned out to be.
+
+    Attributes
+    ----------
+    keys
+        The constraints, as (part, law, number); it takes the place of the last one.
+    value
+        What stays zero, of time and coordinates.
+    constant
+        The constant that the start gives: a parameter, or zero.
+    on_velocities
+        Whether they are constraints on velocities, and not one on a single coordinate, which then stays where it is.
+    """
+
+    keys: tuple[tuple[str, str, int], ...]
+    value: Expression
+    constant: Expression
+    on_velocities: bool = True
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The equations of motion of one form of a scene, with everything they were made of.
+
+    Attributes
+    ----------
+    graph
+        Where expressions live.
+    forest
+        How the configuration is computed.
+    site
+        Where parts are.
+    locals_
+        What the parts contribute.
+    masses
+        All inertia.
+    shapes
+        Shapes of the bodies.
+    kinematics
+        Positions, velocities, accelerations.
+    time, coordinates, speeds, accelerations
+        The symbols. There may be more coordinates than speeds; accelerations are the speeds' derivatives.
+    names, speed_names
+        Names and units of the coordinates and of the speeds.
+    rates
+        Derivatives of the coordinates, affine in the speeds; the speeds themselves unless there are charts.
+    rows
+        For each speed, inertial less applied generalized force; zero if there are no constraints.
+    constraint_rows
+        For each speed, the generalized force of the constraints; ``rows - constraint_rows = 0`` is the motion.
+    constraints
+        The constraints that are left.
+    eliminated
+        Coordinates that linear constraints gave as functions of the others, by name.
+    prescribed
+        Constraints that no coordinate can change and that depend on time, with their residuals.
+    charts
+        Groups of coordinates that stand for an orientation together.
+    solved_speeds
+        Speeds that constraints on velocities gave as functions of the others, by name.
+    integrals
+        Constraints on velocities that turned out to be ones on positions.
+    read
+        The multipliers that laws of force read, as functions of the state; `rows` has these in their place.
+    rows_with_multipliers
+        In maximal coordinates, the rows as they are: with the multipliers themselves; empty if they have none.
+    """
+
+    graph: Graph
+    forest: Forest
+    site: Site
+    locals_: Mapping[str, LocalPart]
+    masses: Masses
+    shapes: Mapping[int, BodyShape]
+    kinematics: Kinematics
+    time: Expression
+    coordinates: tuple[Expression, ...]
+    speeds: tuple[Expression, ...]
+    accelerations: tuple[Expression, ...]
+    names: tuple[Coordinate, ...]
+    speed_names: tuple[Coordinate, ...]
+    rates: tuple[Expression, ...]
+    rows: tuple[Expression, ...]
+    constraint_rows: tuple[Expression, ...]
+    constraints: tuple[Constraint, ...]
+    eliminated: tuple[str, ...]
+    prescribed: tuple[tuple[tuple[str, str, int], Expression], ...]
+    charts: tuple[Chart, ...] = ()
+    solved_speeds: tuple[str, ...] = ()
+    integrals: tuple[Integral, ...] = ()
+    read: Mapping[Expression, Expression] = field(default_factory=dict)
+    rows_with_multipliers: tuple[Expression, ...] = ()
+
+    @property
+    def multipliers(self) -> tuple[Expression, ...]:
+        """The symbols of the multipliers."""
+        return tuple(one.multiplier for one in self.constraints)
+
+
+def inertia_forces(
+    site: Site,
+    masses: Masses,
+    kinematics: Kinematics,
+    lifted: Lifted,
+    forces: Forces,
+) -> dict[int, list[Expression]]:
+    """Return ``m (a - g)`` at the centre of mass of each body, and add the inertia of masses spread between nodes.
+
+    Parameters
+    ----------
+    site, masses, kinematics
+        The mechanism.
+    lifted
+        What `lifted_accelerations` gave.
+    forces
+        Takes up, with its sign reversed, what acts at nodes and the inertial torques.
+    """
+    at_nodes, at_references = lifted
+    at_centers: dict[int, list[Expression]] = {}
+    for index, one in masses.bodies.items():
+        at_centers[index] = [site.graph.convert(one.mass * a) for a in at_references[index]]
+        if index in kinematics.angular_accelerations:
+            spins = kinematics.angular_velocities[index], kinematics.angular_accelerations[index]
+            forces.twist(index, [-c for c in inertial_torque(one.moment, *spins)])
+    for spread in masses.coupled:
+        for i, node in enumerate(spread.nodes):
+            total: list[Scalar] = [0.0] * len(at_nodes[node])
+            for j in range(len(spread.nodes)):
+                total = [t + spread.masses[i][j] * a for t, a in zip(total, at_nodes[spread.nodes[j]], strict=True)]
+            forces.push(node, [-t for t in total])
+    for path, body in masses.varying:
+        lifted_node = at_nodes[site.node(path, body.frame.name)]
+        push_body(site, kinematics, forces, path, body, (lifted_node, (0.0,) * len(lifted_node)))
+    return at_centers
+
+
+def push_body(
+    site: Site,
+    kinematics: Kinematics,
+    forces: Forces,
+    path: str,
+    body: BodyInertia,
+    falling: tuple[Sequence[Scalar], Sequence[Scalar]],
+) -> None:
+    """Add the inertial force of a rigid body, taken to its frame's node.
+
+    Parameters
+    ----------
+    site, kinematics
+        The mechanism.
+    forces
+        Takes up the force, and the torque about the node.
+    path, body
+        The part and its inertia.
+    falling
+        Acceleration of the node, and that of free fall, unless the first is without it.
+    """
+    space = site.space
+    node = site.node(path, body.frame.name)
+    index, turn = site.bodies.body_of[node], site.node_turns[node]
+    arm = arm_of(kinematics, index, turn, body.center_of_mass, space)
+    parts = zip(falling[0], arm.acceleration, falling[1], strict=True)
+    force = [site.graph.convert(-body.mass * (a + swing - g)) for a, swing, g in parts]
+    forces.push(node, force)
+    if not space.has_rotation:
+        return
+    about_node = torque_components(
+        cross(space.vector(arm.position), space.vector(tuple(force))), kinematics.placements.axes.get(index), space
+    )
+    spins = kinematics.angular_velocities.get(index), kinematics.angular_accelerations.get(index)
+    if spins[0] is None or spins[1] is None:
+        forces.twist(index, about_node, node)
+        return
+    moment = turned_tensor(tensor_of(path, body), turn) if space.name == "space" else body.moment
+    turning = inertial_torque(moment, spins[0], spins[1])
+    forces.twist(index, [t - i for t, i in zip(about_node, turning, strict=True)], node)
+
+
+def balance_rows(
+    kinematics: Kinematics,
+    at_centers: Mapping[int, Sequence[Expression]],
+    forces: Forces,
+    speeds: Sequence[Expression],
+) -> list[Expression]:
+    """Return, for each speed, the virtual power of inertial less other forces: one reverse sweep.
+
+    Parameters
+    ----------
+    kinematics
+        The velocity program.
+    at_centers
+        Inertial forces at the reference points of bodies.
+    forces
+        Forces on nodes and torques on bodies.
+    speeds
+        The symbols of the speeds.
+    """
+    outputs: list[Expression] = []
+    cotangents: list[Expression] = []
+    for index, inertial in at_centers.items():
+        outputs += kinematics.reference_velocities[index]
+        cotangents += inertial
+    for node, force in forces.on_nodes.items():
+        outputs += kinematics.velocities[node]
+        cotangents += [-f for f in force]
+    for body, torque in forces.on_bodies.items():
+        if body in kinematics.angular_velocities:
+            outputs += kinematics.angular_velocities[body]
+            cotangents += [-c for c in torque]
+    for symbol, force_on_joint in forces.on_joints.items():
+        outputs.append(kinematics.joint_rates[symbol])
+        cotangents.append(-force_on_joint)
+    kept = [(o, c) for o, c in zip(outputs, cotangents, strict=True) if not c.is_zero and not o.is_zero]
+    if not kept:
+        zero = forces.graph.constant(0.0)
+        return [zero for _ in speeds]
+    return vjp([o for o, _ in kept], [c for _, c in kept], list(speeds))
+
+
+def motion_rows(
+    site: Site,
+    locals_: Mapping[str, LocalPart],
+    masses: Masses,
+    kinematics: Kinematics,
+    lifted: Lifted,
+    signals: Mapping[Expression, Expression],
+    speeds: Sequence[Expression],
+) -> list[Expression]:
+    """Return, for each speed, inertial less applied generalized force."""
+    forces = Forces(site.graph)
+    at_centers = inertia_forces(site, masses, kinematics, lifted, forces)
+    for local in locals_.values():
+        part_forces(site, local, kinematics, {**local_map(site, local, kinematics), **signals}, forces)
+    return balance_rows(kinematics, at_centers, forces, speeds)
+
+
+def force_rows(
+    site: Site,
+    locals_: Mapping[str, LocalPart],
+    kinematics: Kinematics,
+    chosen: Sequence[tuple[str, LocalConstraint, Expression]],
+    signals: Mapping[Expression, Expression],
+    speeds: Sequence[Expression],
+) -> list[Expression]:
+    """Return, for each speed, the generalized force of constraints with the given multipliers."""
+    forces = Forces(site.graph)
+    for path, constraint, multiplier in chosen:
+        local = locals_[path]
+        mapping = {**local_map(site, local, kinematics), **signals}
+        constraint_forces(site, local, constraint.value, multiplier, mapping, forces)
+    return [-row for row in balance_rows(kinematics, {}, forces, speeds)]
+
+
+def constraint_levels(
+    values: Sequence[Expression],
+    time: Expression,
+    coordinates: Sequence[Expression],
+    rates: Sequence[Expression],
+    speeds: Sequence[Expression],
+    accelerations: Sequence[Expression],
+) -> tuple[list[Expression], list[Expression]]:
+    """Return the first and second time derivatives of constraints on positions: one sweep for all of them.
+
+    Parameters
+    ----------
+    values
+        Their residuals, of time and coordinates.
+    time, coordinates, speeds, accelerations
+        The symbols.
+    rates
+        Derivatives of the coordinates.
+    """
+    first: dict[Expression, Expression | float] = {time: 1.0, **dict(zip(coordinates, rates, strict=True))}
+    if not values:
+        return [], []
+    found = jvp(values, first)
+    return found, jvp(found, {**first, **dict(zip(speeds, accelerations, strict=True))})
+
+
+def put_in_place(value: Expression, mapping: Mapping[Expression, Expression]) -> Expression:
+    """Return an expression of local symbols where the part is."""
+    return substitute([value], mapping)[0]

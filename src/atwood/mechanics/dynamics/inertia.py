@@ -1,0 +1,285 @@
+"""Inertia: the masses of all parts, added up body by body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.errors import DeclarationError, ParameterError
+from atwood.expr import Expression, Scalar, evaluate, is_zero
+from atwood.mechanics.kinematics.orientation import NodeTurn, rotate
+from atwood.model.declare.contributions import BodyInertia
+from atwood.model.local.laws import LocalPart
+from atwood.model.values.rotation import Axes, from_axes, transposed
+from atwood.model.values.space import Space
+from atwood.model.values.vector import ZERO as _ZERO
+from atwood.model.values.vector import Vector, dot
+from atwood.solids.checks import symmetric_part, verify_moments
+from atwood.topology.bodies import Bodies
+from atwood.topology.graph import MechanismGraph
+
+__all__ = [
+    "CoupledMass",
+    "Masses",
+    "RigidMass",
+    "add_masses",
+    "check_masses",
+    "check_tensors",
+    "shifted_tensor",
+    "sum_vectors",
+    "tensor_of",
+    "turned_tensor",
+]
+
+
+@dataclass(frozen=True)
+class RigidMass:
+    """Inertia of a body.
+
+    Attributes
+    ----------
+    mass
+        kg.
+    center
+        Centre of mass in the axes of the body, m.
+    moment
+        Moment of inertia about it, kg m^2; in space the tensor, as its columns in the axes of the body.
+    parts
+        Paths of the parts it comes from.
+    """
+
+    mass: Scalar
+    center: Vector
+    moment: Scalar | Axes
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CoupledMass:
+    """A mass that is spread between several nodes: kinetic energy ``1/2 sum m_ij v_i . v_j``."""
+
+    part: str
+    nodes: tuple[int, ...]
+    masses: tuple[tuple[Scalar, ...], ...]
+
+
+@dataclass(frozen=True)
+class Masses:
+    """All inertia of a scene.
+
+    Attributes
+    ----------
+    bodies
+        Inertia of each body that has mass and is not fixed.
+    coupled
+        Masses spread between nodes.
+    fixed_parts
+        Parts whose inertia cannot move.
+    varying
+        Rigid bodies whose inertia changes with time, with the paths of their parts; single points that do are among
+        the coupled masses.
+    """
+
+    bodies: Mapping[int, RigidMass]
+    coupled: tuple[CoupledMass, ...]
+    fixed_parts: tuple[str, ...]
+    varying: tuple[tuple[str, BodyInertia], ...] = ()
+
+
+def add_masses(
+    mechanism: MechanismGraph,
+    bodies: Bodies,
+    locals_: Mapping[str, LocalPart],
+    layouts: Mapping[int, tuple[Mapping[int, Vector], Mapping[int, NodeTurn]]],
+    space: Space,
+) -> Masses:
+    """Add up the inertia of all parts, with the parallel-axis theorem (Goldstein, section 5.3).
+
+    Parameters
+    ----------
+    mechanism, bodies, locals_, space
+        The mechanism.
+    layouts
+        Offset and turn of each node in each body.
+    """
+    shares: dict[int, list[RigidMass]] = {}
+    coupled: list[CoupledMass] = []
+    fixed: list[str] = []
+    varying: list[tuple[str, BodyInertia]] = []
+
+    def share(part: str, node: int, mass: Scalar, center: Vector, moment: Scalar | Axes) -> None:
+        body = bodies.body_of[node]
+        if is_zero(mass) and _is_nothing(moment):
+            return
+        if body == 0:
+            fixed.append(part)
+            return
+        offsets, turns = layouts[body]
+        turn = turns[node]
+        if isinstance(moment, tuple):
+            moment = turned_tensor(moment, turn)
+        shares.setdefault(body, []).append(RigidMass(mass, offsets[node] + rotate(center, turn), moment, (part,)))
+
+    nothing: Scalar | Axes = (_ZERO, _ZERO, _ZERO) if space.name == "space" else 0.0
+    for path, local in locals_.items():
+        for point in local.point_inertias:
+            nodes = tuple(mechanism.node_of[(path, p.name)] for p in point.points)
+            if len(nodes) == 1 and point not in local.varying:
+                share(path, nodes[0], point.masses[0][0], Vector(0.0, 0.0, 0.0), nothing)
+            elif not all(is_zero(m) for row in point.masses for m in row):
+                if all(bodies.body_of[node] == 0 for node in nodes):
+                    fixed.append(path)
+                else:
+                    coupled.append(CoupledMass(path, nodes, tuple(tuple(row) for row in point.masses)))
+        for body in local.body_inertias:
+            node = mechanism.node_of[(path, body.frame.name)]
+            if body in local.varying:
+                varying.append((path, body)) if bodies.body_of[node] else fixed.append(path)
+                continue
+            moment = tensor_of(path, body) if space.name == "space" else body.moment
+            share(path, node, body.mass, body.center_of_mass, moment)
+    merged = {index: _merge(found) for index, found in shares.items()}
+    return Masses(merged, tuple(coupled), tuple(fixed), tuple(varying))
+
+
+def tensor_of(path: str, body: BodyInertia) -> Axes:
+    """Return the inertia tensor of a rigid body about its centre of mass, as its columns.
+
+    Raises
+    ------
+    DeclarationError
+        If the part gives none, as a part of the plane need not.
+    """
+    if body.tensor is None:
+        raise DeclarationError(
+            "in space a rigid body needs an inertia tensor, and this part gives a moment about one axis only",
+            where=path,
+            advice="Give its BodyInertia a tensor.",
+        )
+    rows = [list(row) for row in body.tensor]
+    return Vector(*rows[0]), Vector(*rows[1]), Vector(*rows[2])
+
+
+def check_tensors(locals_: Mapping[str, LocalPart], values: Mapping[Expression, float], space: Space) -> None:
+    """Refuse inertia that no body can have: not symmetric, a negative principal moment, one beyond the others' sum.
+
+    In a plane only the moment about its normal counts, and the others need not be given: they may all be zero.
+
+    Raises
+    ------
+    ParameterError
+        With the path of the part.
+    """
+    for path, local in locals_.items():
+        for body in local.body_inertias:
+            entries = [entry for row in body.tensor or () for entry in row]
+            if not entries or body in local.varying or all(is_zero(entry) for entry in entries):
+                continue
+            graph = next(iter(values)).graph if values else None
+            numbers = evaluate([graph.convert(entry) for entry in entries], values) if graph else entries
+            tensor = np.array(numbers, dtype=float).reshape(3, 3)
+            if space.name == "plane" and tensor[1, 1] > 0.0 and np.count_nonzero(tensor) == 1:
+                continue
+            try:
+                verify_moments(symmetric_part(tensor))
+            except ParameterError as error:
+                raise ParameterError(error.message, where=path, advice=error.advice) from error
+
+
+def check_masses(masses: Masses, values: Mapping[Expression, float]) -> None:
+    """Refuse bodies whose masses add up to less than nothing; one that depends on time is known only later.
+
+    Raises
+    ------
+    ParameterError
+        With the paths of the parts.
+    """
+    found = [(" and ".join(one.parts), one.mass) for one in masses.bodies.values()]
+    found += [(one.part, row[i]) for one in masses.coupled for i, row in enumerate(one.masses)]
+    for where, mass in found:
+        if isinstance(mass, Expression) and not mass.is_parametric:
+            continue
+        number = evaluate([mass], values)[0] if isinstance(mass, Expression) else float(mass)
+        if number < 0.0:
+            raise ParameterError(
+                f"the mass of the body is {number:.6g} kg in all, and no body has less than none",
+                where=where,
+                advice="A part may take mass away, as a hole does, but not more than there is.",
+            )
+
+
+def _is_nothing(moment: Scalar | Axes) -> bool:
+    return all(is_zero(c) for v in moment for c in v) if isinstance(moment, tuple) else is_zero(moment)
+
+
+def turned_tensor(tensor: Axes, turn: NodeTurn) -> Axes:
+    """Return a tensor given in the axes of a node in those of its body: ``C J C^T``."""
+    assert isinstance(turn, tuple)
+    back = transposed(turn)
+    columns = [from_axes(turn, from_axes(tensor, column)) for column in back]
+    return columns[0], columns[1], columns[2]
+
+
+def _merge(shares: Sequence[RigidMass]) -> RigidMass:
+    if len(shares) == 1:
+        return shares[0]
+    parts = tuple(path for one in shares for path in one.parts)
+    mass = _total([one.mass for one in shares])
+    if all(_same(one.center, shares[0].center) for one in shares):
+        return RigidMass(mass, shares[0].center, _total_moment([one.moment for one in shares]), parts)
+    massive = [one for one in shares if not is_zero(one.mass)]
+    if not massive:
+        return RigidMass(mass, shares[0].center, _total_moment([one.moment for one in shares]), parts)
+    center = massive[0].center * massive[0].mass
+    for one in massive[1:]:
+        center = center + one.center * one.mass
+    center = center / mass
+    moments = [_shifted(one.moment, one.mass, one.center - center) for one in shares]
+    return RigidMass(mass, center, _total_moment(moments), parts)
+
+
+def _shifted(moment: Scalar | Axes, mass: Scalar, r: Vector) -> Scalar | Axes:
+    """Return a moment or tensor about a point at a distance from the centre of mass."""
+    if not isinstance(moment, tuple):
+        return moment + mass * (r.x * r.x + r.z * r.z)
+    return shifted_tensor(moment, mass, r)
+
+
+def shifted_tensor(moment: Axes, mass: Scalar, r: Vector) -> Axes:
+    """Return a tensor about a point at a distance from the centre of mass: ``J + m (r^2 1 - r r)``."""
+    square = dot(r, r)
+    units = (Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0))
+    x, y, z = (moment[i] + (units[i] * square - r * r[i]) * mass for i in range(3))
+    return x, y, z
+
+
+def _total_moment(moments: Sequence[Scalar | Axes]) -> Scalar | Axes:
+    if not isinstance(moments[0], tuple):
+        return _total(moments)
+    x, y, z = (sum_vectors([one[i] for one in moments if isinstance(one, tuple)]) for i in range(3))
+    return x, y, z
+
+
+def sum_vectors(vectors: Sequence[Vector]) -> Vector:
+    """Return the sum of some vectors."""
+    total = vectors[0]
+    for vector in vectors[1:]:
+        total = total + vector
+    return total
+
+
+def _total(values: Sequence[Scalar]) -> Scalar:
+    total = values[0]
+    for value in values[1:]:
+        total = total + value
+    return total
+
+
+def _same(a: Vector, b: Vector) -> bool:
+    return all(p is q or (is_zero(p) and is_zero(q)) or _equal_numbers(p, q) for p, q in zip(a, b, strict=True))
+
+
+def _equal_numbers(p: Scalar, q: Scalar) -> bool:
+    return not isinstance(p, Expression) and not isinstance(q, Expression) and bool(p == q)

@@ -1,0 +1,1 @@
+"""Positions, orientations and velocities of every node and body."""

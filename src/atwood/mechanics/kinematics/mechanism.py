@@ -1,0 +1,207 @@
+"""A scene as bodies and joints, and what is decided about it by the size of numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+from atwood.errors import TopologyError
+from atwood.expr import Expression, Scalar, evaluate
+from atwood.expr.core.relations import TimeRelations, values_just_after
+from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, plain, rotate
+from atwood.model.local.laws import LocalPart, ParameterTable
+from atwood.model.values.rotation import as_rotation, compose
+from atwood.model.values.space import Space
+from atwood.model.values.vector import Vector, as_vector
+from atwood.topology.bodies import Bodies
+from atwood.topology.graph import Joint, MechanismGraph
+
+__all__ = ["CLOSES", "Mechanism", "check_closures", "decide", "extent", "from_start", "make_gravity", "started_at"]
+
+T = TypeVar("T")
+
+CLOSES = 1e-9
+"""Relative to the extent of the mechanism: how far rigid parts may miss each other and still count as joined."""
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A scene as bodies and joints on local symbols, before a form is chosen.
+
+    Attributes
+    ----------
+    table
+        The parameters.
+    time
+        The symbol of time.
+    space
+        What the scene lives in.
+    gravity
+        Acceleration of free fall, m/s^2, a symbol or zero.
+    locals_, graph, bodies
+        Parts, nodes and bodies.
+    links
+        For each linked input, the output that feeds it.
+    sides
+        On a line, the signs of lengths as the start values tell them; None elsewhere, and where they were given.
+    decisions
+        What shaped the equations by the size of numbers: how each was decided, and how it came out.
+    places
+        Where the scene starts, by form and by the symbols of its coordinates; None where nothing depends on it: then
+        constraints on velocities stay what they are.
+    constants
+        Further parameters, whose values the start gives: for each, by which form's coordinates it is said, and what it
+        is the value of there. One may depend on those before it.
+    t_start
+        When it starts, s.
+    idle_spins
+        The axis, in the axes of the body, of each body that has no inertia about it; see `idle_spin`.
+    """
+
+    table: ParameterTable
+    time: Expression
+    space: Space
+    gravity: Vector
+    locals_: Mapping[str, LocalPart]
+    graph: MechanismGraph
+    bodies: Bodies
+    links: Mapping[tuple[str, str], tuple[str, str]]
+    sides: Mapping[tuple[str, str, str], float] | None = None
+    decisions: list[tuple[Callable[[Mechanism], object], object]] = field(default_factory=list)
+    places: Mapping[str, Mapping[Expression, float]] | None = None
+    constants: dict[Expression, tuple[str, Expression]] = field(default_factory=dict)
+    t_start: float = 0.0
+    idle_spins: Mapping[int, Vector] = field(default_factory=dict)
+
+    def known_at_start(self) -> dict[Expression, float]:
+        """Return the values of parameters, of time and of relations of it at the start of a run."""
+        values, relations = self.table.values, self.relations.found
+        after = values_just_after(relations, values, self.t_start)
+        symbols = (one.symbol for one in relations)
+        return {**values, self.time: self.t_start, **dict(zip(symbols, after, strict=True))}
+
+    @property
+    def relations(self) -> TimeRelations:
+        """The relations of functions of time alone in its laws."""
+        found = self.table.graph.relations
+        assert found is not None
+        return found
+
+    @property
+    def can_read_multipliers(self) -> bool:
+        """Whether forces read reactions: of their own part, or perhaps through inputs that are linked to one."""
+        feeding = (self.locals_[source] for source, _ in self.links.values())
+        return any(one.reads for one in self.locals_.values()) or any(one.binding.reactions for one in feeding)
+
+
+def decide(mechanism: Mechanism, how: Callable[[Mechanism], T]) -> T:
+    """Decide something by the size of numbers, and note it: other values may decide it otherwise."""
+    outcome = how(mechanism)
+    mechanism.decisions.append((how, outcome))
+    return outcome
+
+
+def from_start(mechanism: Mechanism, name: str, form: str, value: Expression) -> Expression:
+    """Return a parameter that has the value of an expression where the scene starts, whichever start that is.
+
+    Parameters
+    ----------
+    mechanism
+        It notes the parameter.
+    name
+        Of the parameter.
+    form, value
+        In which form's coordinates it is said, and what it is the value of.
+    """
+    symbol = mechanism.table.graph.parameter(name)
+    mechanism.constants[symbol] = form, value
+    mechanism.table.values[symbol] = _at_start(mechanism, form, value)
+    return symbol
+
+
+def _at_start(mechanism: Mechanism, form: str, value: Expression) -> float:
+    assert mechanism.places is not None
+    return evaluate([value], {**mechanism.table.values, **mechanism.places[form]})[0]
+
+
+def started_at(mechanism: Mechanism, places: Mapping[str, Mapping[Expression, float]]) -> Mechanism:
+    """Return a mechanism with the constants of another start.
+
+    Parameters
+    ----------
+    mechanism
+        With the values of all other parameters.
+    places
+        Where it starts.
+    """
+    made = replace(mechanism, places=places, table=replace(mechanism.table, values=dict(mechanism.table.values)))
+    for symbol, said in mechanism.constants.items():
+        made.table.values[symbol] = _at_start(made, *said)
+    return made
+
+
+def extent(mechanism: Mechanism) -> float:
+    """Return the extent of a mechanism, m: the largest length among the parameters of what moves; 0 if none is.
+
+    Of a vector that is its magnitude, which does not depend on how the scene is turned.
+    """
+    sizes = [0.0]
+    for path, local in mechanism.locals_.items():
+        bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors}
+        if bodies == {0}:
+            continue  # where the ground is says nothing about the size of what moves
+        for name, spec in local.part.component.parameter_specs().items():
+            value = local.part.values[name]
+            if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
+                sizes.append(math.hypot(*value) if isinstance(value, tuple) else abs(value))
+    return max(sizes)
+
+
+def check_closures(mechanism: Mechanism) -> None:
+    """Check that rigid joints between parts of one body agree.
+
+    Raises
+    ------
+    TopologyError
+        If they do not: two grounds fight, or rigid parts do not fit together.
+    """
+    bodies, space = mechanism.bodies, mechanism.space
+    for joint in bodies.closures:
+        body = bodies.bodies[bodies.body_of[joint.a]]
+        offsets, turns = body_offsets(body, space)
+        placement = joint.local.placement
+        from_a = placement.displacement
+        if placement.axes == "a" and space.has_rotation:
+            from_a = rotate(from_a, turns[joint.a])
+        gap = offsets[joint.b] - offsets[joint.a] - from_a
+        graph = mechanism.table.graph
+        misses = [*gap, *_turns_missed(joint, turns[joint.a], turns[joint.b], space)]
+        numbers = evaluate([graph.convert(m) for m in misses], mechanism.table.values)
+        turned = max((abs(m) for m in numbers[3:]), default=0.0)
+        if not all(abs(m) <= CLOSES * (extent(mechanism) or 1.0) for m in numbers[:3]) or not turned <= CLOSES:
+            kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
+            raise TopologyError(
+                f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {turned:g} rad",
+                where=joint.label,
+                advice="Two rigid connections say different things about the same place; remove or change one.",
+            )
+
+
+def _turns_missed(joint: Joint, turn_a: NodeTurn, turn_b: NodeTurn, space: Space) -> list[Scalar]:
+    """Return by what angles, while they are small, a rigid joint's end is turned from where it should be."""
+    if not space.has_rotation:
+        return []
+    rotation = joint.local.placement.rotation
+    if isinstance(turn_a, tuple) and isinstance(turn_b, tuple):
+        wanted = compose(turn_a, as_rotation(0.0 if rotation is None else rotation).axes())
+        return [component for mine, theirs in zip(turn_b, wanted, strict=True) for component in mine - theirs]
+    angle: Any = 0.0 if rotation is None else rotation
+    return [plain(turn_b) - plain(turn_a) - angle]
+
+
+def make_gravity(table: ParameterTable, value: float) -> Vector:
+    """Return the acceleration of free fall as a vector."""
+    pull = table.scalar("gravity", value)
+    return as_vector((0.0, 0.0, -pull))

@@ -1,0 +1,1 @@
+"""What can be observed: quantities by path, event functions, power, reactions inside bodies."""

@@ -1,0 +1,83 @@
+"""Events of components as expressions of the state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from atwood.expr import Expression, Graph
+from atwood.mechanics.build import Mechanism
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.outputs.observables import Reaction
+from atwood.mechanics.outputs.reading import Reader
+from atwood.model.declare.component import bind
+from atwood.model.declare.laws import Law
+from atwood.model.returned import call_law, one_scalar
+
+__all__ = ["Watch", "list_watches"]
+
+
+@dataclass(frozen=True)
+class Watch:
+    """A zero crossing that is watched in the present mode.
+
+    Attributes
+    ----------
+    part, law
+        Where it is declared.
+    value
+        The expression, of time, coordinates, speeds, accelerations and reactions.
+    direction
+        +1, -1 or 0.
+    target
+        The mode it leads to, or ``"stop"``.
+    message
+        What has happened, in words.
+    unit
+        SI unit of the value.
+    impact
+        Whether velocities jump.
+    """
+
+    part: str
+    law: str
+    value: Expression
+    direction: int
+    target: str
+    message: str
+    unit: str
+    impact: bool
+
+
+def list_watches(
+    mechanism: Mechanism, equations: Equations, reactions: Sequence[Reaction], modes: Mapping[str, str]
+) -> tuple[Watch, ...]:
+    """Return what is watched in the present modes; what is constant can never cross zero and is left out."""
+    found = []
+    graph = mechanism.table.graph
+    reader = Reader(mechanism, equations, reactions)
+    for path, local in mechanism.locals_.items():
+        component = local.part.component
+        mode = modes.get(path, "")
+        space = mechanism.space.name
+        laws = [law for law in component.laws("event") if law.holds_in(space) and law.acts_in(mode)]
+        if not laws:
+            continue
+        bound = bind(component, reader.binding(local))
+        for law in laws:
+            value = call_law(path, law, partial(_evaluated, graph, bound, law))
+            if value.is_constant or value in mechanism.table.values:
+                continue
+            options, target = law.options, law.options.target
+            if target not in (*component.modes, "stop"):  # then it is the choice that says which
+                target = local.part.values.get(target, target)
+            found.append(
+                Watch(path, law.name, value, options.direction, target, options.message, options.unit, options.impact)
+            )
+    return tuple(found)
+
+
+def _evaluated(graph: Graph, bound: Any, law: Law) -> Expression:
+    return one_scalar(graph, getattr(bound, law.name)())

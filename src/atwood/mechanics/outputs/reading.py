@@ -1,0 +1,209 @@
+"""Quantities of components by path, made when somebody asks for them.
+
+A large scene has ten thousands of quantities, of which a run needs a few.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from atwood.errors import AtwoodError
+from atwood.expr import Expression
+from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.outputs.observables import Observable, Reaction, add_up, make_binding, part_energies, take
+from atwood.model.declare.component import Binding, bind
+from atwood.model.local.laws import LocalPart
+from atwood.model.returned import call_law, not_evaluated, one_scalar
+from atwood.model.values.vector import Vector
+
+__all__ = ["Observables", "Reader", "observe"]
+
+
+def observe(
+    mechanism: Mechanism,
+    equations: Equations,
+    reactions: Sequence[Reaction],
+    lock: AbstractContextManager[Any] | None = None,
+) -> Mapping[str, Observable]:
+    """Return every observable of every component, by path.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    equations
+        Its equations in one form.
+    reactions
+        What `list_reactions` gave.
+    lock
+        Held while expressions are made, where several threads may ask.
+    """
+    return Observables(mechanism, equations, reactions, lock or nullcontext())
+
+
+class Observables(Mapping[str, Observable]):
+    """Every observable of a scene by path; those of a component are made when one of them is first asked for.
+
+    Parameters
+    ----------
+    mechanism, equations, reactions, lock
+        See `observe`.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        equations: Equations,
+        reactions: Sequence[Reaction],
+        lock: AbstractContextManager[Any],
+    ) -> None:
+        self._mechanism, self._lock = mechanism, lock
+        self._reader = Reader(mechanism, equations, reactions)
+        self._reactions = {one.path: one for one in reactions}
+        self._made: dict[str, dict[str, Observable]] = {}
+        self._all: dict[str, Observable] | None = None
+
+    def __getitem__(self, path: str) -> Observable:
+        if self._all is not None:
+            return self._all[path]
+        one = self._reactions.get(path)
+        if one is not None:
+            return Observable(one.path, one.unit, one.doc, False, one.symbol)
+        part = path.rpartition(".")[0]
+        while part:
+            if part in self._mechanism.locals_:
+                return self._of(part)[path]
+            part = part.rpartition(".")[0]
+        raise KeyError(path)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._everything())
+
+    def __len__(self) -> int:
+        return len(self._everything())
+
+    def _everything(self) -> dict[str, Observable]:
+        if self._all is None:
+            found = {path: one for part in self._mechanism.locals_ for path, one in self._of(part).items()}
+            found.update({path: self[path] for path in self._reactions})
+            self._all = found
+        return self._all
+
+    def _of(self, part: str) -> dict[str, Observable]:
+        if part not in self._made:
+            with self._lock:
+                self._made[part] = _observe_part(self._mechanism, self._reader, part)
+        return self._made[part]
+
+
+def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, Observable]:
+    """Return every observable of one component, without its reactions."""
+    found: dict[str, Observable] = {}
+    local = mechanism.locals_[path]
+    bound = bind(local.part.component, reader.binding(local, with_energies=True))
+    for law in local.part.component.laws("observable"):
+        if not law.holds_in(mechanism.space.name):
+            continue
+        try:
+            value = getattr(bound, law.name)()
+        except (AtwoodError, ArithmeticError):
+            continue  # it asks for an orientation that nothing determines, or that never leaves a pole
+        except Exception as error:  # whatever a law of somebody's own can raise
+            raise not_evaluated(path, law, error) from error
+        if not isinstance(value, Vector):
+            value = call_law(path, law, partial(one_scalar, mechanism.table.graph, value))
+        options = law.options
+        rate = f"{path}.{options.rate}" if options.rate else ""
+        take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic, rate)
+    has_inertia = any(local.part.component.laws(kind) for kind in ("inertia", "lagrangian"))
+    if has_inertia or local.potentials:
+        kinetic, potential = reader.energies(path)
+        if has_inertia:
+            take(mechanism, found, f"{path}.kinetic_energy", kinetic, "J", "Kinetic energy.", False)
+        take(mechanism, found, f"{path}.potential_energy", potential, "J", "Potential energy.", False)
+    # A rate that has no value, as of an angle that never leaves a pole, tells no turns.
+    return {name: one if one.rate in found else replace(one, rate="") for name, one in found.items()}
+
+
+class Reader:
+    """What the laws of parts read when they may read everything.
+
+    Parameters
+    ----------
+    mechanism, equations, reactions
+        See `observe`.
+    """
+
+    def __init__(self, mechanism: Mechanism, equations: Equations, reactions: Sequence[Reaction]) -> None:
+        self._mechanism, self._equations = mechanism, equations
+        self._signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
+        self._energies: dict[str, tuple[Expression, Expression]] = {}
+        self._around: dict[str, _EnergiesAround] = {}
+        self._reactions: dict[str, dict[str, Expression]] = {}
+        for one in reactions:
+            self._reactions.setdefault(one.key[0], {})[one.path[len(one.key[0]) + 1 :]] = one.symbol
+        self._known: dict[str, dict[str, Expression]] = {}
+        for symbol, value in equations.kinematics.placements.joint_coordinates.items():
+            part, _, name = symbol.name.rpartition(".")
+            self._known.setdefault(part, {})[name] = value
+
+    def energies(self, path: str) -> tuple[Expression, Expression]:
+        """Return kinetic and potential energy of one part."""
+        if path not in self._energies:
+            self._energies[path] = part_energies(self._mechanism, self._equations, path, self._signals)
+        return self._energies[path]
+
+    def binding(self, local: LocalPart, with_energies: bool = False) -> Binding:
+        """Return what the laws of a part read.
+
+        Parameters
+        ----------
+        local
+            The part.
+        with_energies
+            Whether that includes the energies of the model around it.
+        """
+        path = local.part.path
+        known, own = self._known.get(path, {}), self._reactions.get(path, {})
+        energies: Mapping[str, Expression] = self._energies_around(local) if with_energies else {}
+        return make_binding(self._mechanism, self._equations, local, own, known, energies, self._signals)
+
+    def _energies_around(self, local: LocalPart) -> Mapping[str, Expression]:
+        owner = local.part.component._parent
+        inside = f"{owner.path}." if owner is not None and owner.path else ""
+        if inside not in self._around:
+            self._around[inside] = _EnergiesAround(self, [p for p in self._mechanism.locals_ if p.startswith(inside)])
+        return self._around[inside]
+
+
+class _EnergiesAround(Mapping[str, Expression]):
+    """The energies of some parts together, added up when they are asked for."""
+
+    def __init__(self, reader: Reader, parts: Sequence[str]) -> None:
+        self._reader, self._parts = reader, parts
+        self._made: dict[str, Expression] = {}
+
+    def __getitem__(self, kind: str) -> Expression:
+        if kind not in self._made:
+            if kind not in _ENERGIES:
+                raise KeyError(kind)
+            number = _ENERGIES.index(kind)
+            self._made[kind] = add_up([self._reader.energies(path)[number] for path in self._parts])
+        return self._made[kind]
+
+    def __contains__(self, kind: object) -> bool:
+        return kind in _ENERGIES
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_ENERGIES)
+
+    def __len__(self) -> int:
+        return len(_ENERGIES)
+
+
+_ENERGIES = ("kinetic", "potential")

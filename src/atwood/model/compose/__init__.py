@@ -1,0 +1,1 @@
+"""Components put together: models, scenes, their differences and their files."""

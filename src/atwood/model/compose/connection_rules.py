@@ -1,0 +1,256 @@
+"""Who may meet whom: connections, their ends, and parts that can take each other's place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from atwood.arguments import show
+from atwood.errors import ConnectError, DeclarationError, UsageError, suggestion
+from atwood.model.declare.component import Component
+from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, OutputRef
+from atwood.model.declare.declaring import check_reserved
+from atwood.model.values.units import Unit, parse_unit
+
+__all__ = [
+    "Connection",
+    "check_ends",
+    "check_same_connectors",
+    "connect",
+    "declared_connection",
+    "declared_parts",
+    "find_end",
+    "named_parts",
+    "relative_path",
+]
+
+Parts: TypeAlias = Component | list[Component]
+"""What a name in a model stands for: a part, or an array of parts."""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Two ends that are joined, as written in the class body of a model."""
+
+    a: Any
+    b: Any
+
+
+def connect(a: Any, b: Any) -> Connection:
+    """Join two connectors, or an output with an input, in the class body of a model.
+
+    Parameters
+    ----------
+    a, b
+        Connectors of parts (``rod.a``), connectors of the model itself, or an output and an input.
+
+    Raises
+    ------
+    ConnectError
+        When the class is made, if the two cannot meet.
+    """
+    return Connection(a, b)
+
+
+def named_parts(parts: Mapping[str, Parts]) -> Iterator[tuple[str, Component]]:
+    """Return every part with its own name, the elements of an array as ``name[0]``, ``name[1]``, ..."""
+    for name, part in parts.items():
+        if isinstance(part, list):
+            yield from ((f"{name}[{index}]", one) for index, one in enumerate(part))
+        else:
+            yield name, part
+
+
+def class_path(end: Any, names: Mapping[int, str], where: str) -> str:
+    """Return the path of an end that was written in the class body of a model.
+
+    Parameters
+    ----------
+    end
+        The end.
+    names
+        Names of the declared parts by identity.
+    where
+        Name of the class.
+    """
+    _check_is_end(end, where)
+    if isinstance(end, ConnectorSpec):
+        return end.name
+    steps = [end.name]
+    component = end.component
+    while component._parent is not None:
+        steps.append(component._name)
+        component = component._parent
+    if id(component) not in names:
+        raise ConnectError("it belongs to a part that is not declared in the class body", where=f"{where}.{end.name}")
+    return ".".join([names[id(component)], *reversed(steps)])
+
+
+def relative_path(end: Any, model: Component) -> str:
+    """Return the path of an end, as seen from the model that joins it."""
+    _check_is_end(end, model.path or type(model).__name__)
+    if isinstance(end, ConnectorSpec):
+        if model.connector_specs().get(end.name) is not end:
+            raise ConnectError("it is declared by another class", where=end.name, advice="Connect things like rod.a.")
+        return end.name
+    names = [end.name]
+    component: Component | None = end.component
+    while component is not None and component is not model:
+        names.append(component._name or type(component).__name__)
+        component = component._parent
+    path = ".".join(reversed(names))
+    if component is None:
+        raise ConnectError("it belongs to a part that is not in this model", where=path, advice="Add the part first.")
+    return path
+
+
+def _check_is_end(end: Any, where: str) -> None:
+    if isinstance(end, ConnectorSpec) and end.count is not None:
+        end = (end,)
+    if isinstance(end, tuple) and end and all(isinstance(one, (Connector, ConnectorSpec)) for one in end):
+        name = end[0].name.partition("[")[0]
+        raise ConnectError(
+            f"{name!r} is an array of connectors",
+            where=where,
+            advice=f"Connect its elements one by one, as in {name}[0]; in a method build(self) if their number varies.",
+        )
+    if not isinstance(end, (Connector, ConnectorSpec, InputRef, OutputRef)):
+        advice = "Connect things like rod.a or mass.point."
+        if isinstance(end, Component):
+            where = end.path or where
+            advice = f"Name one of its connectors: {', '.join(end.connector_specs())}."
+        raise ConnectError(f"{show(end)} is no connector", where=where, advice=advice)
+
+
+def check_ends(a: Any, b: Any, path_a: str, path_b: str) -> None:
+    """Refuse a connection of an end to itself, or of unlike ends."""
+    if path_a == path_b:
+        raise ConnectError("it is joined to itself", where=path_a, advice="Connect it to another connector.")
+    if isinstance(a, (InputRef, OutputRef)) or isinstance(b, (InputRef, OutputRef)):
+        if isinstance(a, InputRef) and isinstance(b, OutputRef):
+            _check_signal_units(b, a, path_b, path_a)
+        elif isinstance(a, OutputRef) and isinstance(b, InputRef):
+            _check_signal_units(a, b, path_a, path_b)
+        else:
+            raise ConnectError(
+                f"{path_a} and {path_b} are not an output and an input",
+                advice="Connect sensor.output('...') with part.input('...').",
+            )
+        return
+    kind_a, kind_b = (end.kind if isinstance(end, ConnectorSpec) else type(end) for end in (a, b))
+    if kind_a.family != kind_b.family:
+        raise ConnectError(
+            f"{path_a} is a {kind_a.__name__} and {path_b} is a {kind_b.__name__}; they are unlike and cannot meet",
+            advice="A Groove takes a rope's bend, a Shaft or a Slide a gear; points and frames meet each other.",
+        )
+
+
+def _check_signal_units(source: OutputRef, target: InputRef, path_source: str, path_target: str) -> None:
+    given, wanted = output_unit(source), target.component.signal_specs()[target.name].unit
+    if given is not None and not given.has_dimension_of(wanted):
+        advice = f"Connect an output in {wanted.text}, or put a part between that makes one of it."
+        raise ConnectError(f"{path_source} is in {given.text} and {path_target} takes {wanted.text}", advice=advice)
+
+
+def output_unit(output: OutputRef) -> Unit | None:
+    """Return the unit of an observable; None if it is not known."""
+    for law in output.component.laws("observable"):
+        if law.name == output.name.split(".")[0]:
+            return parse_unit(law.options.unit)
+    return None
+
+
+def check_same_connectors(old: Parts, new: Any, where: str) -> None:
+    """Refuse a part, or an array of parts, that cannot take the place of another."""
+    if isinstance(old, list) or isinstance(new, list):
+        if not isinstance(new, list) or not isinstance(old, list) or len(old) != len(new):
+            wanted = f"an array of {len(old)} parts" if isinstance(old, list) else "one part"
+            raise DeclarationError(f"here must be {wanted}", where=where)
+        for index, (old_one, new_one) in enumerate(zip(old, new, strict=True)):
+            check_same_connectors(old_one, new_one, f"{where}[{index}]")
+        return
+    if not isinstance(new, Component):
+        raise DeclarationError(f"{show(new)} is no component", where=where, advice="Give a part, such as Rod().")
+    have = new.connectors()
+    for name, connector in old.connectors().items():
+        if name not in have or have[name].family != connector.family:
+            raise DeclarationError(
+                f"a {type(new).__name__} cannot take the place of a {type(old).__name__}: it has no connector {name!r}",
+                where=where,
+                advice=suggestion(name, have),
+            )
+
+
+def find_end(model: Component, path: str) -> Connector | InputRef | OutputRef:
+    """Return the end at a dotted path within a model.
+
+    Raises
+    ------
+    UsageError
+        If there is none.
+    """
+    component, steps = model, path.split(".")
+    while len(steps) > 1 and steps[0] in component._children():
+        component = component._children()[steps[0]]
+        steps = steps[1:]
+    name = ".".join(steps)
+    connectors = component.connectors()
+    if name in connectors:
+        return connectors[name]
+    if name in component.signal_specs():
+        return component.input(name)
+    if steps[0] in component.output_names():
+        return component.output(name)
+    raise UsageError(
+        f"there is no connector, input or output {name!r}",
+        where=component.path or type(component).__name__,
+        advice=suggestion(name, [*connectors, *component._children()]),
+    )
+
+
+def declared_parts(cls: type[Component], inherited: dict[str, Parts]) -> dict[str, Parts]:
+    """Return the parts that a class declares and inherits, each an object of its own.
+
+    Parameters
+    ----------
+    cls
+        The class, a model.
+    inherited
+        The parts of its bases.
+    """
+    found = dict(inherited)
+    for name, value in list(vars(cls).items()):
+        is_array = isinstance(value, list) and bool(value) and all(isinstance(one, Component) for one in value)
+        if isinstance(value, Component) or is_array:
+            check_reserved(cls, name)
+            if name in inherited:
+                check_same_connectors(inherited[name], value, f"{cls.__name__}.{name}")
+            found[name] = value
+        elif name in inherited:
+            raise DeclarationError(
+                f"the part {name!r} is declared again as {value!r}, which is no component", where=cls.__name__
+            )
+    names: dict[int, str] = {}
+    for name, part in named_parts(found):
+        if id(part) in names:
+            raise DeclarationError(
+                f"one object is declared as {names[id(part)]!r} and as {name!r}",
+                where=cls.__name__,
+                advice="Give each its own object.",
+            )
+        names[id(part)] = name
+        if not part._declared:
+            object.__setattr__(part, "_declared", f"{cls.__name__}.{name}")
+    return found
+
+
+def declared_connection(cls: type[Component], connection: Any, names: Mapping[int, str]) -> tuple[str, str]:
+    """Return the paths of the two ends of a connection that was written in a class body."""
+    if not isinstance(connection, Connection):
+        raise ConnectError(
+            f"{connection!r} is no connection", where=cls.__name__, advice="Write connect(rod.a, mass.point)."
+        )
+    pair = class_path(connection.a, names, cls.__name__), class_path(connection.b, names, cls.__name__)
+    check_ends(connection.a, connection.b, *pair)
+    return pair

@@ -1,0 +1,80 @@
+"""Scenes: the model that is simulated, with its gravity and its start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, MutableMapping
+from typing import Any, ClassVar, Self
+
+from atwood.errors import StartError
+from atwood.model.compose.composite import Model
+from atwood.model.compose.start_values import StartValues
+from atwood.model.declare.fields import parameter
+
+__all__ = ["Scene"]
+
+
+class Scene(Model):
+    """The model that is simulated: a model with its space, its gravity and its start.
+
+    Axes: x right, y into the page, z up; a planar scene lives in the x-z plane, gravity is along -z. A scene can be
+    declared as a class, like any model, or put together step by step::
+
+        scene = Scene()
+        ground = scene.add("ground", Ground())
+        rod = scene.add("rod", Rod(length=1.0))
+        scene.connect(ground.frame, rod.a)
+        scene.start["rod.angle"] = 0.5
+
+    As a part of another scene it is a model like any other; of its own settings only its start is then used.
+
+    Attributes
+    ----------
+    start
+        What holds exactly at the start, by path: any mix of coordinates, positions and velocities. A value is a
+        number in SI units, text with a unit (``"30 deg"``), or a parameter of the scene. Every scene has its own,
+        which begins as that of its class.
+    guess
+        What holds roughly at the start; used where the start leaves a choice.
+    """
+
+    space: str = parameter("plane", choices=("line", "plane", "space"), doc="What the scene lives in.")
+    line_axis: tuple[float, float, float] = parameter(
+        (1.0, 0.0, 0.0), size=3, structural=True, doc="Direction of the line, for a scene on a line."
+    )
+    gravity: float = parameter(9.81, unit="m/s^2", doc="Acceleration of free fall, along -z.")
+    t_start: float = parameter(0.0, unit="s", doc="Time of the start.")
+    t_end: float = parameter(10.0, unit="s", doc="Time of the end, unless a run is given another.")
+
+    start: ClassVar[MutableMapping[str, Any]] = {}
+    guess: ClassVar[MutableMapping[str, Any]] = {}
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        for name in ("start", "guess"):
+            if not isinstance(getattr(cls, name), Mapping):
+                raise StartError(
+                    f"{name!r} must say values by path", where=cls.__name__, advice="Write {'rod.angle': 0.5}."
+                )
+            StartValues(getattr(cls, name), cls.__name__)
+
+    def _assemble(self) -> None:
+        # Its own copy of the class's values for each scene: what is added in `build` or later belongs to it alone.
+        for name in ("start", "guess"):
+            object.__setattr__(self, name, StartValues(getattr(type(self), name)))
+        super()._assemble()
+
+    def _start_values(self) -> Mapping[str, MutableMapping[str, Any]]:
+        return {name: getattr(self, name) for name in ("start", "guess")}
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in ("start", "guess"):
+            object.__setattr__(self, name, StartValues(value, self.path))
+        else:
+            super().__setattr__(name, value)
+
+    def copy(self) -> Self:
+        """Return a scene with the same settings and its own parts and start."""
+        twin = super().copy()
+        for name in ("start", "guess"):
+            object.__setattr__(twin, name, StartValues(getattr(self, name)))
+        return twin

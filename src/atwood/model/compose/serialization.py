@@ -1,0 +1,419 @@
+"""Scenes as plain data, and back: what is written to a file is what the class does not say by itself.
+
+A component is written as a reference to its class and the values it was given. A model adds what was changed on it
+afterwards (see `atwood.model.compose.differences`). Classes are not written: reading a scene imports the modules that
+they are in, so read only files that you would also run.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import json
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from atwood.arguments import FILE, MAPPING, instance, takes
+from atwood.errors import AtwoodError, UsageError, suggestion
+from atwood.files import check_readable, write_atomically
+from atwood.model.compose.composite import Model
+from atwood.model.compose.connection_rules import Parts, find_end
+from atwood.model.compose.differences import REMOVED, Edits, find_edits
+from atwood.model.declare.component import Component
+from atwood.model.declare.fields import FieldReference
+from atwood.model.declare.parameter_expressions import OPERATIONS, Deferred
+from atwood.model.declare.time_functions import StoredFunction, write_function
+
+__all__ = ["FORMAT", "VERSION", "from_data", "load_scene", "save_scene", "to_data"]
+
+FORMAT = "atwood scene"
+VERSION = 1
+
+_CHANGES = ("settings", "replaced", "added", "connections", "starts")
+
+
+@takes(scene=instance("a Scene or a Model", Model))
+def to_data(scene: Model) -> dict[str, Any]:
+    """Return a scene as plain data: dictionaries, lists, text and numbers.
+
+    Parameters
+    ----------
+    scene
+        The scene or model.
+
+    Raises
+    ------
+    UsageError
+        If it is no model, or a class in it cannot be found again by name.
+    ParameterError
+        If a function of time cannot be written.
+    """
+    return {"format": FORMAT, "version": VERSION, "scene": _write(scene, "")}
+
+
+def _checksum(data: Mapping[str, Any]) -> str:
+    text = json.dumps(data.get("scene"), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@takes(data=MAPPING)
+def from_data(data: Mapping[str, Any]) -> Model:
+    """Return the scene that plain data stand for; every value is checked as when it is given by hand.
+
+    Parameters
+    ----------
+    data
+        As returned by `to_data`.
+
+    Raises
+    ------
+    UsageError
+        If the data are no scene, of an unknown version, or name a class that cannot be found.
+    ParameterError
+        If a value is not admissible.
+    """
+    if data.get("format") != FORMAT:
+        raise UsageError("these data are no scene of Atwood", advice="A scene is written with save_scene or to_data.")
+    version = data.get("version")
+    if version != VERSION or isinstance(version, bool):
+        raise UsageError(
+            f"the scene is written in version {version!r} of the format and this Atwood reads version {VERSION}",
+            advice="Read it with the Atwood that wrote it, or a newer one.",
+        )
+    if "checksum" in data and data["checksum"] != _checksum(data):
+        raise UsageError(
+            "the scene is not what was saved: its checksum is that of other contents",
+            where="checksum",
+            advice="Save it again; if it was changed by hand, take the entry 'checksum' away.",
+        )
+    try:
+        scene = _read(data.get("scene"), "scene")
+    except RecursionError:
+        raise UsageError("the data are nested too deeply for a scene", where="scene", advice="Save it again.") from None
+    if not isinstance(scene, Model):
+        raise UsageError(f"a {type(scene).__name__} is no scene", where="scene", advice="Only models are scenes.")
+    return scene
+
+
+@takes(scene=instance("a Scene or a Model", Model), path=FILE)
+def save_scene(scene: Model, path: str | Path) -> None:
+    """Write a scene to a file, as JSON.
+
+    Parameters
+    ----------
+    scene
+        The scene or model.
+    path
+        The file; it is written only when the whole scene can be.
+    """
+    data = to_data(scene)
+    text = json.dumps({**data, "checksum": _checksum(data)}, indent=2, allow_nan=False)
+    write_atomically(Path(path), lambda part: part.write_text(text + "\n", encoding="utf-8"))
+
+
+@takes(path=FILE)
+def load_scene(path: str | Path) -> Model:
+    """Read a scene from a file that `save_scene` wrote.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Raises
+    ------
+    UsageError
+        If the file cannot be read, or holds no scene.
+    """
+    check_readable(Path(path))
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"the file cannot be read ({error.strerror})", where=str(path)) from None
+    except (ValueError, RecursionError) as error:
+        raise UsageError(f"the file is no JSON ({error})", where=str(path)) from None
+    try:
+        return from_data(data)
+    except AtwoodError as error:
+        where = f"{path}: {error.where}" if error.where else str(path)
+        raise type(error)(error.message, where=where, advice=error.advice) from error
+
+
+# -- writing -----------------------------------------------------------------------------------------------------
+
+
+def _write(component: Component, path: str) -> dict[str, Any]:
+    written: dict[str, Any] = {"class": _class_name(type(component), path)}
+    values = {name: _write_value(value, _join(path, name)) for name, value in component._settings.items()}
+    if values:
+        written["values"] = values
+    if isinstance(component, Model):
+        parts = {name: _write_parts(part, _join(path, name)) for name, part in component._given.items()}
+        if parts:
+            written["parts"] = parts
+        changes = _write_edits(find_edits(component), path)
+        if changes:
+            written["changes"] = changes
+    return written
+
+
+def _write_parts(parts: Parts, path: str) -> Any:
+    if isinstance(parts, list):
+        return [_write(one, f"{path}[{index}]") for index, one in enumerate(parts)]
+    return _write(parts, path)
+
+
+def _write_edits(edits: Edits, path: str) -> dict[str, Any]:
+    changes = {
+        "settings": {
+            part: {name: _write_value(value, _join(path, f"{part}.{name}")) for name, value in values.items()}
+            for part, values in edits.settings.items()
+        },
+        "replaced": {name: _write_parts(part, _join(path, name)) for name, part in edits.replaced.items()},
+        "added": {name: _write_parts(parts, _join(path, name)) for name, parts in edits.added.items()},
+        "connections": {part: [list(pair) for pair in joined] for part, joined in edits.joined.items()},
+        "starts": {
+            part: {
+                kind: {key: _write_value(value, key) for key, value in values.items()}
+                for kind, values in starts.items()
+            }
+            for part, starts in edits.starts.items()
+        },
+    }
+    return {name: change for name, change in changes.items() if change}
+
+
+def _write_value(value: Any, where: str) -> Any:
+    if isinstance(value, FieldReference):
+        return {"bound": value.name}
+    if isinstance(value, Deferred):
+        return {"bound": [value.operation, *(_write_operand(one) for one in value.arguments)]}
+    if isinstance(value, tuple):
+        return list(value)
+    if callable(value):
+        return {"function": write_function(value, where)}
+    return value
+
+
+def _write_operand(operand: Any) -> Any:
+    if isinstance(operand, FieldReference):
+        return operand.name
+    if isinstance(operand, Deferred):
+        return [operand.operation, *(_write_operand(one) for one in operand.arguments)]
+    return float(operand)
+
+
+def _class_name(cls: type[Component], path: str) -> str:
+    name = f"{cls.__module__}:{cls.__qualname__}"
+    try:
+        same = _find_class(name, path) is cls
+    except AtwoodError:
+        same = False
+    if not same:
+        raise UsageError(
+            f"the class {cls.__qualname__} could not be found again by its name",
+            where=path or cls.__name__,
+            advice="Write the class at the outer level of a module, not inside a function.",
+        )
+    return name
+
+
+def _join(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name
+
+
+# -- reading -----------------------------------------------------------------------------------------------------
+
+
+def _find_class(name: Any, where: str) -> type[Component]:
+    module_name, _, qualified = name.partition(":") if isinstance(name, str) else ("", "", "")
+    if not module_name or not qualified:
+        raise UsageError(f"{name!r} does not name a class", where=where, advice="A class is named 'module:Class'.")
+    advice = (
+        f"The module must be one that Python can import: install it, start Python in its folder, or, for a scene "
+        f"in a file {module_name}.py, put the folder of that file on the path."
+    )
+    if module_name == "__main__":
+        advice = "It was declared in a script that was run; put the class into a module of its own and save it again."
+    try:
+        found: Any = sys.modules.get(module_name) or importlib.import_module(module_name)
+    except Exception as error:  # importing runs code of others
+        raise UsageError(
+            f"the module {module_name!r} cannot be imported ({type(error).__name__}: {error})",
+            where=where,
+            advice=advice,
+        ) from error
+    for step in qualified.split("."):
+        known = [key for key in vars(found) if not key.startswith("_")]
+        found = vars(found).get(step) if isinstance(found, type) else getattr(found, step, None)
+        if found is None:
+            raise UsageError(
+                f"there is no class {qualified!r} in the module {module_name!r}",
+                where=where,
+                advice=advice if module_name == "__main__" else suggestion(step, known) or advice,
+            )
+        if not isinstance(found, type):
+            break
+    if not isinstance(found, type) or not issubclass(found, Component):
+        raise UsageError(f"{name!r} is no component", where=where, advice="Name a class derived from Component.")
+    return found
+
+
+def _read(data: Any, where: str) -> Component:
+    entries = _mapping(data, where, ("class", "values", "parts", "changes"))
+    cls = _find_class(entries.get("class"), where)
+    given = {
+        name: _read_value(value, _join(where, name)) for name, value in _mapping(entries.get("values"), where).items()
+    }
+    parts = {
+        name: _read_parts(part, _join(where, name)) for name, part in _mapping(entries.get("parts"), where).items()
+    }
+    if not issubclass(cls, Model):
+        if "parts" in entries or "changes" in entries:
+            raise UsageError(f"a {cls.__name__} has no parts", where=where)
+        made = object.__new__(cls)
+        Component.__init__(made, **_told_apart(given, cls, where))
+        return made
+    unknown = sorted(set(parts) - set(cls._prototypes))
+    if unknown:
+        raise UsageError(
+            f"a {cls.__name__} has no part {unknown[0]!r}", where=where, advice=suggestion(unknown[0], cls._prototypes)
+        )
+    model = object.__new__(cls)  # not by calling the class: what its constructor may add is written as added parts
+    Model.__init__(model, **_told_apart(given, cls, where), **parts)
+    if not _depends_on_around(model):
+        _read_changes(model, entries.get("changes"), where)
+    return model
+
+
+def _depends_on_around(part: Component) -> bool:
+    """Return whether a part that belongs to no model yet has values bound to the model that it will be in.
+
+    Its own parts may not be there before; so its changes are read when it has its place.
+    """
+    return isinstance(part, Model) and any(isinstance(part._value(name), Deferred) for name in part._settings)
+
+
+def _place(part: Component, data: Any, where: str, put: Callable[[Component], Component]) -> None:
+    """Put a part that was read into its place, and read the changes that had to wait for it."""
+    waits = _depends_on_around(part)
+    placed = put(part)
+    if waits and isinstance(placed, Model):
+        _read_changes(placed, data.get("changes"), where)
+
+
+def _told_apart(values: dict[str, Any], cls: type[Component], where: str) -> dict[str, Any]:
+    """Return values if all of them are those of parameters and inputs."""
+    for name in values:
+        if name not in cls._parameters and name not in cls._signals:
+            raise UsageError(
+                f"a {cls.__name__} has no parameter {name!r}",
+                where=where,
+                advice=suggestion(name, [*cls._parameters, *cls._signals]),
+            )
+    return values
+
+
+def _read_parts(data: Any, where: str) -> Any:
+    if isinstance(data, list):
+        return [_read(one, f"{where}[{index}]") for index, one in enumerate(data)]
+    return _read(data, where)
+
+
+def _read_changes(model: Model, data: Any, where: str) -> None:
+    changes = _mapping(data, where, _CHANGES)
+    for path, values in _mapping(changes.get("settings"), where).items():
+        for name, value in _mapping(values, _join(where, path)).items():
+            setattr(model[path], name, _read_value(value, f"{path}.{name}"))
+    for path, part in _mapping(changes.get("replaced"), where).items():
+        owner, name = _owner(model, path)
+        _place(_read(part, path), part, path, functools.partial(owner.replace, name))
+    for path, part in _mapping(changes.get("added"), where).items():
+        owner, name = _owner(model, path)
+        if name in owner._attached:  # a part that was made anew with its parameters is there already
+            continue
+        if isinstance(part, list):
+            _place_array(owner, name, part, path)
+        else:
+            _place(_read(part, path), part, path, functools.partial(owner.add, name))
+    for path, joined in _mapping(changes.get("connections"), where).items():
+        owner = _model_at(model, path)
+        present = set(owner._connections)
+        for pair in joined if isinstance(joined, list) else ():
+            if not isinstance(pair, list) or len(pair) != 2:
+                raise UsageError(f"{pair!r} does not name two ends", where=where)
+            if tuple(map(str, pair)) not in present:
+                owner.connect(*(find_end(owner, str(end)) for end in pair))
+    for path, starts in _mapping(changes.get("starts"), where).items():
+        owner = _model_at(model, path)
+        for kind, values in _mapping(starts, where).items():
+            if kind not in owner._start_values():
+                raise UsageError(f"it has no {kind!r}", where=_join(where, path))
+            target = owner._start_values()[kind]
+            for key, value in _mapping(values, where).items():
+                if value is REMOVED:
+                    target.pop(key, None)
+                else:
+                    target[key] = _read_value(value, key)
+
+
+def _place_array(owner: Model, name: str, data: list[Any], where: str) -> None:
+    parts = _read_parts(data, where)
+    waiting = [_depends_on_around(one) for one in parts]
+    owner.add(name, parts)
+    for index, (one, entries) in enumerate(zip(parts, data, strict=True)):
+        if waiting[index]:
+            _read_changes(one, entries.get("changes"), f"{where}[{index}]")
+
+
+def _owner(model: Model, path: str) -> tuple[Model, str]:
+    outer, _, name = path.rpartition(".")
+    return _model_at(model, outer), name
+
+
+def _model_at(model: Model, path: str) -> Model:
+    found = model[path] if path else model
+    if not isinstance(found, Model):
+        raise UsageError("it has no parts", where=path)
+    return found
+
+
+def _mapping(data: Any, where: str, known: tuple[str, ...] = ()) -> Mapping[str, Any]:
+    """Return entries by name, none where there are no data; `known` are the names allowed, if not any."""
+    if data is None:
+        return {}
+    if not isinstance(data, dict):
+        raise UsageError(f"the scene cannot be read: {str(data)[:60]!r} should be entries by name", where=where)
+    for key in data if known else ():
+        if key not in known:
+            raise UsageError(
+                f"the scene cannot be read: unknown entry {key!r}", where=where, advice=suggestion(key, known)
+            )
+    return data
+
+
+def _read_value(value: Any, where: str) -> Any:
+    if not isinstance(value, Mapping):
+        return value
+    if set(value) == {"function"}:
+        return StoredFunction(value["function"], where)
+    if set(value) == {"bound"}:
+        return _read_bound(value["bound"], where)
+    raise UsageError(f"the value {str(value)[:60]!r} cannot be read", where=where)
+
+
+def _read_bound(written: Any, where: str) -> Any:
+    if isinstance(written, str):
+        return FieldReference(written)
+    if isinstance(written, (int, float)) and not isinstance(written, bool):
+        return written
+    operation = written[0] if isinstance(written, list) and written else None
+    if not isinstance(operation, str) or operation not in OPERATIONS:
+        raise UsageError(f"the bound value {str(written)[:60]!r} cannot be read", where=where)
+    operands = tuple(_read_bound(one, where) for one in written[1:])
+    if len(operands) != (1 if operation == "neg" else 2):
+        raise UsageError(f"the bound value {str(written)[:60]!r} has a wrong number of operands", where=where)
+    return Deferred(operation, operands, None)

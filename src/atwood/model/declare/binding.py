@@ -1,0 +1,51 @@
+"""What laws are evaluated on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from atwood.expr import Scalar
+from atwood.model.declare.connectors import Motion
+from atwood.model.values.vector import Vector
+
+__all__ = ["Binding"]
+
+
+@dataclass(frozen=True)
+class Binding:
+    """What the laws of a component are evaluated on: floats, expressions or sympy terms.
+
+    Attributes
+    ----------
+    values
+        Parameters and signals by name.
+    motions
+        What each connector knows, by name.
+    time
+        The time.
+    space
+        ``"line"``, ``"plane"`` or ``"space"``.
+    line
+        Unit vector of the line, for a scene on a line.
+    sides
+        On a line: +1 or -1 for a pair of connector names, the sign of the second's position minus the first's.
+        None while the signs are not known yet.
+    known
+        Observables that are known without their formula, such as a joint coordinate.
+    reactions
+        Reactions by name.
+    energies
+        ``"kinetic"`` and ``"potential"`` energy of the model that the component is placed in.
+    """
+
+    values: Mapping[str, Any]
+    motions: Mapping[str, Motion] = field(default_factory=dict)
+    time: Scalar = 0.0
+    space: str = "plane"
+    line: Vector | None = None
+    sides: Mapping[tuple[str, str], float] | None = None
+    known: Mapping[str, Any] = field(default_factory=dict)
+    reactions: Mapping[str, Any] = field(default_factory=dict)
+    energies: Mapping[str, Any] = field(default_factory=dict)

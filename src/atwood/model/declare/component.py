@@ -1,0 +1,408 @@
+"""The base of every part: parameters, connectors, signals and laws, declared in a class body like a dataclass."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self, dataclass_transform
+
+from atwood.arguments import NAME, check
+from atwood.errors import DeclarationError, MissingNameError, ParameterError, UsageError, near_matches, suggestion
+from atwood.expr import Scalar
+from atwood.model.declare.binding import Binding
+from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
+from atwood.model.declare.declaring import check_field_name, merge_inherited, with_checked_default
+from atwood.model.declare.fields import MISSING, Deferred, Field, ParameterSpec, SignalSpec
+from atwood.model.declare.laws import Kind, Law
+from atwood.model.declare.quantities import Quantity
+from atwood.model.values.outline import Outline
+from atwood.model.values.vector import Vector, dot, norm
+
+__all__ = ["Binding", "Component", "bind"]
+
+
+@dataclass_transform(kw_only_default=True, field_specifiers=(connector,))
+class Component:
+    """A part: it has parameters, connectors and laws, and sees neither the graph nor the solver.
+
+    Subclasses declare their fields in the class body with `parameter`, `connector` and `signal`, and their laws as
+    methods marked with `inertia`, `potential`, `dissipation`, `force`, `constraint`, `joint`, `observable` and
+    `event`. Within a law, ``self.stiffness`` is the parameter, ``self.a.position`` what the connector knows,
+    ``self.time`` the time.
+
+    Parameters
+    ----------
+    **values
+        Parameters and signals by name.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown, a required parameter is missing, or a value is not admissible.
+    """
+
+    modes: ClassVar[tuple[str, ...]] = ()
+    """Modes of the component, the usual one first; empty if it has just one."""
+    mode_parameter: ClassVar[str] = ""
+    """Name of the choice parameter that says the mode at the start; the usual one if empty."""
+
+    spaces: ClassVar[tuple[str, ...]] = ("line", "plane", "space")
+    """Where it means something; in a scene that lives elsewhere it is refused."""
+
+    _parameters: ClassVar[dict[str, ParameterSpec]] = {}
+    _signals: ClassVar[dict[str, SignalSpec]] = {}
+    _connectors: ClassVar[dict[str, ConnectorSpec]] = {}
+    _laws: ClassVar[dict[str, Law]] = {}
+
+    _parent: Component | None
+    _name: str
+    _settings: dict[str, Any]
+    _token: object
+    _bound: Binding | None = None
+    _declared: str = ""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        merge_inherited(cls)
+        for name, value in list(vars(cls).items()):
+            law = getattr(value, "_atwood_law", None)
+            if isinstance(value, (Field, ConnectorSpec)) or isinstance(law, Law):
+                check_field_name(cls, name, value)
+            if isinstance(value, ParameterSpec):
+                cls._parameters[name] = with_checked_default(value, cls)
+            elif isinstance(value, SignalSpec):
+                cls._signals[name] = with_checked_default(value, cls)
+            elif isinstance(value, ConnectorSpec):
+                cls._connectors[name] = value
+            elif isinstance(law, Law):
+                cls._laws[name] = law
+            elif name in cls._parameters:
+                changed = with_checked_default(cls._parameters[name].with_default(value), cls)
+                cls._parameters[name] = changed
+                setattr(cls, name, changed)
+            elif name in cls._signals:
+                replaced = with_checked_default(cls._signals[name].with_default(value), cls)
+                cls._signals[name] = replaced
+                setattr(cls, name, replaced)
+
+    def __init__(self, **values: Any) -> None:
+        self._start_as({}, None, "")
+        for name in values:
+            if name not in self._parameters and name not in self._signals:
+                raise self._unknown(name)
+        object.__setattr__(self, "_settings", {name: self._checked(name, value) for name, value in values.items()})
+        for name, spec in self._parameters.items():
+            if spec.default is MISSING and name not in self._settings:
+                raise ParameterError(
+                    "it has no default and must be given",
+                    where=f"{type(self).__name__}.{name}",
+                    advice=f"{name} is: {spec.doc}" + ("" if spec.unit.text == "1" else f" Unit {spec.unit.text}."),
+                )
+
+    def _start_as(self, settings: dict[str, Any], parent: Component | None, name: str) -> None:
+        """Give the object its bare state."""
+        object.__setattr__(self, "_parent", parent)
+        object.__setattr__(self, "_name", name)
+        object.__setattr__(self, "_settings", settings)
+        object.__setattr__(self, "_token", object())
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in self._parameters and name not in self._signals:
+            raise self._unknown(name)
+        before = self._settings
+        object.__setattr__(self, "_settings", {**before, name: self._checked(name, value)})
+        try:
+            self._follow()
+        except Exception:
+            object.__setattr__(self, "_settings", before)
+            raise
+
+    def __getattr__(self, name: str) -> Quantity:
+        """Return a reaction, which no method computes, as a quantity."""
+        for law in self.laws("constraint") if not name.startswith("_") else ():
+            if name in {reaction.split(".")[0] for reaction in law.options.reactions}:
+                return Quantity(self, name, law.options.unit, law.options.doc)
+        for law in self.laws("joint") if name in ("force", "torque") else ():
+            if law.options.rigid and law.options.reaction_doc:
+                return Quantity(self, name, "N" if name == "force" else "N*m", law.options.reaction_doc)
+        if name.startswith("_"):  # what Python asks for, which nobody reads
+            raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
+        raise self._missing(name)
+
+    def _missing(self, name: str) -> MissingNameError:
+        """Return the error that says what there is instead of a name: something alike, and the connectors."""
+        kind = type(self).__name__
+        there = [*self._connectors, *self._children(), *self._parameters, *self._signals]
+        there += [law.name for law in self.laws("observable")]
+        close = near_matches(name, there)
+        advice = suggestion(name, close) if close else ""
+        if self._connectors:
+            advice += f"{' ' if advice else ''}Its connectors are {', '.join(self._connectors)}."
+        return MissingNameError(f"a {kind} has no {name!r}", where=self.path or kind, advice=advice)
+
+    def __delattr__(self, name: str) -> None:
+        raise UsageError(f"{name!r} cannot be taken away", where=self.path or type(self).__name__)
+
+    def __repr__(self) -> str:
+        settings = ", ".join(f"{name}={value!r}" for name, value in self._settings.items())
+        return f"{type(self).__name__}({settings})"
+
+    # -- what a law reads ---------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> Scalar:
+        """The time, s; only within a law."""
+        return self._binding().time
+
+    @property
+    def on_a_line(self) -> bool:
+        """Whether the scene is on a line; only within a law."""
+        return self._binding().space == "line"
+
+    @property
+    def in_space(self) -> bool:
+        """Whether the scene is in space; only within a law."""
+        return self._binding().space == "space"
+
+    @property
+    def line(self) -> Vector:
+        """Unit vector of the scene's line; only within a law of a scene on a line."""
+        line = self._binding().line
+        if line is None:
+            raise DeclarationError("the scene is not on a line, so there is no direction of it", where=self.path)
+        return line
+
+    def side(self, a: Connector, b: Connector, default: float | None = 1.0) -> float:
+        """Return, on a line, +1 if b starts further along than a, and -1 otherwise.
+
+        Parameters
+        ----------
+        a, b
+            Connectors of this component.
+        default
+            What to return if the start does not tell; None to refuse.
+        """
+        sides = self._binding().sides
+        if sides is None:
+            return 1.0
+        known = sides.get((a.name, b.name), default)
+        if known is None:
+            raise DeclarationError(
+                f"it is not known on which side of {a.name} the end {b.name} starts",
+                where=self.path,
+                advice="Give start or guess positions of what they are joined to, such as 'm1.position.z'.",
+            )
+        return known
+
+    def distance(self, a: Any, b: Any, side: float | None = 1.0) -> Scalar:
+        """Return the distance of two points, m; on a line, positive in the order in which they start.
+
+        Parameters
+        ----------
+        a, b
+            Connectors of this component.
+        side
+            On a line, the sign if the start does not tell it; None to refuse.
+        """
+        separation = b.position - a.position
+        if self.on_a_line:
+            return dot(separation, self.line) * self.side(a, b, side)
+        return norm(separation)
+
+    def restate_start(self, given: Mapping[str, float], space: str) -> dict[str, float]:
+        """Return start values of this component, said in a way that a start can be found from.
+
+        A component overrides this where what people say is no good condition: Euler angles, say, have no derivative
+        where they meet, while the axes they stand for have one everywhere.
+
+        Parameters
+        ----------
+        given
+            Start values of its quantities by name, in SI units.
+        space
+            ``"line"``, ``"plane"`` or ``"space"``.
+        """
+        return dict(given)
+
+    def check_values(self) -> None:
+        """Refuse parameters of which each is admissible and which do not go together.
+
+        A component overrides this where a bound is another parameter, as the radius of a hole has; it is called before
+        the scene is assembled, and its parameters are then plain numbers.
+
+        Raises
+        ------
+        ParameterError
+            If they do not, with the path of the parameter and what to do.
+        """
+
+    def outline(self) -> Outline | None:
+        """Return what it looks like, for pictures; None for what has no shape of its own. Parameters are numbers."""
+        return None
+
+    def reaction(self, name: str) -> Scalar:
+        """Return a reaction of this component; only within a force, a dissipation, an observable or an event."""
+        reactions = self._binding().reactions
+        if name not in reactions:
+            advice = suggestion(name, reactions)
+            if any(law.options.rigid and law.options.reaction_doc for law in self.laws("joint")):
+                advice = (
+                    "What passes through a rigid connection is worked out after the motion: hold the parts by a "
+                    "@constraint, whose reaction a force may read."
+                )
+            raise DeclarationError(f"this law may not read the reaction {name!r}", where=self.path, advice=advice)
+        return reactions[name]
+
+    def energy_around(self, kind: str) -> Scalar:
+        """Return the kinetic or potential energy of the enclosing model; only within an observable."""
+        energies = self._binding().energies
+        if kind not in energies:
+            raise DeclarationError(f"this law may not read the {kind} energy", where=self.path)
+        return energies[kind]
+
+    def _binding(self) -> Binding:
+        if self._bound is None:
+            raise UsageError("this has a value only inside a law", where=self.path or type(self).__name__)
+        return self._bound
+
+    def _known_observable(self, name: str) -> Any:
+        return self._bound.known.get(name) if self._bound is not None else None
+
+    # -- what the fields read -----------------------------------------------------------------------------------
+
+    def _value(self, name: str) -> Any:
+        """Return the value of a field; deferred if it depends on a model that is only declared so far."""
+        if self._bound is not None:
+            return self._bound.values[name]
+        spec = self._field(name)
+        given = name in self._settings
+        value = self._settings[name] if given else spec.default
+        scope = self._parent if given else self
+        if not isinstance(value, Deferred) or scope is None:
+            return value
+        where = f"{self.path or type(self).__name__}.{name}"
+        try:
+            worked_out = value.value_in(scope)
+        except (ArithmeticError, TypeError) as error:
+            raise ParameterError(f"its value {value!r} cannot be worked out ({error})", where=where) from None
+        return spec.check(worked_out, where)
+
+    def _field(self, name: str) -> Field:
+        return self._parameters[name] if name in self._parameters else self._signals[name]
+
+    def _connector(self, spec: ConnectorSpec) -> Any:
+        made = self._made(spec)
+        if not made and spec.count is None:
+            raise spec.absent(self)
+        return made if spec.count is not None else made[0]
+
+    def _made(self, spec: ConnectorSpec) -> tuple[Connector, ...]:
+        """Return the connectors that a declaration stands for, of which there may be none."""
+        motions = self._bound.motions if self._bound is not None else {}
+        return tuple([spec.kind(self, name, motions.get(name)) for name in spec.names(self)])
+
+    def _checked(self, name: str, value: Any) -> Any:
+        return self._field(name).check(value, f"{self.path or type(self).__name__}.{name}")
+
+    def _unknown(self, name: str) -> ParameterError:
+        known = [*self._parameters, *self._signals]
+        kind = type(self).__name__
+        return ParameterError(
+            f"a {kind} has no parameter {name!r}", where=self.path or kind, advice=suggestion(name, known)
+        )
+
+    # -- what models change -------------------------------------------------------------------------------------
+
+    def _follow(self) -> None:
+        """Make what depends on a changed setting; for models."""
+
+    def _settle(self) -> None:
+        """Make what could not be made before the parts around were there; for models."""
+
+    def _children(self) -> Mapping[str, Component]:
+        """Return the parts by name; for models."""
+        return {}
+
+    # -- what the rest of Atwood reads --------------------------------------------------------------------------
+
+    @property
+    def path(self) -> str:
+        """The dotted path of the component from the outermost model; empty for the outermost itself."""
+        if self._parent is None:
+            return ""
+        prefix = self._parent.path
+        return f"{prefix}.{self._name}" if prefix else self._name
+
+    @classmethod
+    def laws(cls, kind: Kind) -> list[Law]:
+        """Return the laws of one kind, in the order in which they are declared."""
+        return [law for law in cls._laws.values() if law.kind == kind]
+
+    @classmethod
+    def parameter_specs(cls) -> Mapping[str, ParameterSpec]:
+        """Return the declared parameters by name."""
+        return cls._parameters
+
+    @classmethod
+    def signal_specs(cls) -> Mapping[str, SignalSpec]:
+        """Return the declared inputs by name."""
+        return cls._signals
+
+    @classmethod
+    def connector_specs(cls) -> Mapping[str, ConnectorSpec]:
+        """Return the declared connectors by name."""
+        return cls._connectors
+
+    def connectors(self) -> dict[str, Connector]:
+        """Return the connectors by name, each element of an array on its own."""
+        return {one.name: one for spec in self._connectors.values() for one in self._made(spec)}
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the parameter values by name."""
+        return {name: self._value(name) for name in self._parameters}
+
+    def input(self, name: str) -> InputRef:
+        """Return an input, to be connected to an output of another component."""
+        check(NAME, name, "name", f"{self.path or type(self).__name__}.input", DeclarationError)
+        if name not in self._signals:
+            raise DeclarationError(f"it has no input {name!r}", where=self.path, advice=suggestion(name, self._signals))
+        return InputRef(self, name)
+
+    def output(self, name: str) -> OutputRef:
+        """Return a scalar observable, or a reaction, to be connected to an input of another component."""
+        check(NAME, name, "name", f"{self.path or type(self).__name__}.output", DeclarationError)
+        names = self.output_names()
+        if name.split(".")[0] not in names:
+            raise DeclarationError(f"it has no output {name!r}", where=self.path, advice=suggestion(name, names))
+        return OutputRef(self, name)
+
+    @classmethod
+    def output_names(cls) -> list[str]:
+        """Return the names of its outputs: observables, and reactions of its constraints."""
+        reactions = (name.split(".")[0] for law in cls.laws("constraint") for name in law.options.reactions)
+        return [*(law.name for law in cls.laws("observable")), *dict.fromkeys(reactions)]
+
+    def copy(self) -> Self:
+        """Return a component with the same settings, that belongs to no model."""
+        twin = copy.copy(self)
+        object.__setattr__(twin, "_parent", None)
+        object.__setattr__(twin, "_name", "")
+        object.__setattr__(twin, "_declared", "")
+        return twin
+
+
+def bind(component: Component, binding: Binding) -> Any:
+    """Return the component with values in place of its fields, so that its laws can be evaluated.
+
+    Parameters
+    ----------
+    component
+        The component.
+    binding
+        Numbers, expressions or sympy terms for everything its laws may read.
+    """
+    twin = object.__new__(type(component))
+    for name in ("_parent", "_name", "_settings"):
+        object.__setattr__(twin, name, getattr(component, name))
+    object.__setattr__(twin, "_bound", binding)
+    return twin

@@ -1,0 +1,391 @@
+"""Laws: what a component contributes to mechanics.
+
+A law is a method of a component, marked by one of the decorators here.  It is written in plain arithmetic with
+Atwood's functions, and never sees the graph or the solver.  Newton's equations are nobody's law: they are put
+together from inertia, energy, forces and constraints.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeVar, overload
+
+from atwood.arguments import CALLBACK, DOC, FLAG, NAME, TEXT, check, each, number, one_of, takes, whole
+from atwood.errors import DeclarationError
+from atwood.expr import Scalar
+from atwood.model.declare.quantities import ObservableLaw
+from atwood.model.values.units import parse_si_unit
+from atwood.model.values.vector import Vector
+
+__all__ = [
+    "constraint",
+    "dissipation",
+    "event",
+    "force",
+    "inertia",
+    "joint",
+    "lagrangian",
+    "observable",
+    "potential",
+]
+
+Kind = Literal[
+    "potential", "dissipation", "force", "inertia", "lagrangian", "constraint", "joint", "observable", "event"
+]
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class Law:
+    """A marked method of a component; `options` is one of the `...Options` below, or None."""
+
+    kind: Kind
+    name: str
+    options: Any = None
+
+    def holds_in(self, space: str) -> bool:
+        """Return whether the law has a meaning in a space."""
+        return self.options is None or space in getattr(self.options, "spaces", (space,))
+
+    def acts_in(self, mode: str) -> bool:
+        """Return whether the law acts while its component is in a mode."""
+        modes = getattr(self.options, "modes", ())
+        return not modes or mode in modes
+
+
+@dataclass(frozen=True)
+class ActingOptions:
+    """In which modes a potential, a Rayleigh function or loads act; in all when empty."""
+
+    modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ConstraintOptions:
+    """See `constraint`."""
+
+    reactions: tuple[str, ...]
+    unit: str
+    sign: float
+    doc: str
+    modes: tuple[str, ...]
+    spaces: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class JointOptions:
+    """See `joint`."""
+
+    a: str
+    b: str
+    coordinates: tuple[str, ...]
+    solves: tuple[str, ...]
+    spaces: tuple[str, ...]
+    rigid: bool
+    reaction_doc: str
+    modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ObservableOptions:
+    """See `observable`."""
+
+    unit: str
+    doc: str
+    periodic: bool
+    rate: str
+    spaces: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class EventOptions:
+    """See `event`."""
+
+    modes: tuple[str, ...]
+    direction: int
+    target: str
+    message: str
+    unit: str
+    impact: bool
+    spaces: tuple[str, ...] = ("line", "plane", "space")
+
+
+def _mark(function: _F, law: Law) -> _F:
+    function._atwood_law = law  # type: ignore[attr-defined]
+    return function
+
+
+def _acting(kind: Kind, function: _F | None, modes: Sequence[str]) -> _F | Callable[[_F], _F]:
+    """Mark a method by itself, or return what marks one with options."""
+    options = ActingOptions(check(_NAMES, modes, "modes", kind, DeclarationError))
+    if function is not None:
+        check(CALLBACK, function, "function", kind, DeclarationError)
+    if function is None:
+        return lambda method: _mark(method, Law(kind, method.__name__, options))
+    return _mark(function, Law(kind, function.__name__, options))
+
+
+@overload
+def potential(function: _F) -> _F: ...
+@overload
+def potential(*, modes: Sequence[str] = ()) -> Callable[[_F], _F]: ...
+def potential(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Callable[[_F], _F]:
+    """Mark a method that returns a potential energy, J, from positions, angles and time.
+
+    Parameters
+    ----------
+    function
+        The method, where the mark has no options.
+    modes
+        The modes of the component in which it acts; all when empty. Energy that is there when such a mode is entered,
+        or left, counts as work that was put in, or taken out, at that moment.
+    """
+    return _acting("potential", function, modes)
+
+
+@overload
+def dissipation(function: _F) -> _F: ...
+@overload
+def dissipation(*, modes: Sequence[str] = ()) -> Callable[[_F], _F]: ...
+def dissipation(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Callable[[_F], _F]:
+    """Mark a method that returns a Rayleigh function, W: half the dissipated power, from velocities.
+
+    The force on each connector is minus the derivative with respect to its velocity (Goldstein, section 1.5).
+
+    Parameters
+    ----------
+    function
+        The method, where the mark has no options.
+    modes
+        The modes of the component in which it acts; all when empty.
+    """
+    return _acting("dissipation", function, modes)
+
+
+@overload
+def force(function: _F) -> _F: ...
+@overload
+def force(*, modes: Sequence[str] = ()) -> Callable[[_F], _F]: ...
+def force(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Callable[[_F], _F]:
+    """Mark a method that returns the loads it puts on its connectors, an iterable of `Load`.
+
+    Parameters
+    ----------
+    function
+        The method, where the mark has no options.
+    modes
+        The modes of the component in which they act; all when empty.
+    """
+    return _acting("force", function, modes)
+
+
+def inertia(function: _F) -> _F:
+    """Mark a method that returns an iterable of `PointInertia` and `BodyInertia`; it reads parameters and time.
+
+    Mass that changes with time comes, or goes, with the velocity that the body has where it is: it exerts no force, and
+    ``m(t) a = F`` holds for what is there (a leaking bucket). The thrust of mass that leaves with another velocity is a
+    `force` of its own. What depends on positions or joint coordinates is a `lagrangian`.
+    """
+    check(CALLBACK, function, "function", "inertia", DeclarationError)
+    return _mark(function, Law("inertia", function.__name__))
+
+
+def lagrangian(function: _F) -> _F:
+    """Mark a method that returns a Lagrangian, J, from positions, velocities, orientations, their rates and time.
+
+    It acts by ``dL/dq - d/dt dL/dq'`` on whatever its connectors are joined to (Goldstein, section 1.4), so that
+    inertia may depend on coordinates, and terms may be linear in velocities. It has to be smooth. It has no weight
+    besides the potential energy that is in it. Its energy is ``p q' - L`` (Goldstein, section 2.7): potential energy is
+    minus its value without velocities, kinetic energy the rest.
+    """
+    check(CALLBACK, function, "function", "lagrangian", DeclarationError)
+    return _mark(function, Law("lagrangian", function.__name__, ActingOptions(())))
+
+
+_SPACES = each(one_of(("line", "plane", "space")), "some of 'line', 'plane' and 'space'", 1)
+_NAMES = each(NAME, "names, as texts")
+
+
+@takes(
+    DeclarationError,
+    reaction=each(NAME, "a name, or several", 1),
+    unit=TEXT,
+    doc=DOC,
+    sign=number(),
+    modes=_NAMES,
+    spaces=_SPACES,
+)
+def constraint(
+    *,
+    reaction: str | Sequence[str],
+    unit: str = "N",
+    doc: str,
+    sign: float = 1.0,
+    modes: Sequence[str] = (),
+    spaces: Sequence[str] = ("line", "plane", "space"),
+) -> Callable[[_F], _F]:
+    """Mark a method that returns what must stay zero: one scalar, a `Vector`, or a sequence of scalars.
+
+    Parameters
+    ----------
+    reaction
+        Name of the quantity that the multiplier is reported as; one for each scalar (``"force"`` for a vector gives
+        ``force.x``, ``force.y``, ``force.z``).
+    unit
+        Unit of the reaction.
+    doc
+        One line of what the reaction is, with its sign.
+    sign
+        The reaction is `sign` times the multiplier. With +1 it is the generalized force along the residual.
+    modes
+        The modes of the component in which the constraint acts; all when empty.
+    spaces
+        The spaces in which it acts.
+    """
+    parse_si_unit(unit)
+    names = (reaction,) if isinstance(reaction, str) else tuple(reaction)
+    options = ConstraintOptions(names, unit, sign, doc, tuple(modes), tuple(spaces))
+    return lambda function: _mark(function, Law("constraint", function.__name__, options))
+
+
+@takes(
+    DeclarationError,
+    a=NAME,
+    b=NAME,
+    coordinates=_NAMES,
+    solves=_NAMES,
+    spaces=_SPACES,
+    rigid=FLAG,
+    reaction=TEXT,
+    modes=_NAMES,
+)
+def joint(
+    a: str,
+    b: str,
+    *,
+    coordinates: Sequence[str] = (),
+    solves: Sequence[str] = (),
+    spaces: Sequence[str] = ("plane",),
+    rigid: bool = False,
+    reaction: str = "",
+    modes: Sequence[str] = (),
+) -> Callable[[_F], _F]:
+    """Mark a method that returns the `Placement` of connector b seen from connector a, for given joint coordinates.
+
+    A joint is a constraint together with coordinates that solve it.
+
+    Parameters
+    ----------
+    a, b
+        Names of two connectors; ``"world"`` for a joint to the world itself.
+    coordinates
+        Names of the joint coordinates, which are the arguments of the method, in this order. Each is also an
+        observable of the component.
+    solves
+        Names of the constraints that hold whatever the coordinates are.
+    spaces
+        The spaces in which this description holds.
+    rigid
+        Whether a and b belong to one body; then there are no coordinates and no constraint.
+    reaction
+        For a rigid joint: one line of what its force and torque are reported as; empty to report none.
+    modes
+        The modes of the component in which it holds; all when empty.
+    """
+    options = JointOptions(a, b, tuple(coordinates), tuple(solves), tuple(spaces), rigid, reaction, tuple(modes))
+    return lambda function: _mark(function, Law("joint", function.__name__, options))
+
+
+@takes(DeclarationError, unit=TEXT, doc=DOC, periodic=FLAG, rate=TEXT, spaces=_SPACES)
+def observable(
+    *,
+    unit: str,
+    doc: str,
+    periodic: bool = False,
+    rate: str = "",
+    spaces: Sequence[str] = ("line", "plane", "space"),
+) -> Callable[[_F], _F]:
+    """Mark a method that returns a quantity to report: a scalar or a `Vector`.
+
+    Parameters
+    ----------
+    unit
+        SI unit.
+    doc
+        One line of meaning.
+    periodic
+        Whether it is an angle that comes out within one turn; it is then unwrapped along a run.
+    rate
+        Name of the observable that is its rate, by which the turns of a periodic one are counted.
+    spaces
+        The spaces in which it has a meaning.
+    """
+    parse_si_unit(unit)
+
+    def decorate(function: _F) -> _F:
+        name = function.__name__
+
+        @functools.wraps(function)
+        def read(self: Any) -> Any:
+            known = self._known_observable(name)
+            return function(self) if known is None else known
+
+        law = Law("observable", name, ObservableOptions(unit, doc, periodic, rate, tuple(spaces)))
+        return ObservableLaw(read, law)  # type: ignore[return-value]
+
+    return decorate
+
+
+@takes(
+    DeclarationError,
+    target=NAME,
+    message=DOC,
+    unit=TEXT,
+    modes=_NAMES,
+    direction=whole("-1, 0 or +1", -1, 1),
+    impact=FLAG,
+    spaces=_SPACES,
+)
+def event(
+    *,
+    target: str,
+    message: str,
+    unit: str = "1",
+    modes: Sequence[str] = (),
+    direction: int = 0,
+    impact: bool = False,
+    spaces: Sequence[str] = ("line", "plane", "space"),
+) -> Callable[[_F], _F]:
+    """Mark a method whose zero crossing changes the mode of the component or ends the run.
+
+    Parameters
+    ----------
+    target
+        The mode to go to, ``"stop"``, or the name of a choice parameter that says which of these.
+    message
+        What has happened, in words.
+    unit
+        SI unit of the value, which says what is small.
+    modes
+        The modes in which it is watched; all when empty.
+    direction
+        +1 to see crossings upwards only, -1 downwards only, 0 both.
+    impact
+        Whether velocities jump: they are made consistent with the new mode by a plastic impact.
+    spaces
+        The spaces in which it is watched.
+    """
+    parse_si_unit(unit)
+    options = EventOptions(tuple(modes), direction, target, message, unit, impact, tuple(spaces))
+    return lambda function: _mark(function, Law("event", function.__name__, options))
+
+
+def scalars(value: Any) -> list[Scalar]:
+    """Return what a law gave as a list of scalars."""
+    if isinstance(value, Vector):
+        return list(value)
+    if isinstance(value, Iterable):
+        return list(value)
+    return [value]

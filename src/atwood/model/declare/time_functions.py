@@ -1,0 +1,198 @@
+"""Functions of time: tried out on an expression, written as plain data, and read back.
+
+A function is written as a list of steps, each ``[operation, argument, ...]``. An argument is a number, ``"t"`` for
+the time, or ``"#3"`` for the value of step 3; the value of the function is that of the last step.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from atwood.errors import AtwoodError, ParameterError, UsageError
+from atwood.expr.core import functions
+from atwood.expr.core.analysis import live
+from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.operations import BINARY, UNARY
+
+__all__ = ["StoredFunction", "check_function", "write_function"]
+
+_ADVICE = "Write it in plain arithmetic with Atwood's own functions (atwood.sin, atwood.select, ...)."
+Steps = Sequence[Sequence[Any]]
+
+
+def trace(function: Callable[[Any], Any], where: str) -> Expression:
+    """Return what a function of time gives for the symbol ``t`` of a graph of its own.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be evaluated on an expression.
+    """
+    graph = Graph()
+    try:
+        return graph.convert(function(graph.symbol("t")))
+    except RecursionError:
+        reason = "it calls itself without end"
+    except Exception as error:  # what a user's function raises is anything
+        reason = error.message if isinstance(error, AtwoodError) else f"{type(error).__name__}: {error}"
+    raise ParameterError(
+        f"this function of time cannot be evaluated on an expression ({reason})", where=where, advice=_ADVICE
+    )
+
+
+def check_function(function: Callable[[Any], Any], where: str) -> None:
+    """Refuse a function of time that cannot be evaluated on an expression."""
+    if not isinstance(function, StoredFunction):
+        trace(function, where)
+
+
+def write_function(function: Callable[[Any], Any], where: str) -> list[list[Any]]:
+    """Return a function of time as steps.
+
+    Parameters
+    ----------
+    function
+        The function.
+    where
+        The path of the input that it drives.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be evaluated on an expression, or calls an external function.
+    """
+    if isinstance(function, StoredFunction):
+        return [list(step) for step in function.steps]
+    result = trace(function, where)
+    written: dict[int, Any] = {}
+    steps: list[list[Any]] = []
+    for node in live([result]):
+        if node.is_symbol:
+            written[node.index] = "t"
+            continue
+        if node.is_constant and math.isfinite(node.value):
+            written[node.index] = node.value
+            continue
+        if node.operation not in _EVALUATE:
+            raise ParameterError(
+                f"this function of time cannot be stored, because of {node!r}",
+                where=where,
+                advice="External functions and infinite constants cannot be written to a file; set it after loading.",
+            )
+        own = [] if node.payload is None else [node.payload]
+        written[node.index] = f"#{len(steps)}"
+        steps.append([node.operation, *own, *(written[argument.index] for argument in node.arguments)])
+    if written[result.index] != f"#{len(steps) - 1}":  # the time itself, or a constant
+        steps.append(["value", written[result.index]])
+    return steps
+
+
+class StoredFunction:
+    """A function of time that was read back; works on floats and expressions alike.
+
+    Parameters
+    ----------
+    steps
+        As written by `write_function`.
+    where
+        The path of the input that it drives.
+
+    Raises
+    ------
+    ParameterError
+        If the steps do not make sense.
+    """
+
+    def __init__(self, steps: Steps, where: str = "") -> None:
+        if not isinstance(steps, (list, tuple)) or not steps:
+            raise ParameterError("a stored function needs a list of steps", where=where)
+        self.steps = tuple(_checked_step(step, number, where) for number, step in enumerate(steps))
+        check = trace(self._evaluate, where)
+        self.__name__ = f"stored function of {len(live([check]))} operations"
+
+    def __call__(self, t: Any) -> Any:
+        """Return the value at a time."""
+        return self._evaluate(t)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, StoredFunction) and self.steps == other.steps
+
+    def __hash__(self) -> int:
+        return hash(self.steps)
+
+    def __repr__(self) -> str:
+        return f"StoredFunction({[list(step) for step in self.steps]!r})"
+
+    def _evaluate(self, t: Any) -> Any:
+        values: list[Any] = []
+        for name, *arguments in self.steps:
+            read = (t if one == "t" else values[int(one[1:])] if isinstance(one, str) else one for one in arguments)
+            values.append(_EVALUATE[name](*read))
+        return values[-1]
+
+
+def _checked_step(step: Any, number: int, where: str) -> tuple[Any, ...]:
+    problem = ""
+    if not isinstance(step, (list, tuple)) or not step or not isinstance(step[0], str) or step[0] not in _EVALUATE:
+        problem = f"{step!r} is no operation that Atwood knows"
+    elif len(step) - 1 != _argument_count(step):
+        problem = f"{step!r} has a wrong number of arguments"
+    else:
+        for one in step[1:]:
+            if isinstance(one, str):
+                if one != "t" and not (one[:1] == "#" and one[1:].isdecimal() and int(one[1:]) < number):
+                    problem = f"{one!r} is not a value that is known at step {number}"
+            elif isinstance(one, bool) or not isinstance(one, (int, float)) or not math.isfinite(one):
+                problem = f"{one!r} is not a finite number"
+    if problem:
+        raise ParameterError(f"the stored function cannot be read: {problem}", where=where)
+    return tuple(step)
+
+
+def _argument_count(step: Sequence[Any]) -> int:
+    name = step[0]
+    if name == "solve":
+        size = step[1] if len(step) > 1 and isinstance(step[1], int) and step[1] > 0 else 0
+        return 1 + size * size + size
+    return 1 if name in UNARY or name == "value" else 3 if name == "select" else 2
+
+
+def _solve(size: int, *values: Any) -> list[Any]:
+    split = size * size
+    rows = [values[i * size : (i + 1) * size] for i in range(size)]
+    return functions.solve(rows, values[split:])
+
+
+def _component(position: int, unknowns: Any) -> Any:
+    if not isinstance(unknowns, list) or not 0 <= position < len(unknowns):
+        raise UsageError("it is not one of the unknowns of a linear system")
+    return unknowns[position]
+
+
+def _not(a: Any) -> Any:
+    return ~a if isinstance(a, Expression) else not a
+
+
+_NAMED: Mapping[str, Callable[..., Any]] = {
+    "value": lambda a: a,
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
+    "div": operator.truediv,
+    "neg": operator.neg,
+    "pow": operator.pow,
+    "less": operator.lt,
+    "less_equal": operator.le,
+    "logical_and": operator.and_,
+    "logical_or": operator.or_,
+    "logical_not": _not,
+    "select": functions.select,
+    "solve": _solve,
+    "component": _component,
+}
+_EVALUATE: Mapping[str, Callable[..., Any]] = {
+    name: _NAMED[name] if name in _NAMED else getattr(functions, name) for name in (*_NAMED, *UNARY, *BINARY)
+}

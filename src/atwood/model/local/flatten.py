@@ -1,0 +1,239 @@
+"""From a scene to its leaves: parts with their values by path, and who is joined with whom."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from atwood.errors import AtwoodError, DeclarationError, ParameterError, StartError, UsageError
+from atwood.model.compose.composite import Model
+from atwood.model.compose.connection_rules import find_end
+from atwood.model.compose.scene import Scene
+from atwood.model.declare.component import Component
+from atwood.model.declare.connectors import InputRef, OutputRef
+from atwood.model.declare.fields import LARGEST_ANGLE, Deferred, FieldReference, too_large_an_angle
+from atwood.model.values.units import Unit, parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
+
+__all__ = ["FlatScene", "Part", "flatten", "unit_at"]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A leaf of a scene.
+
+    Attributes
+    ----------
+    path
+        Its dotted path.
+    component
+        The component, for its laws.
+    values
+        Its parameters by name.
+    signals
+        Its inputs by name: a number, or a function of time.
+    """
+
+    path: str
+    component: Component
+    values: Mapping[str, Any]
+    signals: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class FlatScene:
+    """A scene as plain data: leaves, connections, start.
+
+    Attributes
+    ----------
+    name
+        Name of the scene.
+    space
+        ``"line"``, ``"plane"`` or ``"space"``.
+    line_axis
+        Unit vector of the line.
+    gravity
+        Acceleration of free fall along -z, m/s^2.
+    t_start, t_end
+        Time span, s.
+    parts
+        The leaves by path, in the order of declaration.
+    connections
+        Pairs of connector paths.
+    links
+        For each linked input (part path, input name): the output (part path, observable name).
+    start, guess
+        Start values by path.
+    """
+
+    name: str
+    space: str
+    line_axis: tuple[float, float, float]
+    gravity: float
+    t_start: float
+    t_end: float
+    parts: Mapping[str, Part]
+    connections: tuple[tuple[str, str], ...]
+    links: Mapping[tuple[str, str], tuple[str, str]]
+    start: Mapping[str, float]
+    guess: Mapping[str, float]
+
+
+def flatten(scene: Model, name: str | None = None) -> FlatScene:
+    """Take a scene apart into its leaves.
+
+    Parameters
+    ----------
+    scene
+        The scene; a plain model is taken as a scene with the usual settings.
+    name
+        What to call it; the name of its class otherwise.
+
+    Raises
+    ------
+    DeclarationError
+        If it holds no parts.
+    ParameterError
+        If a value that is bound to the parameters of an enclosing model is not admissible.
+    StartError
+        If a start value is no number.
+    """
+    if not isinstance(scene, Model):
+        raise UsageError(f"{scene!r} is no scene", advice="Pass a Scene or a Model.")
+    leaves: dict[str, Part] = {}
+    joined: list[tuple[str, str]] = []
+    start: dict[str, float] = {}
+    guess: dict[str, float] = {}
+    _collect(scene, leaves, joined, start, guess)
+    if not leaves:
+        where, advice = name or type(scene).__name__, "Add some: scene.add('bob', PointMass())."
+        raise DeclarationError("the scene has no parts", where=where, advice=advice)
+    connections, links = _split_links(scene, joined, leaves)
+    settings = scene if isinstance(scene, Scene) else Scene()
+    return FlatScene(
+        name=name or type(scene).__name__,
+        space=settings.space,
+        line_axis=_unit_vector(settings.line_axis),
+        gravity=settings.gravity,
+        t_start=settings.t_start,
+        t_end=settings.t_end,
+        parts=leaves,
+        connections=connections,
+        links=links,
+        start=start,
+        guess=guess,
+    )
+
+
+def _collect(
+    model: Model,
+    leaves: dict[str, Part],
+    joined: list[tuple[str, str]],
+    start: dict[str, float],
+    guess: dict[str, float],
+) -> None:
+    prefix = f"{model.path}." if model.path else ""
+    joined.extend((prefix + a, prefix + b) for a, b in model._connections)
+    for part in model.parts.values():
+        if isinstance(part, Model):
+            _collect(part, leaves, joined, start, guess)
+        else:
+            path = part.path
+            signals = {name: part._value(name) for name in part.signal_specs()}
+            part.check_values()
+            leaves[path] = Part(path, part, part.parameters(), signals)
+    if isinstance(model, Scene):  # after the parts, so that the outer scene has the last word
+        for target, given in ((start, model.start), (guess, model.guess)):
+            target.update({prefix + key: _number(value, model, key, prefix) for key, value in given.items()})
+
+
+def _number(value: Any, model: Model, key: str, prefix: str) -> float:
+    """Return a start value in SI units; text must be in a unit of what it is for, where that is known."""
+    path = prefix + key
+    wanted = unit_at(model, key)
+    if isinstance(value, Deferred):
+        if wanted is not None and value.unit is not None and not value.unit.has_dimension_of(wanted):
+            raise StartError(
+                f"it is bound to {value!r}, which is in {value.unit.text} and not in {wanted.text}", where=path
+            )
+        value = value.value_in(model)
+    if isinstance(value, str):
+        _, unit_text = split_quantity(value) or (0.0, "")
+        given = parse_unit(unit_text)
+        try:
+            value = parse_quantity(value, wanted or parse_si_unit(unit_of(given.exponents).text), path)
+        except ParameterError as error:
+            raise StartError(error.message, where=path, advice=error.advice) from None
+    try:
+        number = float(value)
+    except (TypeError, ValueError, AtwoodError):
+        raise StartError(f"{value!r} is not a number", where=path) from None
+    if not math.isfinite(number):
+        raise StartError(f"{number} is not a finite number", where=path, advice="Give a finite number.")
+    if wanted is not None and wanted.text == "rad" and abs(number) > LARGEST_ANGLE:
+        raise too_large_an_angle(number, path, StartError)
+    return number
+
+
+def unit_at(model: Component, key: str) -> Unit | None:
+    """Return the unit of the observable at a path within a model; None if there is no such observable."""
+    component, steps = model, key.split(".")
+    while steps[0] in component._children():
+        component, steps = component._children()[steps[0]], steps[1:]
+        if not steps:
+            return None
+    if len(steps) > 1 and steps[0] in component.connectors():
+        return parse_unit(_CONNECTOR_UNITS[steps[1]]) if steps[1] in _CONNECTOR_UNITS else None
+    for law in component.laws("observable"):
+        if law.name == steps[0]:
+            return parse_unit(law.options.unit)
+    return None
+
+
+_CONNECTOR_UNITS = {"position": "m", "velocity": "m/s", "angle": "rad", "angular_velocity": "rad/s"}
+
+
+def _split_links(
+    scene: Model, joined: list[tuple[str, str]], leaves: Mapping[str, Part]
+) -> tuple[tuple[tuple[str, str], ...], dict[tuple[str, str], tuple[str, str]]]:
+    """Tell connections of connectors from links of outputs to inputs."""
+    connections: list[tuple[str, str]] = []
+    links: dict[tuple[str, str], tuple[str, str]] = {}
+    for a, b in joined:
+        first, second = find_end(scene, a), find_end(scene, b)
+        if isinstance(second, InputRef):
+            first, second = second, first
+        if not isinstance(first, InputRef) or not isinstance(second, OutputRef):
+            connections.append((a, b))
+            continue
+        for target in _driven_inputs(first, leaves):
+            if target in links:
+                raise DeclarationError("it is connected to two outputs", where=".".join(target))
+            links[target] = (second.component.path, second.name)
+    return tuple(connections), links
+
+
+def _driven_inputs(end: InputRef, leaves: Mapping[str, Part]) -> Iterator[tuple[str, str]]:
+    """Return the inputs of leaves that follow an input, which may be that of a model."""
+    if end.component.path in leaves and leaves[end.component.path].component is end.component:
+        yield end.component.path, end.name
+        return
+    for path, part in leaves.items():
+        for name in part.signals:
+            component, source = part.component, name
+            while component is not end.component or source != end.name:
+                bound = component._settings.get(source)
+                if not isinstance(bound, FieldReference) or component._parent is None:
+                    break
+                component, source = component._parent, bound.name
+            else:
+                yield path, name
+
+
+def _unit_vector(axis: tuple[float, float, float]) -> tuple[float, float, float]:
+    length = math.sqrt(sum(a * a for a in axis))
+    if length == 0.0:
+        raise DeclarationError("the direction of the line has no length", where="line_axis")
+    x, y, z = (a / length for a in axis)
+    return x, y, z

@@ -1,0 +1,143 @@
+"""Joint coordinates as functions of the joint's frames, and parts that take hold of them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from atwood.errors import AtwoodError, DeclarationError
+from atwood.expr import Expression, Graph, tan
+from atwood.model.declare.component import bind
+from atwood.model.declare.laws import ConstraintOptions, Law
+from atwood.model.local.flatten import Part
+from atwood.model.local.joint_references import Held
+from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
+
+__all__ = ["Grip", "counting_constraints", "find_grips", "formulas_of"]
+
+Formulas = Mapping[Expression, tuple[Expression, Expression | None]]
+"""For symbols of joint coordinates: the coordinate and its rate as functions of the joint's frames."""
+
+
+@dataclass(frozen=True)
+class Grip:
+    """A joint's coordinate that a part takes hold of.
+
+    Attributes
+    ----------
+    connector
+        The connector of the part.
+    symbol
+        The symbol of the coordinate.
+    value, rate
+        The coordinate and its rate as functions of the joint's frames.
+    connectors
+        The joint's connectors by their full paths.
+    borrowed
+        For these paths: the joint and the name of the connector.
+    """
+
+    connector: str
+    symbol: Expression
+    value: Expression
+    rate: Expression | None
+    connectors: Mapping[str, LocalConnector]
+    borrowed: Mapping[str, tuple[str, str]]
+
+
+def find_grips(taken: Sequence[tuple[Held, LocalPart]], graph: Graph) -> list[Grip]:
+    """Return what a part takes hold of.
+
+    Parameters
+    ----------
+    taken
+        The joints' coordinates with what these joints contribute.
+    graph
+        Where expressions live.
+
+    Raises
+    ------
+    DeclarationError
+        If what a joint offers is no coordinate of it.
+    """
+    found = []
+    for held, joint in taken:
+        symbol = graph.symbol(f"{held.joint}.{held.coordinate}")
+        if not any(symbol in one.coordinates for one in joint.joints):
+            raise DeclarationError(f"it offers {held.coordinate!r}, which is no coordinate of it", where=held.joint)
+        bound = bind(joint.part.component, joint.binding)
+        value, rate = formulas_of(joint.part, bound, [symbol], graph)[symbol]
+        connectors = {f"{held.joint}.{name}": one for name, one in joint.connectors.items()}
+        borrowed = {f"{held.joint}.{name}": (held.joint, name) for name in joint.connectors}
+        found.append(Grip(held.connector, symbol, value, rate, connectors, borrowed))
+    return found
+
+
+def formulas_of(part: Part, bound: Any, symbols: Sequence[Expression], graph: Graph) -> Formulas:
+    """Return what coordinates of a joint, and their rates, are in terms of its connectors.
+
+    Parameters
+    ----------
+    part
+        The joint.
+    bound
+        Its component, to be evaluated on its symbols.
+    symbols
+        The symbols of the coordinates.
+    graph
+        Where expressions live.
+    """
+    laws = {law.name: law for law in part.component.laws("observable")}
+
+    def formula(name: str) -> Expression:
+        try:
+            return graph.convert(getattr(bound, name)())
+        except AtwoodError as error:
+            if error.where.startswith(part.path):
+                raise
+            raise type(error)(error.message, where=f"{part.path}.{name}", advice=error.advice) from error
+        except Exception as error:  # whatever a law of somebody's own can raise
+            raise DeclarationError(
+                f"the law cannot be evaluated ({type(error).__name__}: {error})", where=f"{part.path}.{name}"
+            ) from error
+
+    found = {}
+    for symbol in symbols:
+        name = symbol.name.rpartition(".")[2]
+        if name in laws and laws[name].holds_in(bound._binding().space):
+            rate = laws[name].options.rate
+            found[symbol] = formula(name), formula(rate) if rate in laws else None
+    return found
+
+
+def counting_constraints(
+    part: Part, counted: Collection[str], formulas: Formulas, graph: Graph
+) -> list[LocalConstraint]:
+    """Return constraints that tie joint coordinates, which count turns, to orientations, which do not.
+
+    They hold where nothing hangs on the joint. ``2 tan((phi - formula)/2)`` has slope one at each of its zeros, which
+    are whole turns apart, and no jump where the formula has one.
+
+    Parameters
+    ----------
+    part
+        The joint.
+    counted
+        Names of the coordinates that other parts take hold of.
+    formulas
+        The coordinates as functions of the joint's frames.
+    graph
+        Where expressions live.
+    """
+    found = []
+    for law in part.component.laws("observable"):
+        symbol = graph.symbol(f"{part.path}.{law.name}") if law.name in counted else None
+        if symbol is None or symbol not in formulas or not law.options.periodic:
+            continue
+        doc = "Torque that gears pass on to the frames of the joint."
+        options = ConstraintOptions((law.name,), "N*m", 1.0, doc, (), ("space",))
+        value = 2.0 * tan(0.5 * (symbol - formulas[symbol][0]))
+        counting = Law("constraint", f"count_{law.name}", options)
+        found.append(LocalConstraint(counting, 0, graph.convert(value), law.name, 1.0, symbol))
+    return found

@@ -1,0 +1,402 @@
+"""Laws on local symbols: what each part contributes, before anyone knows where its connectors are.
+
+Every connector gets symbols of its own for what a law can read. Evaluating a law on them gives an expression that
+says by itself which connectors it depends on, and whose derivatives are the forces at them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+from atwood.errors import AtwoodError, DeclarationError, ParameterError, UnsupportedError
+from atwood.expr import Expression, Graph, Scalar, depends_on, live
+from atwood.model.declare.carried_inertia import Asked, Carried
+from atwood.model.declare.component import Binding, bind
+from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
+from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.fields import ParameterSpec
+from atwood.model.declare.laws import Law, scalars
+from atwood.model.local.flatten import FlatScene, Part
+from atwood.model.local.joint_coordinates import Grip, counting_constraints, find_grips, formulas_of
+from atwood.model.local.joint_references import Held, find_held
+from atwood.model.local.moving_mass import check_lagrangians, find_varying
+from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart, multiplier_symbol
+from atwood.model.returned import call_law, listed, one_scalar
+from atwood.model.values.space import FIXED_AXES, Space, planar_axes
+from atwood.model.values.vector import Vector
+
+__all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "ParameterTable", "localize"]
+
+
+@dataclass
+class ParameterTable:
+    """The parameters of a scene as symbols, with their values; filled while the laws are read."""
+
+    graph: Graph
+    values: dict[Expression, float] = field(default_factory=dict)
+    space: str = "plane"
+
+    def scalar(self, name: str, value: float, structural: bool = False) -> Scalar:
+        """Return the symbol of a parameter, or the plain number if it shapes the program (exact zero, structural)."""
+        if structural or value == 0.0:
+            return self.graph.constant(float(value))
+        symbol = self.graph.parameter(name)
+        self.values[symbol] = float(value)
+        return symbol
+
+
+def localize(
+    flat: FlatScene,
+    space: Space,
+    time: Expression,
+    table: ParameterTable,
+    modes: Mapping[str, str],
+    sides: Mapping[tuple[str, str, str], float] | None,
+    carried: Mapping[tuple[str, str], Carried] | None = None,
+) -> dict[str, LocalPart]:
+    """Evaluate the laws of every part on its local symbols.
+
+    Parameters
+    ----------
+    flat
+        The scene.
+    space
+        What it lives in.
+    time
+        The symbol of time.
+    table
+        Takes up the parameters.
+    modes
+        Mode of each part that has modes.
+    sides
+        On a line: for (part, connector, connector) the sign of the second's position minus the first's; None while
+        they are not known yet.
+    carried
+        Inertia of the body that a connector is on, by part and connector, of those that ask for it; None while it is
+        not known yet.
+
+    Raises
+    ------
+    AtwoodError
+        If a law cannot be evaluated; it names the part and the law.
+    """
+    for path, part in flat.parts.items():
+        _check_space(path, part, space.name)
+    held = find_held(flat)
+    counted: dict[str, set[str]] = {}
+    for one in (one for several in held.values() for one in several):
+        counted.setdefault(one.joint, set()).add(one.coordinate)
+    found: dict[str, LocalPart] = {}
+    for path in sorted(flat.parts, key=lambda path: path in held):  # joints before what takes hold of them
+        taken = [(one, found[one.joint]) for one in held.get(path, ())]
+        part, own = flat.parts[path], counted.get(path, ())
+        found[path] = _localize_part(part, flat, space, time, table, modes, sides, taken, own, carried or {})
+    return {path: found[path] for path in flat.parts}
+
+
+def _check_space(path: str, part: Part, space: str) -> None:
+    """Refuse a part that means nothing in a scene's space."""
+    known = type(part.component).spaces
+    if space not in known:
+        kind, places = type(part.component).__name__, " and ".join(_PLACES[one] for one in known)
+        raise UnsupportedError(
+            f"{kind} exists {places} only, and the scene is {_PLACES[space]}",
+            where=path,
+            advice=f"Give the scene space='{known[-1]}', or take the part out.",
+        )
+
+
+_PLACES = {"line": "on a line", "plane": "in a plane", "space": "in space"}
+
+
+@dataclass(frozen=True)
+class _Bound:
+    """A part on its symbols, before its laws are evaluated."""
+
+    binding: Binding
+    connectors: dict[str, LocalConnector]
+    signal_symbols: dict[str, Expression]
+    grips: Sequence[Grip]
+
+
+@dataclass(frozen=True)
+class _Laws:
+    """The laws of a part that hold in the space and the mode."""
+
+    part: Part
+    space: Space
+    mode: str
+    graph: Graph
+
+    def of(self, kind: Any) -> list[Law]:
+        laws = self.part.component.laws(kind)
+        return [law for law in laws if law.holds_in(self.space.name) and law.acts_in(self.mode)]
+
+    def scalars(self, bound: Any, kind: Any, only_in_modes: bool = False) -> tuple[Expression, ...]:
+        """Return what laws give that return one number, where that is not zero."""
+        chosen = [law for law in self.of(kind) if law.options.modes or not only_in_modes]
+        found = [call_law(self.part.path, law, partial(_scalar, bound, law, self.graph)) for law in chosen]
+        return tuple(one for one in found if not one.is_zero)
+
+    def listed(self, bound: Any, kind: Any) -> list[Any]:
+        """Return what laws give that return several things."""
+        return [one for law in self.of(kind) for one in call_law(self.part.path, law, partial(_listed, bound, law))]
+
+
+def _bind_part(
+    part: Part,
+    flat: FlatScene,
+    space: Space,
+    time: Expression,
+    table: ParameterTable,
+    sides: Mapping[tuple[str, str, str], float] | None,
+    taken: Sequence[tuple[Held, LocalPart]],
+) -> _Bound:
+    """Return the symbols of a part, and the numbers of its parameters."""
+    graph, component = table.graph, part.component
+    values = {name: _parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
+    signal_symbols: dict[str, Expression] = {}
+    for name, given in part.signals.items():
+        values[name] = _signal(part, name, given, flat, time, table, signal_symbols)
+    connectors = {
+        name: _local_connector(f"{part.path}.{name}", isinstance(one, Frame), space, graph)
+        for name, one in component.connectors().items()
+        if not isinstance(one, JointCoordinate)
+    }
+    grips = find_grips(taken, graph)
+    motions = {name: local_motion(symbols, space) for name, symbols in connectors.items()}
+    motions.update({one.connector: Motion(value=one.value, rate=one.rate) for one in grips})
+    own_sides = None if sides is None else {(a, b): s for (path, a, b), s in sides.items() if path == part.path}
+    binding = Binding(values=values, motions=motions, time=time, space=space.name, line=space.line, sides=own_sides)
+    for one in grips:
+        connectors.update(one.connectors)
+    return _Bound(binding, connectors, signal_symbols, grips)
+
+
+def _localize_part(
+    part: Part,
+    flat: FlatScene,
+    space: Space,
+    time: Expression,
+    table: ParameterTable,
+    modes: Mapping[str, str],
+    sides: Mapping[tuple[str, str, str], float] | None,
+    taken: Sequence[tuple[Held, LocalPart]],
+    counted: Collection[str],
+    carried: Mapping[tuple[str, str], Carried],
+) -> LocalPart:
+    graph, component = table.graph, part.component
+    symbols = _bind_part(part, flat, space, time, table, sides, taken)
+    binding, connectors = symbols.binding, symbols.connectors
+    bound = bind(component, binding)  # inertia and joints say what bodies there are, and may not ask what these have
+    known = {
+        name: replace(one, body=carried.get((part.path, name)) or Asked(graph, f"{part.path}.{name}"))
+        for name, one in binding.motions.items()
+    }
+    binding = replace(binding, motions=known)
+    acting = bind(component, binding)
+    mode = modes.get(part.path, component.modes[0] if component.modes else "")
+    laws, own, linked = _Laws(part, space, mode, graph), [*connectors.values()], symbols.signal_symbols.values()
+    potentials, switched = laws.scalars(acting, "potential"), laws.scalars(acting, "potential", only_in_modes=True)
+    constraints = [one for law in laws.of("constraint") for one in _local_constraints(part, law, acting, graph)]
+    inertias, lagrangians = laws.listed(bound, "inertia"), laws.scalars(acting, "lagrangian")
+    check_lagrangians(part.path, lagrangians, own, linked)
+    joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws.of("joint"))
+    coordinates = [symbol for joint in joints for symbol in joint.coordinates]
+    formulas = formulas_of(part, bound, coordinates, graph) if space.name == "space" else {}
+    # Only forces may read reactions: they are solved for together with the accelerations.
+    binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
+    acting = bind(component, binding)
+    dissipations, loads = laws.scalars(acting, "dissipation"), laws.listed(acting, "force")
+    forces: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components)]
+    _check_reads(part, connectors, potentials, dissipations)
+    return LocalPart(
+        part=part,
+        binding=binding,
+        connectors=connectors,
+        joints=joints,
+        point_inertias=tuple(one for one in inertias if isinstance(one, PointInertia)),
+        body_inertias=tuple(one for one in inertias if isinstance(one, BodyInertia)),
+        potentials=potentials,
+        dissipations=dissipations,
+        loads=tuple(loads),
+        constraints=(*constraints, *counting_constraints(part, counted, formulas, graph)),
+        signal_symbols=symbols.signal_symbols,
+        formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in symbols.grips}},
+        borrowed={full: end for one in symbols.grips for full, end in one.borrowed.items()},
+        switched=switched,
+        lagrangians=lagrangians,
+        varying=find_varying(part.path, inertias, own, linked, graph),
+        reads=_multipliers_read(part, constraints, forces, graph),
+    )
+
+
+def _readable_reactions(
+    part: Part, constraints: Sequence[LocalConstraint], mode: str, space: Space, graph: Graph
+) -> dict[str, Scalar]:
+    """Return the reactions of a part's constraints by name: multipliers times their sign; zero in other modes."""
+    found: dict[str, Scalar] = {}
+    for law in part.component.laws("constraint"):
+        if law.holds_in(space.name) and not law.acts_in(mode):
+            for name in law.options.reactions:
+                found |= dict.fromkeys((name, *(f"{name}.{axis}" for axis in "xyz")), 0.0)
+    for one in constraints:
+        found[one.reaction] = one.sign * multiplier_symbol(graph, part.path, one.law.name, one.index)
+    return found
+
+
+def _multipliers_read(
+    part: Part, constraints: Sequence[LocalConstraint], forces: Sequence[Scalar], graph: Graph
+) -> tuple[Expression, ...]:
+    """Return the multipliers of a part that its forces depend on."""
+    if not constraints or not forces:
+        return ()
+    used = {node.index for node in live([graph.convert(one) for one in forces])}
+    own = (multiplier_symbol(graph, part.path, one.law.name, one.index) for one in constraints)
+    return tuple(symbol for symbol in own if symbol.index in used)
+
+
+def _scalar(bound: Any, law: Law, graph: Graph) -> Expression:
+    return one_scalar(graph, getattr(bound, law.name)())
+
+
+def _check_reads(
+    part: Part,
+    connectors: Mapping[str, LocalConnector],
+    potentials: tuple[Expression, ...],
+    dissipations: tuple[Expression, ...],
+) -> None:
+    """Refuse energies that depend on velocities, and Rayleigh functions that do not: their forces would be lost."""
+    velocities = [symbol for one in connectors.values() for symbol in one.velocity]
+    velocities += [symbol for one in connectors.values() for symbol in one.spin]
+    if any(depends_on(value, velocities) for value in potentials):
+        raise DeclarationError(
+            "a potential depends on positions, angles and time, not on velocities",
+            where=part.path,
+            advice="Use @dissipation for what depends on velocities, or @force for any other load.",
+        )
+    if any(not value.is_parametric and not depends_on(value, velocities) for value in dissipations):
+        raise DeclarationError(
+            "a Rayleigh function depends on velocities, and this one does not",
+            where=part.path,
+            advice="Use @potential for what depends on positions.",
+        )
+
+
+def _listed(bound: Any, law: Law) -> list[Any]:
+    return listed(getattr(bound, law.name)(), (Load,) if law.kind == "force" else (PointInertia, BodyInertia))
+
+
+def _parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
+    value, name = part.values[spec.name], f"{part.path}.{spec.name}"
+    if value is None or spec.integer or spec.choices or spec.text:
+        return value
+    if spec.turning and table.space == "plane" and (value[0] != 0.0 or value[2] != 0.0):
+        advice = "Leave its x and z components zero: (0, -1, 0) turns counter-clockwise."
+        raise ParameterError("in a plane things turn about its normal only", where=name, advice=advice)
+    if spec.direction and not spec.turning and table.space == "plane" and value[1] != 0.0:
+        raise ParameterError("it points out of the plane", where=name, advice="Leave its y component zero.")
+    if spec.size is None:
+        return table.scalar(name, value, spec.structural)
+    axes = "xyz" if spec.size == 3 else [str(i) for i in range(spec.size)]
+    made = [table.scalar(f"{name}.{axis}", one, spec.structural) for axis, one in zip(axes, value, strict=True)]
+    return Vector(*made) if spec.size == 3 else tuple(made)
+
+
+def _signal(
+    part: Part,
+    name: str,
+    given: Any,
+    flat: FlatScene,
+    time: Expression,
+    table: ParameterTable,
+    signal_symbols: dict[str, Expression],
+) -> Scalar:
+    path = f"{part.path}.{name}"
+    if (part.path, name) in flat.links:
+        source, observable = flat.links[part.path, name]
+        if _is_source(flat.parts[source], flat):
+            return _source_value(flat.parts[source], observable, flat, time, table)
+        signal_symbols[name] = table.graph.symbol(f"{path}()")
+        return signal_symbols[name]
+    if not callable(given):
+        return table.scalar(path, given)
+    try:
+        return table.graph.convert(given(time))
+    except (TypeError, AtwoodError) as error:
+        raise DeclarationError(
+            f"this function of time cannot be evaluated on an expression ({error})",
+            where=path,
+            advice="Write it in plain arithmetic with Atwood's own functions (atwood.sin, atwood.select, ...).",
+        ) from error
+
+
+def _is_source(part: Part, flat: FlatScene) -> bool:
+    """Return whether a part's outputs are functions of time and parameters alone."""
+    return not part.component.connectors() and not any((part.path, name) in flat.links for name in part.signals)
+
+
+def _source_value(source: Part, observable: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
+    """Return the output of a part that depends on time and parameters alone."""
+    values = {name: _parameter(source, spec, table) for name, spec in source.component.parameter_specs().items()}
+    values |= {name: _signal(source, name, given, flat, time, table, {}) for name, given in source.signals.items()}
+    bound = bind(source.component, Binding(values=values, time=time))
+    law = next(law for law in source.component.laws("observable") if law.name == observable)
+    return table.graph.convert(call_law(source.path, law, getattr(bound, law.name)))
+
+
+def _local_connector(path: str, is_frame: bool, space: Space, graph: Graph) -> LocalConnector:
+    position = tuple(graph.symbol(f"{path}.position.{axis}") for axis in space.axis_names)
+    velocity = tuple(graph.symbol(f"{path}.velocity.{axis}") for axis in space.axis_names)
+    if not is_frame or not space.has_rotation:
+        return LocalConnector(position, velocity)
+    if space.name == "plane":
+        turns = graph.symbol(f"{path}.angle"), graph.symbol(f"{path}.angular_speed")
+        return LocalConnector(position, velocity, *turns)
+    x, y, z = (Vector(*(graph.symbol(f"{path}.{axis}_axis.{c}") for c in "xyz")) for axis in "xyz")
+    spin = Vector(*(graph.symbol(f"{path}.angular_velocity.{c}") for c in "xyz"))
+    return LocalConnector(position, velocity, axes=(x, y, z), angular_velocity=spin)
+
+
+def local_motion(symbols: LocalConnector, space: Space) -> Motion:
+    """Return the motion of a connector in terms of its symbols; the plane's rotation is about -y."""
+    position, velocity = space.vector(symbols.position), space.vector(symbols.velocity)
+    if symbols.axes is not None:
+        return Motion(position, velocity, axes=symbols.axes, angular_velocity=symbols.angular_velocity)
+    if symbols.angle is None or symbols.angular_speed is None:
+        still = Vector(0.0, 0.0, 0.0)
+        return Motion(position, velocity, axes=FIXED_AXES, angle=0.0, angular_velocity=still)
+    return Motion(
+        position,
+        velocity,
+        axes=planar_axes(symbols.angle),
+        angle=symbols.angle,
+        angular_velocity=Vector(0.0, -symbols.angular_speed, 0.0),
+    )
+
+
+def _local_joint(
+    part: Part, law: Law, bound: Any, graph: Graph, connectors: Mapping[str, LocalConnector]
+) -> LocalJoint:
+    coordinates = tuple(graph.symbol(f"{part.path}.{name}") for name in law.options.coordinates)
+    placement = call_law(part.path, law, lambda: getattr(bound, law.name)(*coordinates))
+    if not isinstance(placement, Placement):
+        raise DeclarationError("a joint must return a Placement", where=f"{part.path}.{law.name}")
+    ends = [connectors[name].axes for name in (law.options.a, law.options.b) if name in connectors]
+    return LocalJoint(law, coordinates, placement, tuple(axes for axes in ends if axes is not None))
+
+
+def _local_constraints(part: Part, law: Law, bound: Any, graph: Graph) -> Iterable[LocalConstraint]:
+    values = call_law(part.path, law, lambda: [one_scalar(graph, one) for one in scalars(getattr(bound, law.name)())])
+    names = law.options.reactions
+    if len(names) == 1 and len(values) == 3:
+        names = tuple(f"{names[0]}.{axis}" for axis in "xyz")
+    if len(names) != len(values):
+        raise DeclarationError(
+            f"it returns {len(values)} scalars and names {len(names)} reactions", where=f"{part.path}.{law.name}"
+        )
+    for index, (value, name) in enumerate(zip(values, names, strict=True)):
+        yield LocalConstraint(law, index, value, name, law.options.sign)

@@ -1,0 +1,152 @@
+"""What a part contributes, on symbols of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+from atwood.expr import Expression, Graph
+from atwood.model.declare.binding import Binding
+from atwood.model.declare.carried_inertia import Asked
+from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.laws import Law
+from atwood.model.local.flatten import Part
+from atwood.model.values.rotation import Axes
+from atwood.model.values.vector import Vector
+
+__all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "multiplier_symbol"]
+
+
+@dataclass(frozen=True)
+class LocalConnector:
+    """The symbols that stand for what one connector knows.
+
+    Attributes
+    ----------
+    position, velocity
+        One symbol for each free position component of the space.
+    angle, angular_speed
+        Rotation in the plane and its rate, for a frame in the plane; else None.
+    axes, angular_velocity
+        The frame's axes and its angular velocity, in world axes, for a frame in space; else None.
+    """
+
+    position: tuple[Expression, ...]
+    velocity: tuple[Expression, ...]
+    angle: Expression | None = None
+    angular_speed: Expression | None = None
+    axes: Axes | None = None
+    angular_velocity: Vector | None = None
+
+    @property
+    def orientation(self) -> tuple[Expression, ...]:
+        """The symbols that say how it is turned."""
+        if self.axes is not None:
+            return tuple(component for axis in self.axes for component in axis)
+        return () if self.angle is None else (self.angle,)
+
+    @property
+    def spin(self) -> tuple[Expression, ...]:
+        """The symbols that say how fast it turns."""
+        if self.angular_velocity is not None:
+            return tuple(self.angular_velocity)
+        return () if self.angular_speed is None else (self.angular_speed,)
+
+
+@dataclass(frozen=True)
+class LocalJoint:
+    """A joint law: its coordinates as symbols, the placement they give, and in space the axes of both its frames."""
+
+    law: Law
+    coordinates: tuple[Expression, ...]
+    placement: Placement
+    axes: tuple[Axes, ...] = ()
+
+
+@dataclass(frozen=True)
+class LocalConstraint:
+    """One scalar that must stay zero: its law, its number there, its reaction's name and sign.
+
+    One that `counts` gives a joint coordinate its value, turns counted, where nothing hangs on the joint.
+    """
+
+    law: Law
+    index: int
+    value: Expression
+    reaction: str
+    sign: float
+    counts: Expression | None = None
+
+
+def multiplier_symbol(graph: Graph, path: str, law: str, index: int) -> Expression:
+    """Return the symbol of a constraint's multiplier: of the part's path, its law, and the number within the law."""
+    return graph.symbol(f"lambda:{path}.{law}[{index}]")
+
+
+@dataclass(frozen=True)
+class LocalPart:
+    """What one part contributes, on its local symbols.
+
+    Attributes
+    ----------
+    part
+        The leaf.
+    binding
+        What the laws were evaluated on.
+    connectors
+        Symbols by connector name.
+    joints, point_inertias, body_inertias, potentials, dissipations, loads, constraints
+        What its laws returned.
+    signal_symbols
+        Stand-ins for inputs that are linked to an output.
+    formulas
+        For the symbol of each joint coordinate, the formulas of the observable of its name and of its rate: in space
+        of the part's own, and everywhere of those that it takes hold of.
+    borrowed
+        Connectors of joints that it takes hold of, which are among its own under their full paths.
+    reads
+        The multipliers that its laws of force read.
+    lagrangians
+        What its laws of that kind returned.
+    varying
+        Those of its inertias that change with time.
+    switched
+        Those of its potentials that act in some of its modes only.
+    """
+
+    part: Part
+    binding: Binding
+    connectors: Mapping[str, LocalConnector]
+    joints: tuple[LocalJoint, ...]
+    point_inertias: tuple[PointInertia, ...]
+    body_inertias: tuple[BodyInertia, ...]
+    potentials: tuple[Expression, ...]
+    dissipations: tuple[Expression, ...]
+    loads: tuple[Load, ...]
+    constraints: tuple[LocalConstraint, ...]
+    signal_symbols: Mapping[str, Expression]
+    formulas: Mapping[Expression, tuple[Expression, Expression | None]] = field(default_factory=dict)
+    borrowed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    switched: tuple[Expression, ...] = ()
+    reads: tuple[Expression, ...] = ()
+    lagrangians: tuple[Expression, ...] = ()
+    varying: tuple[PointInertia | BodyInertia, ...] = ()
+
+    @property
+    def asks(self) -> list[str]:
+        """Connectors of which it asks for the inertia of the body that they are on, which is not known yet."""
+        return [name for name, one in self.binding.motions.items() if isinstance(one.body, Asked) and one.body.is_read]
+
+    @property
+    def velocities(self) -> list[Expression]:
+        """The symbols that say how fast its connectors move and turn."""
+        return [symbol for one in self.connectors.values() for symbol in (*one.velocity, *one.spin)]
+
+    def is_idle(self, solved: Collection[tuple[str, str, int]]) -> bool:
+        """Return whether all that it does is held by constraints, as (part, law, number), that are solved anyhow."""
+        keys = [(self.part.path, one.law.name, one.index) for one in self.constraints]
+        return (
+            bool(keys)
+            and all(key in solved for key in keys)
+            and not (self.potentials or self.dissipations or self.loads or self.lagrangians)
+        )

@@ -1,0 +1,1 @@
+"""Values that laws compute with: units, vectors, rotations, spaces."""

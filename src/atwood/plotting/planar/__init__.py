@@ -1,0 +1,1 @@
+"""Mechanisms in a plane and on a line."""

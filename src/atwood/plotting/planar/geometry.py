@@ -1,0 +1,300 @@
+"""Where everything is, and what it looks like: shapes of parts, found from their laws and not from their names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import UsageError, suggestion
+from atwood.expr import Expression, Scalar, evaluate
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.build import Mechanism
+from atwood.mechanics.kinematics.orientation import body_offsets, plain
+from atwood.model.declare.connectors import Groove
+from atwood.model.local.laws import LocalPart
+from atwood.plotting.planar.columns import spread_columns
+from atwood.plotting.shapes.meshes import Mesh
+from atwood.plotting.shapes.outlines import outline_mesh, outline_of
+from atwood.result.result import Result
+
+__all__ = ["Kind", "Picture", "Shape", "find_connectors", "make_picture"]
+
+Kind = Literal["ground", "rod", "link", "spring", "damper", "rope", "mass", "pulley", "rail", "pivot", "solid"]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What a part looks like.
+
+    Attributes
+    ----------
+    part
+        Its path.
+    kind
+        How it is drawn.
+    nodes
+        Between which nodes, in order.
+    size
+        Mass of a mass, kg; zero otherwise.
+    surface
+        Of a solid its surface, in the axes of its node.
+    """
+
+    part: str
+    kind: Kind
+    nodes: tuple[int, ...]
+    size: float = 0.0
+    surface: Mesh | None = None
+
+    @cached_property
+    def rim(self) -> FloatArray:
+        """Of a solid the points of its surface that are farthest out on the page, in the axes of its node, m."""
+        assert self.surface is not None
+        page = self.surface.vertices[:, [0, 2]]
+        turn = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+        found: FloatArray = page[np.unique(np.argmax(page @ np.array([np.cos(turn), np.sin(turn)]), axis=0))]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A mechanism on the page along a run.
+
+    Attributes
+    ----------
+    time
+        Times, s.
+    points
+        Place of each node on the page, shape (times, 2).
+    shapes
+        What to draw.
+    direction
+        For a scene on a line: ``"across"`` or ``"up"``; empty in the plane.
+    radii
+        On a vertical line: radius of each pulley by its groove's node.
+    angles
+        Of the nodes of solids: how they are turned, counter-clockwise, rad, shape (times,).
+    """
+
+    time: FloatArray
+    points: Mapping[int, FloatArray]
+    shapes: tuple[Shape, ...]
+    direction: str
+    radii: Mapping[int, float]
+    angles: Mapping[int, FloatArray] = field(default_factory=dict)
+
+    @cached_property
+    def extent(self) -> float:
+        """The larger side of what is drawn."""
+        return float(np.max(np.ptp(self.everything(), axis=0))) or 1.0
+
+    def everything(self, shown: slice = slice(None)) -> FloatArray:
+        """Return the places that hold all that is drawn at some of the times, shape (places, 2)."""
+        places = [points[shown] for points in self.points.values()]
+        for shape in self.shapes:
+            if shape.surface is not None:
+                angles = self.angles[shape.nodes[0]][shown, None]
+                x, z = shape.rim.T
+                turned = np.stack([x * np.cos(angles) - z * np.sin(angles), x * np.sin(angles) + z * np.cos(angles)], 2)
+                middle = self.points[shape.nodes[0]][shown]
+                places += [middle + turned.min(axis=1), middle + turned.max(axis=1)]
+        return np.concatenate(places)
+
+
+def find_connectors(result: Result, paths: str | Sequence[str]) -> dict[str, int]:
+    """Return the nodes of connectors.
+
+    Parameters
+    ----------
+    result
+        The run.
+    paths
+        Paths of connectors, such as ``"rod2.b"``, or of parts that have a single one.
+
+    Raises
+    ------
+    UsageError
+        If there is no such connector.
+    """
+    found = {}
+    nodes = result.assembly.mechanism.graph.node_of
+    known = {f"{part}.{name}": node for (part, name), node in nodes.items()}
+    for path in paths:
+        below = [one for one in known if one == path or one.rpartition(".")[0] == path]
+        if len(below) > 1:
+            raise UsageError("it has several connectors", where=path, advice=f"Choose one: {', '.join(below)}.")
+        if not below:
+            raise UsageError("there is no such connector", where=path, advice=suggestion(path, known))
+        found[path] = known[below[0]]
+    return found
+
+
+def make_picture(result: Result, also: Iterable[int] = ()) -> Picture:
+    """Return where everything is on the page along a run of a scene in a plane or on a line.
+
+    Parameters
+    ----------
+    result
+        The run.
+    also
+        Nodes that are wanted though nothing is drawn there.
+    """
+    mechanism = result.assembly.mechanism
+    shapes = _shapes(mechanism)
+    points = _node_points(result)
+    used = {node for shape in shapes for node in shape.nodes} | set(also)
+    points = {node: values for node, values in points.items() if node in used}
+    direction = ""
+    radii: dict[int, float] = {}
+    if mechanism.space.line is not None:
+        axis = mechanism.space.line
+        direction = "up" if abs(float(axis.z)) > abs(float(axis.x)) else "across"
+        if direction == "up":
+            ropes = [shape.nodes for shape in shapes if shape.kind == "rope"]
+            others = [shape.nodes for shape in shapes if shape.kind != "rope" and len(shape.nodes) > 1]
+            heights = np.concatenate([values[:, 1] for values in points.values()])
+            columns, places, radii = spread_columns(
+                ropes, others, mechanism.bodies.body_of, 0.11 * float(np.ptp(heights) or 1.0)
+            )
+            for node, values in points.items():
+                values[:, 0] = places.get(node, columns.get(mechanism.bodies.body_of[node], 0.0))
+            _place_grounds(mechanism, shapes, points, columns)
+    angles = _node_angles(result, [shape.nodes[0] for shape in shapes if shape.surface is not None])
+    return Picture(result.time, points, tuple(shapes), direction, radii, angles)
+
+
+def _place_grounds(
+    mechanism: Mechanism, shapes: list[Shape], points: dict[int, FloatArray], columns: Mapping[int, float]
+) -> None:
+    """Put what is fixed in the column of what hangs on it."""
+    for shape in shapes:
+        if shape.kind == "pulley" and mechanism.bodies.body_of[shape.nodes[0]] == 0:
+            points[shape.nodes[1]][:, 0] = points[shape.nodes[0]][:, 0]
+            continue
+        for one, other in zip(shape.nodes, shape.nodes[1:], strict=False):
+            for node, partner in ((one, other), (other, one)):
+                body, beside = mechanism.bodies.body_of[node], mechanism.bodies.body_of[partner]
+                if body == 0 and beside != 0 and shape.kind != "rope":
+                    points[node][:, 0] = columns.get(beside, 0.0)
+
+
+def _node_points(result: Result) -> dict[int, FloatArray]:
+    """Return x and z of every node at the output times."""
+    nodes = sorted(result.assembly.equations.kinematics.placements.positions)
+
+    def places(assembly: Assembly) -> Iterator[Scalar]:
+        for node in nodes:
+            position = assembly.equations.kinematics.placements.positions[node]
+            where = assembly.mechanism.space.vector(tuple(position))
+            yield from (where.x, where.z)
+
+    whole = _along_run(result, "places", places)
+    return {node: whole[2 * i : 2 * i + 2].T.copy() for i, node in enumerate(nodes)}
+
+
+def _node_angles(result: Result, nodes: Sequence[int]) -> dict[int, FloatArray]:
+    """Return, in a plane, how nodes are turned at the output times; what has no orientation is not turned."""
+    if not nodes:
+        return {}
+
+    def angles(assembly: Assembly) -> Iterator[Scalar]:
+        mechanism, known = assembly.mechanism, assembly.equations.kinematics.placements.angles
+        for node in nodes:
+            body = mechanism.bodies.bodies[mechanism.bodies.body_of[node]]
+            own = known.get(body.index)
+            yield (0.0 if own is None else own) + plain(body_offsets(body, mechanism.space)[1][node])
+
+    return dict(zip(nodes, _along_run(result, "angles", angles), strict=True))
+
+
+def _along_run(result: Result, name: str, quantities: Callable[[Assembly], Iterable[Scalar]]) -> FloatArray:
+    """Return quantities of the configuration at the output times, shape (quantities, times)."""
+    pieces = []
+    for segment in result.run.segments:
+        assembly = segment.assembly
+        graph = assembly.mechanism.table.graph
+        program = assembly.state_program(name, [graph.convert(one) for one in quantities(assembly)])
+        idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
+        kernel = assembly.kernel(program, vectorized=True)
+        values = kernel(segment.time[None, :], segment.coordinates, segment.speeds, *idle)[0]
+        pieces.append(np.asarray(values)[:, segment.shown])
+    return np.concatenate(pieces, axis=1)
+
+
+def _shapes(mechanism: Mechanism) -> list[Shape]:
+    """Return the shapes of all parts, those that are drawn first in front."""
+    found: list[Shape] = []
+    for path, local in mechanism.locals_.items():
+        found += _shapes_of(mechanism, path, local)
+    order: tuple[Kind, ...] = (
+        "ground",
+        "rail",
+        "rope",
+        "spring",
+        "damper",
+        "solid",
+        "link",
+        "rod",
+        "pulley",
+        "pivot",
+        "mass",
+    )
+    return sorted(found, key=lambda shape: order.index(shape.kind))
+
+
+def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]:
+    """Return what a part looks like, from what its laws do."""
+    kinds = {name: one for name, one in local.part.component.connectors().items() if name in local.connectors}
+    nodes = {name: mechanism.graph.node_of[path, name] for name in kinds}
+    ends = [nodes[name] for name, one in kinds.items() if not isinstance(one, Groove)]
+    grooves = [nodes[name] for name, one in kinds.items() if isinstance(one, Groove)]
+    outline = outline_of(local) if mechanism.space.name == "plane" else None
+    if outline is not None:
+        return [Shape(path, "solid", (ends[0],), surface=outline_mesh(outline, around=120))]
+    masses = [one for one in local.point_inertias if len(one.points) == 1]
+    weight = sum(_value(mechanism, one.masses[0][0]) for one in masses)
+    joints = [joint.law.options for joint in local.joints]
+    if any(options.rigid and options.a == "world" for options in joints):
+        return [Shape(path, "ground", tuple(ends))]
+    if grooves and any(options.rigid for options in joints):
+        return [Shape(path, "pulley", (grooves[0], *ends[:1]), weight)]
+    if len(ends) == 2:
+        return _between(mechanism, path, local, (ends[0], ends[1]), grooves)
+    if masses and ends:
+        rail = [Shape(path, "rail", (0, ends[0]))] if joints and mechanism.space.name == "plane" else []
+        return [*rail, Shape(path, "mass", (ends[0],), weight)]
+    return []
+
+
+def _between(
+    mechanism: Mechanism, path: str, local: LocalPart, ends: tuple[int, int], grooves: list[int]
+) -> list[Shape]:
+    """Return what a part with two ends looks like."""
+    joints = list(local.joints)
+    if grooves or (local.constraints and not joints):
+        return [Shape(path, "rope", (ends[0], *grooves, ends[1]))]
+    if any(joint.law.options.rigid for joint in joints):
+        return [Shape(path, "link", ends)]
+    if local.potentials or local.dissipations:
+        turns = all(symbols.angle is not None for symbols in local.connectors.values())
+        if turns:
+            return []  # a torsion spring acts where its frames meet
+        return [Shape(path, "spring" if local.potentials else "damper", ends)]
+    if joints:
+        shifts = [c for joint in joints for c in joint.placement.displacement]
+        if all(not isinstance(c, Expression) and c == 0.0 for c in shifts):
+            return [Shape(path, "pivot", (ends[1],))]
+        is_rod = any(joint.placement.axes == "world" and joint.placement.rotation is None for joint in joints)
+        radius = local.part.values.get("radius", 0.0)  # of what rolls on a line, and not through it
+        rolls = float(radius) if isinstance(radius, (int, float)) else 0.0
+        return [Shape(path, "rod", ends) if is_rod else Shape(path, "rail", ends, rolls)]
+    return []
+
+
+def _value(mechanism: Mechanism, value: Scalar) -> float:
+    return float(evaluate([mechanism.table.graph.convert(value)], mechanism.known_at_start())[0])

@@ -1,0 +1,272 @@
+"""The strokes of a mechanism: how each kind of part is drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.plotting.canvas import COLOURS, GREY, INK
+from atwood.plotting.planar.geometry import Picture, Shape
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Pen", "draw_trace"]
+
+
+class Pen:
+    """Draws a mechanism at one time.
+
+    Parameters
+    ----------
+    picture
+        Where everything is.
+    """
+
+    def __init__(self, picture: Picture) -> None:
+        self.picture = picture
+        self.share = 1.0
+        self.unit = 0.01 * picture.extent
+        self.heavy = [shape for shape in picture.shapes if shape.kind == "mass" and shape.size > 0.0]
+        self.heaviest = max((shape.size for shape in self.heavy), default=1.0)
+        self.rails = {shape.part: self._rail_ends(shape) for shape in picture.shapes if shape.kind == "rail"}
+        self.middle = float(np.mean([points[:, 1].mean() for points in picture.points.values()]))
+        self.sliding = {shape.nodes[1] for shape in picture.shapes if shape.kind == "rail"}
+
+    def colour(self, shape: Shape) -> str:
+        """Return the colour of a mass; of very many, all have the same."""
+        if len(self.heavy) > len(COLOURS):
+            return COLOURS[0]
+        return COLOURS[self.heavy.index(shape)] if shape in self.heavy else INK
+
+    def draw(self, axes: Axes, moment: int, alpha: float, depth: int) -> None:
+        """Draw everything at one time.
+
+        Parameters
+        ----------
+        axes
+            Where.
+        moment
+            Number of the time.
+        alpha
+            How strongly: what is fainter is mixed with white, so that nothing shines through.
+        depth
+            What is drawn later lies in front.
+        """
+        for shape in self.picture.shapes:
+            points = np.array([self.picture.points[node][moment] for node in shape.nodes])
+            self.share = 1.0 if shape.kind == "ground" else alpha
+            look = {"zorder": depth}
+            getattr(self, f"_{shape.kind}")(axes, shape, points, look, moment)
+
+    def _tone(self, colour: str) -> tuple[float, float, float]:
+        """Return a colour as strongly as is being drawn."""
+        from matplotlib.colors import to_rgb
+
+        r, g, b = (self.share * part + 1.0 - self.share for part in to_rgb(colour))
+        return r, g, b
+
+    # -- what is fixed ---------------------------------------------------------------------------------------------
+
+    def _ground(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        x, z = points[0]
+        u = self.unit
+        look = {**look, "zorder": 2}
+        direction = self.picture.direction
+        if direction == "across":  # a wall
+            middle = np.mean([p[:, 0].mean() for p in self.picture.points.values()])
+            out = -1.0 if x <= middle else 1.0
+            axes.plot([x, x], [z - 5 * u, z + 5 * u], color=INK, linewidth=1.6, **look)
+            for k in np.linspace(-4, 5, 6):
+                axes.plot([x, x + 1.8 * u * out], [z + k * u, z + (k - 1.8) * u], color=INK, linewidth=0.9, **look)
+            return
+        radius = max((self.picture.radii.get(node, 0.0) for node in self._grooves_at(shape)), default=0.0)
+        side = 1.0 if direction or z >= self.middle else -1.0  # the mechanism hangs below it or stands on it
+        top = z + (1.35 * radius if radius else 0.0) + (0.0 if direction else 2.6 * u * side)
+        axes.plot([x - 4 * u, x + 4 * u], [top, top], color=INK, linewidth=1.6, **look)
+        for k in np.linspace(-4, 2.4, 5):
+            axes.plot([x + k * u, x + (k + 1.6) * u], [top, top + 1.6 * u * side], color=INK, linewidth=0.9, **look)
+        if radius:
+            axes.plot([x, x], [z, top], color=INK, linewidth=1.4, **look)
+        elif not direction:
+            axes.plot([x - 1.8 * u, x, x + 1.8 * u], [top, z, top], color=INK, linewidth=1.2, **look)
+
+    def _grooves_at(self, shape: Shape) -> list[int]:
+        """Return the grooves of the pulleys that a ground carries."""
+        return [s.nodes[0] for s in self.picture.shapes if s.kind == "pulley" and s.nodes[-1] in shape.nodes]
+
+    def _rail_ends(self, shape: Shape) -> FloatArray | None:
+        """Return the ends of the straight line along which something slides in the world; None if it moves itself."""
+        base, rider = (self.picture.points[node] for node in shape.nodes)
+        if np.max(np.ptp(base, axis=0)) > 1e-6 * self.picture.extent:
+            return None
+        middle = rider.mean(axis=0)
+        _, _, axes = np.linalg.svd(rider - middle, full_matrices=False)
+        along = (rider - middle) @ axes[0]
+        if np.ptp(along) < 1e-9 * self.picture.extent:
+            return None
+        reach = np.array([along.min(), along.max()]) + np.array([-6.0, 6.0]) * self.unit
+        if shape.size:  # it rolls on a line through the base
+            below = base.mean(axis=0) - middle
+            middle = middle + below - (below @ axes[0]) * axes[0]
+            reach += np.array([-1.0, 1.0]) * shape.size
+        ends: FloatArray = middle + reach[:, None] * axes[0]
+        return ends
+
+    def _rail(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        ends = self.rails[shape.part]
+        if ends is not None:
+            axes.plot(ends[:, 0], ends[:, 1], color=GREY, linewidth=1.2, zorder=1.5, solid_capstyle="round")
+
+    # -- what moves ------------------------------------------------------------------------------------------------
+
+    def _rod(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        axes.plot(points[:, 0], points[:, 1], color=self._tone(INK), linewidth=2.0, solid_capstyle="round", **look)
+
+    def _link(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        front = look["zorder"]
+        for colour, width in ((INK, 8.0), ("#c8d3de", 5.6)):
+            tone = self._tone(colour)
+            axes.plot(points[:, 0], points[:, 1], color=tone, linewidth=width, solid_capstyle="round", zorder=front)
+
+    def _solid(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        """Draw what a surface shows from the front, and the lines where it ends."""
+        from matplotlib.collections import LineCollection, PolyCollection
+
+        assert shape.surface is not None
+        mesh, angle = shape.surface, float(self.picture.angles[shape.nodes[0]][moment])
+        c, s = np.cos(angle), np.sin(angle)
+        page = points[0] + mesh.vertices[:, [0, 2]] @ np.array([[c, s], [-s, c]])
+        front = mesh.normals[:, 1] < -1e-9  # the eye looks along y
+        ends, faces, _ = mesh.edges
+        borders = front[faces[:, 0]] != front[faces[:, 1]]
+        for tone, chosen in (("#c8d3de", front & ~mesh.marked), ("#b4c2cf", front & mesh.marked)):
+            colour = self._tone(tone)
+            flat = PolyCollection(list(page[mesh.faces[chosen]]), facecolors=[colour], edgecolors=[colour], **look)
+            flat.set_linewidth(0.4)
+            axes.add_collection(flat)
+        lines = list(page[ends[borders]])
+        axes.add_collection(LineCollection(lines, colors=[self._tone(INK)], linewidths=1.3, capstyle="round", **look))
+
+    def _pivot(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        x, z = points[0]
+        edge = self._tone(INK)
+        style: dict[str, Any] = {
+            "markerfacecolor": "white",
+            "markeredgecolor": edge,
+            "markeredgewidth": 1.4,
+            "markersize": 5.5,
+        }
+        axes.plot([x], [z], marker="o", linestyle="none", zorder=look["zorder"] + 0.3, **style)
+
+    def _spring(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        line = _zigzag(points[0], points[1], 1.6 * self.unit)
+        axes.plot(line[:, 0], line[:, 1], color=self._tone(INK), linewidth=1.3, solid_joinstyle="round", **look)
+
+    def _damper(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        a, b = points
+        along, across, length = _directions(a, b)
+        half, middle = 1.5 * self.unit, 0.5 * (a + b)
+        size = min(4.0 * self.unit, 0.25 * length)
+        cup = [middle + along * size + across * half, middle - along * size + across * half]
+        cup += [middle - along * size - across * half, middle + along * size - across * half]
+        piston = [middle + across * half * 0.8, middle - across * half * 0.8]
+        for line in ([a, middle - along * size], cup, piston, [middle, b]):
+            path = np.array(line)
+            axes.plot(path[:, 0], path[:, 1], color=self._tone(INK), linewidth=1.3, **look)
+
+    def _rope(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        line = _rope_line(points, [self.picture.radii.get(node, 0.0) for node in shape.nodes])
+        axes.plot(line[:, 0], line[:, 1], color=self._tone("#a8642a"), linewidth=1.6, solid_joinstyle="round", **look)
+
+    def _pulley(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        from matplotlib.patches import Circle
+
+        x, z = points[0]
+        radius = self.picture.radii.get(shape.nodes[0], 2.2 * self.unit)
+        axes.add_patch(
+            Circle(
+                (x, z), 0.97 * radius, facecolor=self._tone("#e7ecf1"), edgecolor=self._tone(INK), linewidth=1.3, **look
+            )
+        )
+        axes.add_patch(
+            Circle((x, z), min(0.16 * radius, self.unit), facecolor=self._tone(INK), edgecolor="none", **look)
+        )
+
+    def _mass(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        from matplotlib.patches import Circle, Rectangle
+
+        x, z = points[0]
+        if shape.size <= 0.0:
+            return
+        half = 3.4 * self.unit * (shape.size / self.heaviest) ** (1.0 / 3.0)
+        half = max(half, 1.1 * self.unit)
+        half *= min(1.0, 8.0 / len(self.heavy))
+        style: dict[str, Any] = {"facecolor": self._tone(self.colour(shape)), "edgecolor": "white", "linewidth": 0.9}
+        style.update({**look, "zorder": look["zorder"] + 0.5})
+        on_rail = shape.nodes[0] in self.sliding
+        if self.picture.direction == "up":
+            axes.add_patch(Rectangle((x - half, z - 2.0 * half), 2.0 * half, 2.0 * half, **style))
+        elif self.picture.direction or on_rail:
+            axes.add_patch(Rectangle((x - 1.4 * half, z - half), 2.8 * half, 2.0 * half, **style))
+        else:
+            axes.add_patch(Circle((x, z), half, **style))
+
+
+def draw_trace(axes: Axes, points: FloatArray, colour: str) -> None:
+    """Draw the path of a point, older parts fainter.
+
+    Parameters
+    ----------
+    axes
+        Where.
+    points
+        Places in order.
+    colour
+        Its colour.
+    """
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import to_rgb
+
+    if len(points) < 2:
+        return
+    pieces = np.stack([points[:-1], points[1:]], axis=1)
+    shares = np.linspace(0.15, 0.8, len(pieces))[:, None]
+    colours = shares * np.array(to_rgb(colour)) + 1.0 - shares
+    axes.add_collection(LineCollection(list(pieces), colors=colours, linewidths=1.3, zorder=1.8, capstyle="round"))
+
+
+def _directions(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return the unit vectors along and across a line, and its length."""
+    span = b - a
+    length = float(np.hypot(*span))
+    along = span / length if length > 0.0 else np.array([1.0, 0.0])
+    return along, np.array([-along[1], along[0]]), length
+
+
+def _zigzag(a: FloatArray, b: FloatArray, half: float, turns: int = 7) -> FloatArray:
+    """Return a spring: straight ends, and a zigzag of fixed width between."""
+    along, across, length = _directions(a, b)
+    shares = np.concatenate([[0.0, 0.12], np.linspace(0.12, 0.88, 2 * turns + 1)[1:-1], [0.88, 1.0]])
+    sides = np.zeros(len(shares))
+    sides[2:-2] = half * np.where(np.arange(len(shares) - 4) % 2 == 0, 1.0, -1.0)
+    line: FloatArray = a + along * (shares * length)[:, None] + across * sides[:, None]
+    return line
+
+
+def _rope_line(points: FloatArray, radii: list[float]) -> FloatArray:
+    """Return a rope over pulleys that lie on vertical columns: straight down on both sides, half a turn between."""
+    line = [points[0]]
+    for i in range(1, len(points) - 1):
+        center, radius = points[i], radii[i]
+        if radius == 0.0:
+            line.append(center)
+            continue
+        start = -1.0 if line[-1][0] <= center[0] else 1.0
+        over = 1.0 if line[-1][1] <= center[1] else -1.0
+        turn = np.linspace(0.0, np.pi, 25)
+        arc = center + radius * np.stack([start * np.cos(turn), over * np.sin(turn)], axis=1)
+        line += list(arc)
+    return np.array([*line, points[-1]])

@@ -1,0 +1,1 @@
+"""Quantities over time, work-precision diagrams, sweeps."""

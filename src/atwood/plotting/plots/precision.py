@@ -1,0 +1,73 @@
+"""Work-precision diagrams: what an error costs."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+from atwood.arguments import FILE, instance, optional, takes
+from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
+from atwood.study.comparison.compare import Comparison, ComparisonRow
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["plot_comparison"]
+
+_MARKERS = ("o", "s", "D", "^", "v")
+
+
+@takes(comparison=instance("a Comparison, as compare returns it", Comparison), file=optional(FILE))
+def plot_comparison(comparison: Comparison, file: str | os.PathLike[str] | None = None) -> Figure:
+    """Draw error against time and against steps, one line for each form and level.
+
+    Parameters
+    ----------
+    comparison
+        What `atwood.compare` gave.
+    file
+        Where to save the picture.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    figure = new_figure(9.0, 4.4)
+    left, right = figure.subplots(1, 2, sharey=True)
+    curves: dict[str, list[ComparisonRow]] = {}
+    for row in comparison.rows:
+        if not row.reason:
+            curves.setdefault(row.label, []).append(row)
+    for (label, rows), colour, marker in zip(curves.items(), COLOURS, _MARKERS, strict=False):
+        errors = [max(row.error or 0.0, 1e-16) for row in rows]
+        style = {"color": colour, "marker": marker, "markersize": 5.5, "linewidth": 1.6, "label": label}
+        left.plot([1e3 * (row.wall_s or 0.0) for row in rows], errors, **style)
+        right.plot([row.steps or 0 for row in rows], errors, **style)
+    for axes, label in ((left, "time, ms"), (right, "steps")):
+        polish(axes, label, "largest error, scaled" if axes is left else "")
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        _plain_ticks(axes)
+        if comparison.reference.error > 1e-14:
+            axes.axhspan(1e-300, comparison.reference.error, color=GREY, alpha=0.18, linewidth=0)
+    if curves:
+        values = [max(row.error or 0.0, 1e-16) for rows in curves.values() for row in rows]
+        left.set_ylim(0.2 * min(values), 5.0 * max(values))
+        right.legend(frameon=False, fontsize=9, labelcolor=INK)
+    left.set_title(
+        f"{comparison.scene} to t = {comparison.t_end:g} s", loc="left", fontsize=11, fontweight="bold", color=INK
+    )
+    if file is not None:
+        save_figure(figure, file)
+    return figure
+
+
+def _plain_ticks(axes: Axes) -> None:
+    """Write plain numbers along a logarithmic axis, at 1, 2 and 5."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,183 @@
+"""Scenes in space on the page: the bodies and what goes between them at one time, the paths until then, panels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.plotting.canvas import INK, new_figure
+from atwood.plotting.scene3d.model import SpaceModel
+from atwood.plotting.scene3d.painter import Stage, to_rgb
+from atwood.plotting.scene3d.picture import SpacePicture, Trail
+from atwood.plotting.scene3d.reading import Tie
+from atwood.plotting.scene3d.scenery import draw_corner_axes, draw_floor, draw_sphere
+from atwood.plotting.shapes.meshes import cylinder, frame_along
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_space", "frame_space", "space_panels"]
+
+
+_ROPE, _ROD = "#a8642a", "#5d6b78"
+
+
+def draw_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
+    """Draw a scene at one time, with the paths until then.
+
+    Parameters
+    ----------
+    axes
+        Where; see `frame_space`.
+    picture
+        The scene.
+    moment
+        Number of the output time.
+    """
+    model = picture.model
+    draw_floor(axes, picture, moment)
+    for trail in picture.trails:
+        draw_sphere(axes, picture.camera, trail)
+    stage = Stage(picture.camera, model.unit)
+    for piece in model.pieces:
+        pose = model.reading.poses[piece.body]
+        origin, turn = pose.origin[moment], pose.axes[moment]
+        if piece.mesh is not None:
+            stage.mesh(piece.mesh.placed(origin, turn), piece.colour)
+            continue
+        assert piece.points is not None
+        points = origin + piece.points @ turn.T
+        if len(points) == 1:
+            stage.ball(points[0], piece.size, piece.colour)
+        else:
+            stage.line(points, piece.colour, piece.size)
+    _draw_ties(stage, model, moment)
+    for trail in picture.trails:
+        _draw_trail(stage, trail, moment)
+    stage.paint(axes, 3.0)
+    draw_corner_axes(axes, picture.camera, picture.bounds)
+
+
+def _draw_trail(stage: Stage, trail: Trail, moment: int) -> None:
+    """Draw a path until a time, older parts fainter."""
+    points = trail.points[: moment + 1]
+    if len(points) > 1:
+        shares = np.linspace(0.3, 1.0, len(points) - 1)[:, None]
+        stage.line(points, shares * to_rgb(trail.colour) + 1.0 - shares, 1.5)
+    if trail.is_axis:
+        stage.ball(points[-1], 1.1 * stage.unit, trail.colour)
+
+
+# -- ties -----------------------------------------------------------------------------------------------------------
+
+
+def _draw_ties(stage: Stage, model: SpaceModel, moment: int) -> None:
+    """Draw what goes between nodes; what joins the same two is drawn side by side."""
+    together: dict[frozenset[int], list[Tie]] = {}
+    for tie in model.ties:
+        together.setdefault(frozenset((tie.nodes[0], tie.nodes[-1])), []).append(tie)
+    for ties in together.values():
+        for number, tie in enumerate(ties):
+            points = np.array([model.reading.place(node)[moment] for node in tie.nodes])
+            if np.linalg.norm(points[-1] - points[0]) > 1e-9 * model.unit:
+                shift = (number - 0.5 * (len(ties) - 1)) * 3.6 * model.unit
+                _TIES[tie.kind](stage, points, shift * _sideways(stage, points))
+
+
+def _sideways(stage: Stage, points: FloatArray) -> FloatArray:
+    """Return the direction across a line in the plane of the page."""
+    across = np.cross(points[-1] - points[0], stage.camera.towards)
+    size = np.linalg.norm(across)
+    found: FloatArray = across / size if size > 0.0 else stage.camera.axes[0]
+    return found
+
+
+def _draw_rod(stage: Stage, points: FloatArray, aside: FloatArray) -> None:
+    way = points[-1] - points[0]
+    made = cylinder(0.6 * stage.unit, float(np.linalg.norm(way)), around=12)
+    stage.mesh(made.placed(0.5 * (points[0] + points[-1]) + aside, frame_along(way)), _ROD, 0.6)
+
+
+def _draw_rope(stage: Stage, points: FloatArray, aside: FloatArray) -> None:
+    stage.line(points + aside, _ROPE, 1.6)
+
+
+def _draw_spring(stage: Stage, points: FloatArray, aside: FloatArray) -> None:
+    a, b = points[0], points[-1]
+    length, turns = float(np.linalg.norm(b - a)), 9
+    lead = min(0.14 * length, 6.0 * stage.unit)
+    phase = np.linspace(0.0, 2.0 * np.pi * turns, 24 * turns + 1)
+    size = 1.7 * stage.unit * np.clip(np.minimum(phase, phase[-1] - phase) / np.pi, 0.0, 1.0)
+    along = lead + (length - 2.0 * lead) * phase / phase[-1]
+    coil = np.stack([size * np.cos(phase), size * np.sin(phase), along], axis=-1) @ frame_along(b - a).T + a + aside
+    stage.line(np.concatenate([[a, a + aside], coil, [b + aside, b]]), INK, 1.2)
+
+
+def _draw_damper(stage: Stage, points: FloatArray, aside: FloatArray) -> None:
+    a, b = points[0], points[-1]
+    cup = min(9.0 * stage.unit, 0.4 * float(np.linalg.norm(b - a)))
+    middle = 0.5 * (a + b) + aside
+    stage.line(np.array([a, a + aside, middle, b + aside, b]), INK, 1.2)
+    stage.mesh(cylinder(1.4 * stage.unit, cup, around=20).placed(middle, frame_along(b - a)), "#e7ecf1")
+
+
+_TIES: dict[str, Callable[[Stage, FloatArray, FloatArray], None]] = {
+    "rod": _draw_rod,
+    "rope": _draw_rope,
+    "spring": _draw_spring,
+    "damper": _draw_damper,
+}
+
+
+# -- panels ---------------------------------------------------------------------------------------------------------
+
+
+def frame_space(axes: Axes, picture: SpacePicture) -> None:
+    """Give axes the bounds of a picture, and nothing else.
+
+    Parameters
+    ----------
+    axes
+        The axes.
+    picture
+        The scene.
+    """
+    lows, highs = picture.bounds
+    axes.set_xlim(float(lows[0]), float(highs[0]))
+    axes.set_ylim(float(lows[1]), float(highs[1]))
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def space_panels(picture: SpacePicture, titles: Sequence[str], name: str = "") -> tuple[Figure, list[Axes]]:
+    """Return a figure with panels of the shape of a picture.
+
+    Parameters
+    ----------
+    picture
+        The scene.
+    titles
+        What stands above each panel.
+    name
+        What stands above them all.
+    """
+    lows, highs = picture.bounds
+    width, height = highs - lows
+    count = len(titles)
+    columns = count if height > 1.6 * width or count <= 3 else 2 if count == 4 else 3
+    rows = -(-count // columns)
+    scale = min(9.0 / (columns * width), 8.0 / (rows * height)) if count > 1 else min(7.0 / width, 7.0 / height)
+    figure = new_figure(max(3.2, columns * scale * width), rows * (scale * height + 0.3) + (0.3 if name else 0.0))
+    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    for axes, title in zip(panels, titles, strict=False):
+        frame_space(axes, picture)
+        axes.set_title(title, fontsize=10, color=INK)
+    if name:
+        figure.suptitle(name, x=0.01, ha="left", fontsize=11, color=INK)
+    return figure, panels[:count]

@@ -1,0 +1,139 @@
+"""What a joint in space looks like, from where it can put its second node and how it can turn it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.expr import Expression, Scalar, depends_on, evaluate
+from atwood.mechanics.build import Mechanism
+from atwood.model.local.laws import LocalJoint
+from atwood.model.values.rotation import FreeRotation, Rotation, as_rotation
+from atwood.plotting.scene3d.reading import Joining, Reading
+
+__all__ = ["numbers", "read_joint"]
+
+
+def numbers(
+    mechanism: Mechanism, given: Sequence[Scalar], also: Mapping[Expression, float] | None = None
+) -> FloatArray:
+    """Return the values of expressions of parameters, and of further symbols with the values given."""
+    graph = mechanism.table.graph
+    values = {**mechanism.known_at_start(), **(also or {})}
+    return np.array(evaluate([graph.convert(one) for one in given], values), dtype=float)
+
+
+def read_joint(
+    reading: Reading, mechanism: Mechanism, path: str, joint: LocalJoint, nodes: Mapping[str, int]
+) -> list[Joining]:
+    """Return what a joint looks like; nothing where it holds nothing, or holds rigidly.
+
+    Parameters
+    ----------
+    reading
+        Where everything is.
+    mechanism
+        The scene.
+    path, joint
+        The part and its law.
+    nodes
+        Node of each of its connectors.
+    """
+    options, placement = joint.law.options, joint.placement
+    if options.rigid or options.a == "world":
+        return []
+    a, b = nodes[options.a], nodes[options.b]
+    turn = reading.turns[a] if placement.axes == "a" else np.eye(3)
+    shift = [mechanism.table.graph.convert(c) for c in placement.displacement]
+    axes = _turning_axes(mechanism, placement.rotation)
+    if all(c.is_zero for c in shift):
+        return _meeting(reading, path, (a, b), axes, isinstance(placement.rotation, FreeRotation))
+    moving = [c for c in joint.coordinates if _depends(shift, c)]
+    if len(moving) == 2:
+        first, second = (_step(mechanism, joint, shift, one, 1.0) for one in moving)
+        normal = turn @ np.cross(first, second)
+        return [Joining(path, "plane", (a, b), (normal / np.linalg.norm(normal),), reach=_touched(mechanism, path))]
+    if len(moving) > 2:
+        return []
+    if len(moving) == 1:
+        one, two = (_step(mechanism, joint, shift, moving[0], size) for size in (1.0, 2.0))
+        if not np.allclose(two, 2.0 * one, rtol=1e-9, atol=0.0):
+            angles = np.linspace(0.0, 2.0 * np.pi, 73)
+            points = np.array([_shift(mechanism, joint, shift, moving[0], angle) for angle in angles])
+            return [Joining(path, "curve", (a, b), curve=points @ turn.T)]
+        axis = turn @ one
+    else:
+        axis = _seen_axis(reading, a, b)
+    if not np.any(axis):
+        return []
+    axis = axis / np.linalg.norm(axis)
+    along = _seen_from(reading, a, b) @ axis
+    return [Joining(path, "slide", (a, b), (axis,), bool(axes), (float(along.min()), float(along.max())))]
+
+
+def _touched(mechanism: Mechanism, path: str) -> tuple[float, float]:
+    """Return how far from below what moves on a plane it can touch it: by the radius of what rolls."""
+    radius = mechanism.locals_[path].part.values.get("radius", 0.0)
+    return 0.0, float(radius) if isinstance(radius, (int, float)) else 0.0
+
+
+def _depends(expressions: Sequence[Expression], symbol: Expression) -> bool:
+    """Return whether one of some expressions depends on a symbol."""
+    return any(depends_on(one, [symbol]) for one in expressions)
+
+
+def _turning_axes(mechanism: Mechanism, rotation: object) -> list[FloatArray]:
+    """Return the axes of the turns of a joint, one after another."""
+    if rotation is None or isinstance(rotation, FreeRotation):
+        return []
+    assert isinstance(rotation, (int, float, Expression, Rotation))
+    turns = as_rotation(rotation).turns
+    return [numbers(mechanism, tuple(one.axis)) for one in turns]
+
+
+def _meeting(
+    reading: Reading, path: str, nodes: tuple[int, int], axes: Sequence[FloatArray], is_free: bool
+) -> list[Joining]:
+    """Return a joint whose two nodes stay at one place."""
+    a, b = nodes
+    if is_free or len(axes) > 2:
+        return [Joining(path, "ball", nodes)]
+    if len(axes) == 2:
+        return [Joining(path, "cross", nodes, (reading.turns[a] @ axes[0], reading.turns[b] @ axes[1]))]
+    return [Joining(path, "hinge", nodes, (reading.turns[a] @ axis,)) for axis in axes]
+
+
+def _shift(
+    mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], one: Expression, value: float
+) -> FloatArray:
+    known = {**dict.fromkeys((*joint.coordinates, *mechanism.relations.roots), 0.0), one: value}
+    for axes in joint.axes:  # whichever way they are turned, the step along a coordinate is the same
+        known.update((c, float(i == k)) for i, axis in enumerate(axes) for k, c in enumerate(axis))
+    return numbers(mechanism, shift, known)
+
+
+def _step(
+    mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], one: Expression, value: float
+) -> FloatArray:
+    """Return by how much a joint's displacement changes when one of its coordinates goes from zero to a value."""
+    found: FloatArray = _shift(mechanism, joint, shift, one, value) - _shift(mechanism, joint, shift, one, 0.0)
+    return found
+
+
+def _seen_from(reading: Reading, a: int, b: int) -> FloatArray:
+    """Return the way from node a to node b in the axes of the body of a, m, shape (times, 3)."""
+    pose = reading.poses[reading.body_of[a]]
+    found: FloatArray = np.einsum("tji,tj->ti", pose.axes, reading.place(b) - reading.place(a))
+    return found
+
+
+def _seen_axis(reading: Reading, a: int, b: int) -> FloatArray:
+    """Return the direction in which node b moves as seen from node a, where it stays on a straight line; else zero."""
+    seen = _seen_from(reading, a, b)
+    spread = seen - seen.mean(axis=0)
+    sizes, axes = np.linalg.svd(spread, full_matrices=False)[1:]
+    straight = sizes[0] > 0.0 and (len(sizes) < 2 or sizes[1] <= 1e-6 * sizes[0])
+    found: FloatArray = axes[0] if straight else np.zeros(3)
+    return found

@@ -1,0 +1,151 @@
+"""What there is to draw of a scene in space, found from laws and not from names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.expr import Expression, depends_on, is_zero
+from atwood.mechanics.build import Mechanism
+from atwood.mechanics.kinematics.orientation import body_offsets
+from atwood.model.declare.contributions import BodyInertia
+from atwood.model.local.laws import LocalPart
+from atwood.plotting.scene3d.joint_reading import numbers, read_joint
+from atwood.plotting.scene3d.reading import Joining, Lump, Pose, Reading, Tie, TieKind
+from atwood.plotting.shapes.outlines import outline_of
+from atwood.result.result import Result
+
+__all__ = ["read_scene"]
+
+
+def read_scene(result: Result) -> Reading:
+    """Return what there is to draw of a scene in space.
+
+    Parameters
+    ----------
+    result
+        The run.
+    """
+    mechanism = result.assembly.mechanism
+    offsets, turns = _layouts(mechanism)
+    poses = _poses(result)
+    bare = Reading(result.time, mechanism.bodies.body_of, offsets, turns, poses, _steps(mechanism))
+    joinings: list[Joining] = []
+    lumps: list[Lump] = []
+    ties: list[Tie] = []
+    grounds: list[int] = []
+    for path, local in mechanism.locals_.items():
+        nodes = {name: mechanism.graph.node_of[path, name] for name in local.connectors}
+        joinings += [one for joint in local.joints for one in read_joint(bare, mechanism, path, joint, nodes)]
+        lumps += _lumps(bare, mechanism, path, local, nodes)
+        ties += _ties(path, local, nodes)
+        options = [joint.law.options for joint in local.joints]
+        if any(one.rigid and one.a == "world" for one in options):
+            grounds += nodes.values()
+    return replace(
+        bare,
+        joinings=tuple(joinings),
+        lumps=tuple(lumps),
+        ties=tuple(ties),
+        grounds=tuple(dict.fromkeys(grounds)),
+        is_heavy=not is_zero(mechanism.gravity.z),
+    )
+
+
+def _layouts(mechanism: Mechanism) -> tuple[dict[int, FloatArray], dict[int, FloatArray]]:
+    """Return place and axes of each node in its body, as numbers."""
+    offsets: dict[int, FloatArray] = {}
+    turns: dict[int, FloatArray] = {}
+    for body in mechanism.bodies.bodies:
+        places, axes = body_offsets(body, mechanism.space)
+        for node, place in places.items():
+            turn = axes[node]
+            assert isinstance(turn, tuple)
+            offsets[node] = numbers(mechanism, tuple(place))
+            turns[node] = np.column_stack([numbers(mechanism, tuple(axis)) for axis in turn])
+    return offsets, turns
+
+
+def _steps(mechanism: Mechanism) -> tuple[tuple[int, int], ...]:
+    steps = [step for body in mechanism.bodies.bodies for step in body.steps]
+    return tuple((one.parent, one.child) for one in steps if one.joint.local.law.options.a != "world")
+
+
+def _poses(result: Result) -> dict[int, Pose]:
+    """Return where every body is at the output times; what has no orientation is drawn unturned."""
+    pieces: list[dict[int, FloatArray]] = []
+    for segment in result.run.segments:
+        assembly, mechanism = segment.assembly, segment.assembly.mechanism
+        placements, graph = assembly.equations.kinematics.placements, mechanism.table.graph
+        expressions = []
+        for body in mechanism.bodies.bodies:
+            expressions += [graph.convert(c) for c in placements.positions[body.root]]
+            axes = placements.axes.get(body.index)
+            unturned = [graph.constant(float(i == j)) for i in range(3) for j in range(3)]
+            expressions += unturned if axes is None else [graph.convert(c) for axis in axes for c in axis]
+        program = assembly.state_program("poses", expressions)
+        idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
+        kernel = assembly.kernel(program, vectorized=True)
+        values = np.asarray(kernel(segment.time[None, :], segment.coordinates, segment.speeds, *idle)[0])
+        shown = values[:, segment.shown].reshape(len(mechanism.bodies.bodies), 12, -1)
+        pieces.append({body.index: shown[i] for i, body in enumerate(mechanism.bodies.bodies)})
+    poses = {}
+    for index in pieces[0]:
+        whole = np.concatenate([piece[index] for piece in pieces], axis=1).T
+        # Row by row an axis each; as columns they turn what is in the body into the world.
+        poses[index] = Pose(whole[:, :3].copy(), whole[:, 3:].reshape(-1, 3, 3).transpose(0, 2, 1).copy())
+    return poses
+
+
+def _lumps(reading: Reading, mechanism: Mechanism, path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Lump]:
+    found = []
+    for one in local.point_inertias:
+        if len(one.points) == 1:
+            node = nodes[one.points[0].name]
+            (mass,) = numbers(mechanism, [one.masses[0][0]])
+            found.append(_lump(reading, path, node, float(mass), np.zeros(3), np.zeros((3, 3))))
+    for body in local.body_inertias:
+        center = numbers(mechanism, tuple(body.center_of_mass))
+        (mass,) = numbers(mechanism, [body.mass])
+        lump = _lump(reading, path, nodes[body.frame.name], float(mass), center, _tensor(mechanism, body))
+        found.append(replace(lump, outline=outline_of(local), origin=reading.offsets[lump.node]))
+    return [one for one in found if one.mass > 0.0]
+
+
+def _tensor(mechanism: Mechanism, body: BodyInertia) -> FloatArray:
+    if body.tensor is None:
+        return np.zeros((3, 3))
+    return numbers(mechanism, [entry for row in body.tensor for entry in row]).reshape(3, 3)
+
+
+def _lump(reading: Reading, path: str, node: int, mass: float, center: FloatArray, tensor: FloatArray) -> Lump:
+    turn = reading.turns[node]
+    place = reading.offsets[node] + turn @ center
+    return Lump(path, reading.body_of[node], node, mass, place, turn, turn @ tensor @ turn.T)
+
+
+def _is_distance(local: LocalPart, value: Expression) -> bool:
+    """Return whether a constraint holds points apart: it reads the places of two connectors at least, and no more."""
+    several = local.connectors.values()
+    others = [symbol for one in several for symbol in (*one.velocity, *one.orientation, *one.spin)]
+    reads = [depends_on(value, list(one.position)) for one in several]
+    return sum(reads) > 1 and not depends_on(value, others)
+
+
+def _ties(path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Tie]:
+    """Return what a part that only pulls or pushes between its nodes looks like."""
+    ends = tuple(dict.fromkeys(nodes.values()))
+    if local.joints or len(ends) < 2:
+        return []
+    if any(_is_distance(local, one.value) for one in local.constraints):
+        return [Tie(path, "rope" if local.part.component.modes else "rod", ends)]
+    kinds: list[TieKind] = []
+    symbols = [symbol for one in local.connectors.values() for symbol in one.position]
+    if any(depends_on(one, symbols) for one in local.potentials):
+        kinds.append("spring")
+    if any(depends_on(one, symbols) for one in local.dissipations):
+        kinds.append("damper")
+    return [Tie(path, kind, ends) for kind in kinds]

@@ -1,0 +1,1 @@
+"""Surfaces of bodies and outlines of parts."""

@@ -1,0 +1,1 @@
+"""From an assembled scene to its motion."""

@@ -1,0 +1,1 @@
+"""The balance of forces in numbers: accelerations, multipliers, rank, coordinates, scales."""

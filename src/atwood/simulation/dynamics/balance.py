@@ -1,0 +1,242 @@
+"""Numbers from the balance of forces: accelerations and multipliers, projection, rank."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.codegen import BoundKernel
+from atwood.errors import SolveError
+from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.program import BalanceProgram
+from atwood.linalg.matrices import (
+    Matrix,
+    from_entries,
+    is_best_full,
+    is_full,
+    scaled,
+)
+from atwood.simulation.dynamics.columns import mass_at
+from atwood.simulation.dynamics.kinematic_map import Turning, turning_of
+from atwood.simulation.dynamics.rank import least_norm, row_scales
+from atwood.simulation.dynamics.rounding import RowErrors
+
+__all__ = [
+    "Balance",
+    "BalanceValues",
+    "balance_of",
+    "solve_balance",
+]
+
+
+@dataclass(frozen=True)
+class BalanceValues:
+    """The balance ``M a + bias = G^T lambda``, ``G a + gamma = 0`` at one state, along the speeds."""
+
+    mass: Matrix
+    bias: FloatArray
+    value: FloatArray
+    rate: FloatArray
+    gamma: FloatArray
+    slope: Matrix
+    drift: FloatArray
+
+
+@dataclass(frozen=True)
+class HeldValues:
+    """The constraints at one state: values, slopes along the speeds, and explicit time derivatives of their rates."""
+
+    value: FloatArray
+    slope: Matrix
+    drift: FloatArray
+
+
+class Balance:
+    """The balance of forces of one form with its parameters.
+
+    Parameters
+    ----------
+    program
+        The program.
+    kernel, held_kernel
+        The same, and the constraints alone, ready to run on one state.
+    turning
+        How the coordinates move with the speeds.
+    errors
+        How far rounding can take the constraints' slopes.
+    mass
+        Gives the mass matrix where the program does not.
+    """
+
+    def __init__(
+        self,
+        program: BalanceProgram,
+        kernel: BoundKernel,
+        held_kernel: Callable[[], BoundKernel],
+        turning: Turning,
+        errors: RowErrors,
+        mass: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
+    ) -> None:
+        self.program, self.kernel, self.turning, self.errors, self._mass = program, kernel, turning, errors, mass
+        self._all = len(program.holonomic) == program.constraints
+        self._held_kernel = held_kernel
+        self.holonomic = np.asarray(program.holonomic, dtype=np.intp)
+
+    @property
+    def constraints(self) -> int:
+        """Number of constraints."""
+        return self.program.constraints
+
+    def at(self, t: float, q: FloatArray, u: FloatArray) -> BalanceValues:
+        """Return the balance at a state."""
+        p = self.program
+        mass, bias, value, rate, gamma, slope, drift = self.kernel([t], q, u)
+        full = self._mass is not None or is_best_full((p.speeds, p.speeds), len(mass))
+        if self._mass is not None:
+            matrix = self._mass(t, q, u)
+        else:
+            matrix = from_entries(p.mass_rows, p.mass_columns, mass, (p.speeds, p.speeds), full)
+        jacobian = from_entries(p.slope_rows, p.slope_columns, slope, (p.constraints, p.speeds), full)
+        parts = (np.asarray(x, dtype=float) for x in (bias, value, rate, gamma))
+        b, v, r, g = parts
+        return BalanceValues(matrix, b, v, r, g, jacobian, np.asarray(drift, dtype=float))
+
+    def held(self, t: float, q: FloatArray, u: FloatArray) -> HeldValues:
+        """Return the constraints at a state."""
+        p = self.program
+        value, slope, drift = self._held_kernel()([t], q, u)
+        full = self._mass is not None or is_best_full((p.speeds, p.speeds), len(p.mass_rows))
+        matrix = from_entries(p.slope_rows, p.slope_columns, slope, (p.constraints, p.speeds), full)
+        return HeldValues(np.asarray(value, dtype=float), matrix, np.asarray(drift, dtype=float))
+
+    def accelerate(
+        self, t: float, q: FloatArray, u: FloatArray, kept: NDArray[np.intp] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return accelerations and multipliers.
+
+        Parameters
+        ----------
+        t, q, u
+            A state that fulfils the constraints.
+        kept
+            Constraints that are independent, all unless given; the multipliers are those of these.
+
+        Raises
+        ------
+        SolveError
+            If the forces do not determine the accelerations.
+        """
+        return solve_balance(self.at(t, q, u), kept, t)
+
+    def project(
+        self, t: float, q: FloatArray, u: FloatArray, scales: FloatArray, iterations: int = 12
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the nearest state that fulfils the constraints on position and velocity.
+
+        Orientations come out with coordinates of size one.
+
+        Parameters
+        ----------
+        t, q, u
+            A state near the constraints.
+        scales
+            Size of a displacement along each speed; nearness is measured in these.
+        iterations
+            The largest number of Newton steps.
+        """
+        q = self.turning.normalized(q)
+        if not self.constraints:
+            return q, u
+        still = np.zeros_like(u)
+        last = np.inf
+        errors = self.errors.near(t, q, scales)
+        on_positions = errors if self._all else errors[self.holonomic]
+        for _ in range(iterations if len(self.holonomic) else 0):
+            slope, value = self.on_positions(self.held(t, q, still))
+            rows = row_scales(slope, scales, on_positions)
+            miss = float(np.max(np.abs(value / rows)))
+            if miss == 0.0 or (miss < 1e-11 and miss >= 0.5 * last):
+                break
+            last = miss
+            q = self.turning.moved(t, q, -scales * least_norm(scaled(slope, scales, rows), value / rows))
+        now = self.held(t, q, u)
+        rows = row_scales(now.slope, scales, errors)
+        for _ in range(2):  # the second pass takes out the rounding of the first
+            rate = now.slope @ u + now.drift
+            u = u - scales * least_norm(scaled(now.slope, scales, rows), rate / rows)
+        return q, u
+
+    def on_positions(self, now: HeldValues) -> tuple[FloatArray, FloatArray]:
+        """Return slopes and values of the constraints that hold positions."""
+        if self._all:
+            return now.slope, now.value
+        return now.slope[self.holonomic], now.value[self.holonomic]
+
+    def row_scales(self, now: BalanceValues | HeldValues, t: float, q: FloatArray, scales: FloatArray) -> FloatArray:
+        """Return the size of each constraint at a place; see `atwood.simulation.dynamics.rank.row_scales`."""
+        return row_scales(now.slope, scales, self.errors.near(t, q, scales))
+
+    def holding(self, chosen: Sequence[int]) -> list[int]:
+        """Return which of some constraints hold positions."""
+        return [i for i in chosen if self._all or i in self.program.holonomic]
+
+    def misses(self, t: float, q: FloatArray, u: FloatArray, scales: FloatArray) -> tuple[float, float]:
+        """Return by how much a state misses the constraints on position and on velocity, relative to the scales."""
+        if not self.constraints:
+            return 0.0, 0.0
+        now = self.held(t, q, u)
+        rows, rate = self.row_scales(now, t, q, scales), now.slope @ u + now.drift
+        return float(np.max(np.abs(now.value / rows))), float(np.max(np.abs(rate / rows)))
+
+
+def balance_of(assembly: Assembly, form: FormName) -> Balance:
+    """Return the balance of forces of a scene in the coordinates of either form."""
+    program = assembly.balance(form)
+    mass = None if program.mass_product is None else partial(mass_at, assembly, form)
+    held = partial(assembly.kernel, program.constraints_alone)
+    places, turning = (program.slope_rows, program.slope_columns), turning_of(assembly, form)
+    laws = [one.key[:2] for one in assembly.in_coordinates(form).constraints]
+    errors = RowErrors(assembly, program.constraints_alone, ("value", "slope"), laws, places, turning)
+    return Balance(program, assembly.kernel(program.program), held, turning, errors, mass)
+
+
+def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -> tuple[FloatArray, FloatArray]:
+    """Return accelerations and multipliers of a balance; see `Balance.accelerate`."""
+    n = len(now.bias)
+    slope = now.slope if kept is None else now.slope[kept]
+    gamma = now.gamma if kept is None else now.gamma[kept]
+    m = len(gamma)
+    if not is_full(now.mass):
+        from atwood.linalg.sparse import solve_bordered
+
+        solved = solve_bordered(now.mass, slope, now.bias, gamma)
+        if solved is None:
+            raise _undetermined(t)
+        return solved
+    matrix = np.zeros((n + m, n + m))
+    matrix[:n, :n] = now.mass
+    matrix[:n, n:] = -slope.T
+    matrix[n:, :n] = slope
+    right = np.concatenate([-now.bias, -gamma])
+    # Scaling to rows and columns of like size, so that singular means singular.
+    size = np.sqrt(np.maximum(np.max(np.abs(matrix), axis=1), np.max(np.abs(matrix), axis=0))) if n + m else right
+    size[size == 0.0] = 1.0
+    try:
+        solution = np.linalg.solve(matrix / size[:, None] / size, right / size) / size
+    except np.linalg.LinAlgError:
+        raise _undetermined(t) from None
+    if not np.all(np.isfinite(solution)):
+        raise _undetermined(t)
+    return solution[:n], solution[n:]
+
+
+def _undetermined(t: float) -> SolveError:
+    return SolveError(
+        f"at t = {t:.6g} the forces do not determine the accelerations",
+        advice="Something without mass is free to move here, or the mechanism is in a singular position.",
+    )

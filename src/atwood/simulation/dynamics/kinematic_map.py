@@ -1,0 +1,190 @@
+"""Coordinates that are not integrals of speeds: how they move with the speeds, in numbers.
+
+Most coordinates have a speed of their own. Orientations in space have three speeds and four coordinates, whose common
+factor means nothing. What is small or near is therefore measured along the speeds: a displacement is what the speeds
+would do in a unit of time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.codegen import BoundKernel
+from atwood.expr import Program
+from atwood.forms.assembly import Assembly, Coordinates
+from atwood.forms.program import RatesProgram
+from atwood.mechanics.dynamics.equations import Equations
+
+__all__ = ["Turning", "resting_place", "roughly_turned", "turning_of"]
+
+
+class Turning:
+    """How the coordinates of one form move: ``q' = B u + b``.
+
+    Parameters
+    ----------
+    program
+        The rates as a program.
+    kernel
+        Gives the same, ready to run on one state or, vectorized, on many.
+    """
+
+    def __init__(self, program: RatesProgram, kernel: Callable[[Program, bool], BoundKernel]) -> None:
+        self.program, self._kernel = program, kernel
+        homogeneous = [chart for chart in program.charts if chart.is_homogeneous]
+        self._charts = [np.asarray(chart.coordinates, dtype=np.intp) for chart in homogeneous]
+        self._kinds = [chart.kind for chart in homogeneous]
+        vectors = [chart.coordinates for chart in program.charts if chart.kind == "rotation-vector"]
+        self._vectors = [np.asarray(one, dtype=np.intp) for one in vectors]
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the rates are the speeds."""
+        return self.program.program is None
+
+    @property
+    def can_stray(self) -> bool:
+        """Whether there are coordinates whose size means nothing."""
+        return bool(self._charts)
+
+    @property
+    def can_be_left(self) -> bool:
+        """Whether there are charts that are singular somewhere, and are left before."""
+        return not all(chart.is_homogeneous for chart in self.program.charts)
+
+    def rates(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+        """Return the derivatives of the coordinates."""
+        program = self.program.program
+        return u if program is None else np.asarray(self._kernel(program, False)([t], q, u)[0], dtype=float)
+
+    def rates_each(self, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
+        """Do the same for many states, of shape (states,) and (number, states)."""
+        program = self.program.program
+        return u if program is None else np.asarray(self._kernel(program, True)(t[None, :], q, u)[0])
+
+    def tangent(self, t: float, q: FloatArray) -> FloatArray:
+        """Return B, of shape (coordinates, speeds)."""
+        made = self.program
+        if made.program is None:
+            return np.eye(len(q))
+        matrix = np.zeros((made.coordinates, made.speeds))
+        matrix[made.rows, made.columns] = self._kernel(made.program, False)([t], q, np.zeros(made.speeds))[1]
+        return matrix
+
+    def moved(self, t: float, q: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Return coordinates after a small displacement along the speeds; exact to its first order."""
+        if self.is_plain:
+            return q + displacement
+        return self.normalized(q + self.tangent(t, q) @ displacement)
+
+    def moved_each(self, t: FloatArray, q: FloatArray, displacements: FloatArray) -> FloatArray:
+        """Do the same for many states, of shape (states,) and (number, states)."""
+        made = self.program
+        if made.program is None:
+            return q + displacements
+        entries = self._kernel(made.program, True)(t[None, :], q, np.zeros_like(displacements))[1]
+        matrix = np.zeros((len(t), made.coordinates, made.speeds))
+        matrix[:, made.rows, made.columns] = entries.T
+        return self.normalized(q + np.einsum("sij,js->is", matrix, displacements))
+
+    def difference(self, t: float, q: FloatArray, other: FloatArray) -> FloatArray:
+        """Return the displacement that leads from one place to another near by, exact to its first order."""
+        if self.is_plain:
+            return other - q
+        target = other.copy()
+        for chart, kind in zip(self._charts, self._kinds, strict=True):
+            target[chart] *= float(np.linalg.norm(q[chart])) / float(np.linalg.norm(other[chart]))
+            if kind == "quaternion" and q[chart] @ other[chart] < 0.0:  # either sign is the same orientation
+                target[chart] *= -1.0
+        return np.asarray(np.linalg.lstsq(self.tangent(t, q), target - q, rcond=None)[0], dtype=float)
+
+    def normalized(self, q: FloatArray) -> FloatArray:
+        """Return coordinates with orientations of size one: one state, or many of shape (coordinates, samples).
+
+        Rotation vectors of more than three quarters of a turn go the other way round.
+        """
+        if not self._charts and not self._vectors:
+            return q
+        q = np.array(q, dtype=float)
+        for chart in self._charts:
+            q[chart] /= np.sqrt(np.sum(q[chart] ** 2, axis=0))
+        for chart in self._vectors:
+            size = np.sqrt(np.sum(q[chart] ** 2, axis=0))
+            turns = np.where(size > 1.5 * np.pi, np.round(size / (2.0 * np.pi)), 0.0)
+            q[chart] *= 1.0 - 2.0 * np.pi * turns / np.where(turns > 0.0, size, 1.0)
+        return q
+
+    def strays(self, q: FloatArray) -> bool:
+        """Return whether the size of an orientation has gone far from one, where tolerances mean something else."""
+        return any(not 0.25 < float(q[chart] @ q[chart]) < 4.0 for chart in self._charts)
+
+
+def resting_place(equations: Equations) -> FloatArray:
+    """Return coordinates of zero, with orientations that are not turned."""
+    q = np.zeros(len(equations.coordinates))
+    for chart in equations.charts:
+        q[list(chart.coordinates)] = chart.reference
+    return q
+
+
+def roughly_turned(equations: Equations, far_off: Callable[[FloatArray], float], q: FloatArray) -> FloatArray:
+    """Return coordinates with each orientation the best of some that cover all of them evenly.
+
+    Parameters
+    ----------
+    equations
+        With the charts.
+    far_off
+        How far coordinates are from what is wanted.
+    q
+        Where to begin; what is not an orientation stays.
+    """
+    best, least = q, far_off(q)
+    for chart in equations.charts:
+        if chart.kind != "quaternion" or least == 0.0:
+            continue
+        start = best
+        for candidate in _orientations():
+            trial = start.copy()
+            trial[list(chart.coordinates)] = candidate
+            size = far_off(trial)
+            if size < 0.999 * least:
+                best, least = trial, size
+    return best
+
+
+@cache
+def _orientations() -> tuple[tuple[float, ...], ...]:
+    """Return quaternions that cover all orientations: the 24 turns of a cube, each also turned a little askew."""
+    square = [tuple(1.0 if i == k else 0.0 for i in range(4)) for k in range(4)]
+    halves = [(0.5, a, b, c) for a in (0.5, -0.5) for b in (0.5, -0.5) for c in (0.5, -0.5)]
+    r = 0.5**0.5
+    edges = [
+        tuple(r if i == a else sign * r if i == b else 0.0 for i in range(4))
+        for a in range(4)
+        for b in range(a + 1, 4)
+        for sign in (1.0, -1.0)
+    ]
+    cube = np.array([*square, *halves, *edges])
+    w, x, y, z = cube.T
+    askew = np.array([0.95, 0.21, 0.15, 0.17]) / np.linalg.norm([0.95, 0.21, 0.15, 0.17])
+    a, b, c, d = askew
+    turned = np.stack(
+        [
+            w * a - x * b - y * c - z * d,
+            w * b + x * a + y * d - z * c,
+            w * c + y * a + z * b - x * d,
+            w * d + z * a + x * c - y * b,
+        ],
+        axis=1,
+    )
+    return tuple(tuple(float(value) for value in row) for row in (*cube, *turned))
+
+
+def turning_of(assembly: Assembly, form: Coordinates) -> Turning:
+    """Return how the coordinates of a scene move."""
+    return Turning(assembly.rates(form), assembly.kernel)

@@ -1,0 +1,53 @@
+"""On a line: on which side of each other the connectors of a part really are, at a state that has been found."""
+
+from __future__ import annotations
+
+from atwood.arrays import FloatArray
+from atwood.forms.assembly import Assembly
+
+__all__ = ["actual_sides", "sides_differ"]
+
+Sides = dict[tuple[str, str, str], float]
+
+
+def actual_sides(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, form: str) -> Sides:
+    """Return, for pairs of connectors of each part, the sign of the second's position minus the first's.
+
+    Parameters
+    ----------
+    assembly
+        The scene; in a plane or in space nothing is signed, and nothing is returned.
+    t, q, u
+        A state.
+    form
+        The form that its coordinates are of.
+    """
+    if assembly.mechanism.space.name != "line":
+        return {}
+    equations = assembly.reduced if form == "reduced" else assembly.maximal
+    positions = equations.kinematics.placements.positions
+    nodes = list(positions)
+    program = assembly.shared.get(
+        ("places", form),
+        lambda: assembly.coordinate_program("places", equations, [positions[node][0] for node in nodes]),
+    )
+    places = dict(zip(nodes, assembly.kernel(program)([t], q, u)[0], strict=True))
+    found: Sides = {}
+    for path, local in assembly.mechanism.locals_.items():
+        for a in local.connectors:
+            for b in local.connectors:
+                gap = places[equations.site.node(path, b)] - places[equations.site.node(path, a)]
+                if gap != 0.0:
+                    found[path, a, b] = 1.0 if gap > 0.0 else -1.0
+    return found
+
+
+def sides_differ(assembly: Assembly, actual: Sides) -> bool:
+    """Return whether the signs that lengths were given differ from where things are."""
+    for (path, a, b), sign in actual.items():
+        given = assembly.mechanism.locals_[path].binding.sides or {}
+        order = list(assembly.mechanism.locals_[path].connectors)
+        usual = 1.0 if order.index(a) < order.index(b) else -1.0  # what laws take where the start does not tell
+        if given.get((a, b), usual) != sign:
+            return True
+    return False

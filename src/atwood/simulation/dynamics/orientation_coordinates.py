@@ -1,0 +1,298 @@
+"""Changes of chart along a run, in numbers: orientations from any coordinates to any others.
+
+Three coordinates are left before they become singular. Modified Rodrigues parameters and rotation vectors have other
+values for the same orientation, which fulfil the same equations; Euler angles go on from another base, with equations
+of their own. The speeds are the angular velocity in the axes of the body before and after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import UsageError
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.kinematics.orientation_coordinates import (
+    FARTHEST_COSINE,
+    FARTHEST_RODRIGUES,
+    FARTHEST_ROTATION,
+    chart_margin,
+)
+from atwood.mechanics.outputs.event_functions import Watch
+from atwood.topology.charts import Chart, Orientation
+
+__all__ = [
+    "CHART",
+    "Restated",
+    "chart_watches",
+    "enter_charts",
+    "from_regular",
+    "longest_step",
+    "own_names",
+    "restated",
+    "to_regular",
+]
+
+Reassemble = Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float], Orientation], Assembly]
+
+CHART = "chart"
+"""Target of the event that a chart is to be left."""
+
+_NEARLY = 0.95
+"""What is so near to where a chart is left leaves it with another that is there."""
+
+_FARTHEST_STEP = 2.0
+"""Angle that a body may turn in a step, rad: together with the margin of a chart it is less than a full turn."""
+
+
+@dataclass(frozen=True)
+class Restated:
+    """A change of the coordinates of an orientation.
+
+    Attributes
+    ----------
+    time
+        When, s.
+    body
+        Of which body.
+    """
+
+    time: float
+    body: str
+
+
+def chart_watches(equations: Equations) -> tuple[Watch, ...]:
+    """Return what tells that a chart is to be left."""
+    found = []
+    for chart in equations.charts:
+        margin = chart_margin(chart, [equations.coordinates[i] for i in chart.coordinates])
+        if margin is not None:
+            says = "its orientation goes on in other coordinates"
+            found.append(Watch(chart.body, "orientation", margin, 1, CHART, says, "1", False))
+    return tuple(found)
+
+
+def to_regular(assembly: Assembly, q: FloatArray) -> FloatArray:
+    """Return generalized coordinates with quaternions, from those of the reduced form; one state or many.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    q
+        Shape (coordinates,) or (coordinates, samples).
+    """
+    return _carried(assembly, assembly.reduced, assembly.regular, q)
+
+
+def from_regular(assembly: Assembly, q: FloatArray) -> FloatArray:
+    """Return coordinates of the reduced form from those with quaternions; see `to_regular`."""
+    return _carried(assembly, assembly.regular, assembly.reduced, q)
+
+
+def _carried(assembly: Assembly, before: Equations, after: Equations, q: FloatArray) -> FloatArray:
+    if before is after:
+        return q
+    if (_plain(before), before.speed_names) != (_plain(after), after.speed_names):
+        raise UsageError(
+            f"with orientations as {assembly.orientation.kind!r} other coordinates or speeds are eliminated",
+            where=assembly.flat.name,
+            advice="Use quaternions.",
+        )
+    found = np.full((len(after.coordinates), *q.shape[1:]), np.nan)
+    number = {one.name: i for i, one in enumerate(before.names)}
+    for i, one in enumerate(after.names):
+        if one.name in number:
+            found[i] = q[number[one.name]]
+    for old, new in zip(before.charts, after.charts, strict=True):
+        found[list(new.coordinates)] = _coordinates(new, _quaternion(old, q[list(old.coordinates)]))
+    return found
+
+
+def own_names(assembly: Assembly, names: Sequence[str]) -> tuple[str, ...]:
+    """Return names of coordinates with quaternions as those of the reduced form.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    names
+        Some of them; one of an orientation stands for all.
+    """
+    regular, reduced = assembly.regular, assembly.reduced
+    if regular is reduced:
+        return tuple(names)
+    stands: dict[str, list[str]] = {}
+    for old, new in zip(regular.charts, reduced.charts, strict=True):
+        own = [reduced.names[i].name for i in new.coordinates]
+        stands |= {regular.names[i].name: own for i in old.coordinates}
+    return tuple(dict.fromkeys(one for name in names for one in stands.get(name, [name])))
+
+
+def longest_step(equations: Equations, u: FloatArray) -> float:
+    """Return the longest step that an explicit method may take in charts that can be left, s; perhaps infinite.
+
+    A uniform turn is no more than a straight line in some of them, and its steps would grow until rounding is
+    amplified; and a step that is longer than the margin of a chart could pass its singular place unseen.
+
+    Parameters
+    ----------
+    equations
+        The equations.
+    u
+        Speeds.
+    """
+    own = [list(chart.speeds) for chart in equations.charts if not chart.is_homogeneous]
+    fastest = max((float(np.linalg.norm(u[one])) for one in own), default=0.0)
+    return _FARTHEST_STEP / fastest if fastest > 0.0 else np.inf
+
+
+def _plain(equations: Equations) -> list[str]:
+    """Return the names of coordinates that are not of orientations."""
+    turned = {i for chart in equations.charts for i in chart.coordinates}
+    return [one.name for i, one in enumerate(equations.names) if i not in turned]
+
+
+def restated(assembly: Assembly, q: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the same place with long rotations the other way round, which fulfil the same equations.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    q
+        Its coordinates.
+
+    Returns
+    -------
+    q
+        The coordinates after that.
+    bodies
+        Which orientations have changed; none of those that are Euler angles.
+    """
+    q, bodies = q.copy(), []
+    for chart in assembly.equations.charts:
+        own = list(chart.coordinates)
+        size = float(np.linalg.norm(q[own]))
+        if chart.kind == "rodrigues" and size * size > _NEARLY * FARTHEST_RODRIGUES:
+            q[own] /= -(size * size)
+        elif chart.kind == "rotation-vector" and size > _NEARLY * FARTHEST_ROTATION:
+            q[own] *= 1.0 - 2.0 * np.pi * max(1.0, round(size / (2.0 * np.pi))) / size
+        else:
+            continue
+        bodies.append(chart.body)
+    return q, tuple(bodies)
+
+
+def enter_charts(assembly: Assembly, q: FloatArray, reassemble: Reassemble) -> tuple[Assembly, FloatArray]:
+    """Return a scene in charts that are far from singular, and its coordinates there.
+
+    Parameters
+    ----------
+    assembly
+        The scene, in the reduced form.
+    q
+        Its generalized coordinates with quaternions.
+    reassemble
+        Gives the scene in other charts.
+    """
+    orientation = assembly.orientation
+    if not orientation.kind.startswith("euler-"):
+        return assembly, from_regular(assembly, q)
+    turned = set(orientation.turned)
+    for chart, regular in zip(assembly.reduced.charts, assembly.regular.charts, strict=True):
+        first, _, third = chart.turns
+        along = _matrix(chart.base, q[list(regular.coordinates)])[first, third]
+        if abs(along) > _NEARLY * FARTHEST_COSINE:
+            turned ^= {chart.body}
+    if turned != orientation.turned:
+        other = Orientation(orientation.kind, frozenset(turned))
+        assembly = reassemble(assembly.modes, assembly.mechanism.sides or {}, other)
+    return assembly, from_regular(assembly, q)
+
+
+def _matrix(base: int, quaternion: FloatArray) -> FloatArray:
+    """Return rotation matrices, seen from a base, from quaternions of shape (4,) or (4, samples)."""
+    w, x, y, z = quaternion / np.sqrt(np.sum(quaternion**2, axis=0))
+    matrix = np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
+    return matrix if base == 0 else matrix[[1, 2, 0]]
+
+
+def _quaternion(chart: Chart, values: FloatArray) -> FloatArray:
+    """Return unit quaternions from coordinates of a chart."""
+    if chart.is_homogeneous:
+        return np.asarray(values / np.sqrt(np.sum(values**2, axis=0)))
+    if chart.kind.startswith("euler-"):
+        found = np.array([1.0, 0.0, 0.0, 0.0] if chart.base == 0 else [0.5, 0.5, 0.5, 0.5])
+        found = found.reshape(4, *[1] * (values.ndim - 1)) * np.ones(values.shape[1:])
+        for axis, angle in zip(chart.turns, values, strict=True):
+            turn = np.zeros_like(found)
+            turn[0], turn[1 + axis] = np.cos(0.5 * angle), np.sin(0.5 * angle)
+            found = _product(found, turn)
+        return found
+    square = np.sum(values**2, axis=0)
+    if chart.kind == "rodrigues":
+        return np.asarray(np.concatenate([[1.0 - square], 2.0 * values]) / (1.0 + square))
+    size = np.sqrt(square)
+    return np.concatenate([[np.cos(0.5 * size)], 0.5 * values * np.sinc(0.5 * size / np.pi)])
+
+
+def _product(p: FloatArray, q: FloatArray) -> FloatArray:
+    return np.array(
+        [
+            p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+            p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+            p[0] * q[2] + p[2] * q[0] + p[3] * q[1] - p[1] * q[3],
+            p[0] * q[3] + p[3] * q[0] + p[1] * q[2] - p[2] * q[1],
+        ]
+    )
+
+
+def _coordinates(chart: Chart, quaternion: FloatArray) -> FloatArray:
+    """Return coordinates of a chart from unit quaternions."""
+    if chart.is_homogeneous:
+        return quaternion
+    if chart.kind.startswith("euler-"):
+        return _euler_angles(chart.turns, _matrix(chart.base, quaternion))
+    short = np.where(quaternion[0] < 0.0, -1.0, 1.0) * quaternion
+    if chart.kind == "rodrigues":
+        return np.asarray(short[1:] / (1.0 + short[0]))
+    sine = np.sqrt(np.sum(short[1:] ** 2, axis=0))
+    half = np.arctan2(sine, short[0])
+    return np.asarray(short[1:] * 2.0 * np.where(sine > 0.0, half / np.where(sine > 0.0, sine, 1.0), 1.0))
+
+
+def _euler_angles(turns: tuple[int, int, int], matrix: FloatArray) -> FloatArray:
+    """Return the angles of three turns, of shape (3,) or (3, samples), from a rotation matrix.
+
+    With i, j, k their axes and l the third besides i and j: the column of the last axis and the row of the first one
+    are those of two turns alone.
+    """
+    i, j, k = turns
+    l = 3 - i - j
+    even = 1.0 if (j - i) % 3 == 1 else -1.0
+    if i == k:
+        return np.array(
+            [
+                np.arctan2(matrix[j, i], -even * matrix[l, i]),
+                np.arctan2(np.hypot(matrix[j, i], matrix[l, i]), matrix[i, i]),
+                np.arctan2(matrix[i, j], even * matrix[i, l]),
+            ]
+        )
+    return np.array(
+        [
+            np.arctan2(-even * matrix[j, k], matrix[k, k]),
+            np.arctan2(even * matrix[i, k], np.hypot(matrix[i, i], matrix[i, j])),
+            np.arctan2(-even * matrix[i, j], matrix[i, i]),
+        ]
+    )

@@ -1,0 +1,289 @@
+"""Which rows of a Jacobian are independent, decided by what rounding could have made of them.
+
+The tolerances of rank are here, with their reasons. Nothing is compared with a number that would depend on where a
+scene stands, how it is turned, or in what units it is: each row comes with its error, which is how far rounding can
+take it (`atwood.simulation.dynamics.rounding`), and a row is independent of others if more is left of it than the
+errors of all together account for. So a row that is nothing but rounding counts as zero, whatever its size, and a row
+that is small but known well does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.clock import within_time
+from atwood.codegen.rounding import ROUGHNESS
+from atwood.linalg.matrices import Matrix, is_full, scaled, to_array
+
+__all__ = [
+    "CLEAR",
+    "FREE",
+    "RANK",
+    "SINGULAR",
+    "certain",
+    "independent_rows",
+    "least_norm",
+    "least_size",
+    "open_directions",
+    "review_rows",
+    "row_scales",
+    "row_sizes",
+    "trusted_sizes",
+]
+
+
+CERTAIN = 30.0
+"""Times its error: what is left of a row by more is not rounding.
+
+Errors are found from some ways of rounding 16 times as rough as the machine's; so 500 roundings in a row that all go
+the same way are still told from what is there.
+"""
+
+RANK = 1e-9
+"""Relative size below which a direction is not followed when a linear system is solved.
+
+It must lie well above what is left of rounding in rows that are scaled by `row_scales`, and below what a mechanism
+shows near a singular position.
+"""
+
+TRUSTED = 1e11
+"""Times its error: a row is measured by its own size if it is larger, and else by this.
+
+What rounding leaves in a row that is scaled so is below 1e-11, a hundredth of `RANK`.
+"""
+
+SINGULAR = 1e-5
+"""Relative to a little away from it: at a singular position the smallest singular value is less.
+
+A little away is 1e-2 of a radian, so that a start within 1e-7 of a singular position, of which Newton's method knows no
+more than that, is one.
+"""
+
+CLEAR = 1e-6
+"""Smallest singular value, rows and columns scaled, above which no position near by is asked: rank is full."""
+
+FREE = 1e-6
+"""Share in a direction of size one above which a coordinate or speed counts as moving along it."""
+
+_LEVEL = 0.03
+"""Of rows that are independent of those chosen, the first is chosen of which this share of the largest is left.
+
+In declared order those that are dropped come last, as one expects; but a row that hardly changes would make the
+multipliers of all that follow inaccurate.
+"""
+
+_POOR, _SETTLED = 3.0, 1.5
+"""A choice of rows is poor where another takes one of it more often; exchanges go on until none does by so much."""
+
+_LOOK = 1e-4
+"""While more than this share of the largest row is left, errors of the chosen rows cannot matter."""
+
+
+def row_sizes(slope: Matrix, scales: FloatArray) -> FloatArray:
+    """Return the largest entry of each row after its columns are scaled, shape (rows,)."""
+    if is_full(slope):
+        return np.asarray(np.max(np.abs(slope * scales), axis=1, initial=0.0))
+    from atwood.linalg.sparse import csr_row_sizes
+
+    return csr_row_sizes(slope, scales)
+
+
+def row_scales(slope: Matrix, scales: FloatArray, errors: FloatArray) -> FloatArray:
+    """Return the size of each row: how much it changes when a coordinate changes by its scale, if that is known.
+
+    Parameters
+    ----------
+    slope
+        The rows.
+    scales
+        Size of each coordinate.
+    errors
+        How far rounding can take each row, in the same scales.
+    """
+    return trusted_sizes(row_sizes(slope, scales), errors)
+
+
+def trusted_sizes(sizes: FloatArray, errors: FloatArray) -> FloatArray:
+    """Return the size of each row from its largest entry, of shape (..., rows); see `row_scales`."""
+    rows = np.maximum(sizes, TRUSTED * errors)
+    return np.where(rows > 0.0, rows, 1.0)
+
+
+def certain(errors: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return what is not rounding alone if it is exceeded.
+
+    Parameters
+    ----------
+    errors, sizes
+        How far rounding can take each row, and its largest entry.
+    """
+    return CERTAIN * _at_least(errors, sizes)
+
+
+def _at_least(errors: FloatArray, sizes: FloatArray) -> FloatArray:
+    return np.maximum(errors, ROUGHNESS * sizes)  # what is exact now is not known to be so
+
+
+def independent_rows(matrix: Matrix, errors: FloatArray, most: int | None = None, before: int = 0) -> list[int]:
+    """Return the numbers of independent rows, as many as there are, and rather the first than the last ones.
+
+    Parameters
+    ----------
+    matrix
+        The rows, with columns of like scale; rows may have any size.
+    errors
+        How far rounding can take each row, in the same units.
+    most
+        How many to return at most.
+    before
+        So many rows come before all others, even if these would make a better choice.
+    """
+    errors = _at_least(errors, row_sizes(matrix, np.ones(matrix.shape[1])))
+    if not is_full(matrix):
+        if most is None and _is_clear(matrix, errors):
+            return list(range(matrix.shape[0]))
+        matrix = to_array(matrix)
+    # In these units a row of the size of the terms that it was computed from has size one.
+    units = np.where(errors > 0.0, errors / ROUGHNESS, 1.0)
+    most = min(matrix.shape) if most is None else min(*matrix.shape, most)
+    return _chosen(matrix / units[:, None], errors / units, most, before)
+
+
+def _chosen(rows: FloatArray, errors: FloatArray, most: int, before: int) -> list[int]:
+    """Return the rows that Gram and Schmidt's method keeps, each time one of those of which most is left."""
+    left = rows.copy()
+    sizes = np.linalg.norm(left, axis=1)
+    chosen: list[int] = []
+    basis = np.empty((most, rows.shape[1]))
+    is_open, is_first = np.ones(len(rows), dtype=bool), np.arange(len(rows)) < before
+    while len(chosen) < most:
+        bounds = CERTAIN * errors
+        largest = float(np.max(sizes, where=is_open, initial=0.0))
+        if chosen and largest < _LOOK:
+            weights = np.linalg.lstsq(rows[chosen].T, rows.T, rcond=None)[0]
+            bounds = CERTAIN * np.sqrt(errors**2 + errors[chosen] ** 2 @ weights**2)
+        is_open &= sizes > bounds
+        if not np.any(is_open):
+            break
+        among = is_open & is_first if np.any(is_open & is_first) else is_open
+        i = int(np.argmax(among & (sizes >= _LEVEL * np.max(sizes, where=among, initial=0.0))))
+        direction = left[i] / sizes[i]
+        known = basis[: len(chosen)]
+        direction = direction - (known @ direction) @ known  # once more, against rounding
+        direction /= np.linalg.norm(direction)
+        basis[len(chosen)] = direction
+        chosen.append(i)
+        is_open[i] = False
+        left -= (left @ direction)[:, None] * direction
+        sizes = np.linalg.norm(left, axis=1)
+    return sorted(chosen)
+
+
+def review_rows(matrix: Matrix, errors: FloatArray, kept: Sequence[int]) -> list[int]:
+    """Return a better choice of independent rows if a choice has become poor, else the same one.
+
+    A choice is good if what the other rows are made of takes no row of it many times, each measured by the terms that
+    it is computed from: exchanging two rows multiplies the volume of the choice by that number.
+
+    Parameters
+    ----------
+    matrix
+        The rows, with columns of like scale.
+    errors
+        How far rounding can take each row; see `independent_rows`.
+    kept
+        The choice.
+    """
+    chosen = list(kept)
+    others = [i for i in range(matrix.shape[0]) if i not in set(chosen)]
+    units = np.where(errors > 0.0, errors / ROUGHNESS, 1.0)
+    rows, bound = scaled(matrix, np.ones(matrix.shape[1]), units), _POOR
+    for _ in range(10 * len(chosen)):
+        if not others:
+            break
+        made_of = _made_of(rows[chosen], rows[others])
+        left = to_array(rows[others]) - made_of @ to_array(rows[chosen])
+        if not np.max(np.abs(left), initial=0.0) <= _LOOK:  # the choice itself is not independent here
+            return independent_rows(matrix, errors, len(kept))
+        weights = np.abs(made_of)
+        this, that = np.unravel_index(int(np.argmax(weights)), weights.shape)
+        if weights[this, that] <= bound:
+            break
+        others[int(this)], chosen[int(that)], bound = chosen[int(that)], others[int(this)], _SETTLED
+    return sorted(chosen)
+
+
+def _made_of(kept: Matrix, others: Matrix) -> FloatArray:
+    """Return how often each kept row is in others, shape (others, kept)."""
+    if is_full(kept):
+        return np.asarray(np.linalg.lstsq(kept.T, others.T, rcond=None)[0].T)
+    from atwood.linalg.sparse import csr_made_of
+
+    return csr_made_of(kept, others)
+
+
+def least_size(slope: FloatArray, kept: NDArray[np.intp], multipliers: FloatArray) -> FloatArray:
+    """Return the multipliers of all rows of least size that have the force of some of the independent ones.
+
+    What other rows are made of, ``G_r = W G_k``, gives all that exert no force: no small number has to be called zero.
+
+    Parameters
+    ----------
+    slope
+        The rows at some states, shape (states, rows, columns).
+    kept
+        Which rows are independent, all others following from them.
+    multipliers
+        Of the independent rows, shape (states, kept).
+    """
+    others = np.setdiff1d(np.arange(slope.shape[1]), kept)
+    found = np.zeros(slope.shape[:2])
+    if not len(kept):
+        return found
+    columns = np.max(np.abs(slope[:, kept]), axis=1)
+    even = slope / np.where(columns > 0.0, columns, 1.0)[:, None, :]
+    rows = np.max(np.abs(even[:, kept]), axis=2)[:, :, None]
+    weights = even[:, others] @ np.linalg.pinv(even[:, kept] / rows) / np.swapaxes(rows, 1, 2)
+    found[:, kept] = multipliers
+    without_force = np.zeros((*found.shape, len(others)))
+    without_force[:, kept], without_force[:, others] = -np.swapaxes(weights, 1, 2), np.eye(len(others))
+    basis = np.linalg.qr(without_force)[0]
+    left: FloatArray = found - (basis @ (np.swapaxes(basis, 1, 2) @ found[:, :, None]))[:, :, 0]
+    return left
+
+
+def _is_clear(matrix: Matrix, errors: FloatArray) -> bool:
+    """Return whether it is certain, for a large matrix, that no row depends on others."""
+    from atwood.linalg.sparse import rows_are_independent
+
+    sizes = row_sizes(matrix, np.ones(matrix.shape[1]))
+    return bool(np.all(sizes > errors / _LOOK)) and rows_are_independent(matrix, CLEAR)
+
+
+def open_directions(matrix: FloatArray, least: float = 0.0) -> FloatArray:
+    """Return orthonormal directions, one row each, along which independent rows do not change.
+
+    Parameters
+    ----------
+    matrix
+        The rows, of any size.
+    least
+        Where they nearly depend on each other: what counts as no change, relative to the size of each.
+    """
+    sizes = np.linalg.norm(matrix, axis=1, keepdims=True)
+    rows = matrix / np.where(sizes > 0.0, sizes, 1.0)
+    _, values, directions = within_time(lambda: np.linalg.svd(rows))
+    return np.asarray(directions[len(matrix) if least == 0.0 else int(np.sum(values > least)) :])
+
+
+def least_norm(matrix: Matrix, right: FloatArray) -> FloatArray:
+    """Return the shortest solution of a linear system, or the best where there is none."""
+    if is_full(matrix):
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=RANK)[0], dtype=float)
+    from atwood.linalg.sparse import csr_least_norm
+
+    return csr_least_norm(matrix, right)

@@ -1,0 +1,238 @@
+"""Accelerations and reactions along a run, for many states at once.
+
+Reactions come from the balance of forces in maximal coordinates, where every joint is a constraint, at the positions
+and velocities of either form.
+"""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.errors import SolveError
+from atwood.forms.accelerations import acceleration_program
+from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.places import to_maximal
+from atwood.forms.program import BalanceProgram
+from atwood.linalg.matrices import is_best_full
+from atwood.mechanics.outputs.internal_reactions import release_program
+from atwood.simulation.dynamics.balance import balance_of
+from atwood.simulation.dynamics.columns import masses_at
+from atwood.simulation.dynamics.kinematic_map import turning_of
+from atwood.simulation.dynamics.rank import least_size
+from atwood.simulation.dynamics.redundancy import RankFinding, find_rank, kept_along
+from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, multiplier_sizes, scene_length
+from atwood.simulation.dynamics.sparse_states import States
+
+__all__ = ["ReactionSolver", "accelerations_and_multipliers", "accelerations_at", "maximal_state"]
+
+
+_CHUNK = 4_000_000
+"""Numbers in the matrices that are solved at once."""
+
+
+def maximal_state(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return maximal coordinates and speeds, each of shape (number, samples), from those of the form."""
+    if assembly.form == "dae":
+        return q, u
+    big_q, big_u = assembly.kernel(to_maximal(assembly), vectorized=True)(t[None, :], q, u)
+    return turning_of(assembly, "dae").normalized(big_q), big_u
+
+
+def accelerations_and_multipliers(
+    assembly: Assembly, form: FormName, t: FloatArray, q: FloatArray, u: FloatArray, kept: NDArray[np.intp]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Solve the balance of forces for many states, with the multipliers of all constraints.
+
+    Parameters
+    ----------
+    assembly, form
+        The scene and the coordinates that the states are in.
+    t, q, u
+        States, of shape (samples,) and (number, samples).
+    kept
+        Numbers of independent constraints.
+
+    Returns
+    -------
+    accelerations, multipliers, drift
+        Of shape (number, samples); drift is the constraints' explicit time derivative. With redundant constraints the
+        multipliers are those of least size, moments divided by the extent of the scene.
+    """
+    program = assembly.balance(form)
+    values = assembly.kernel(program.program, vectorized=True)(t[None, :], q, u)
+    a, multipliers = _solved(assembly, form, (t, q, u), kept, values)
+    if len(kept) < program.constraints:
+        multipliers = _of_least_size(assembly, form, kept, values[5], multipliers)
+    return a, multipliers, np.asarray(values[6])
+
+
+def accelerations_at(
+    assembly: Assembly, form: FormName, t: FloatArray, q: FloatArray, u: FloatArray, kept: NDArray[np.intp]
+) -> FloatArray:
+    """Return the accelerations alone; see `accelerations_and_multipliers`."""
+    values = assembly.kernel(assembly.balance(form).program, vectorized=True)(t[None, :], q, u)
+    return _solved(assembly, form, (t, q, u), kept, values)[0]
+
+
+def _states(assembly: Assembly, form: FormName, kept: NDArray[np.intp]) -> States:
+    chosen = tuple(kept.tolist())
+    return assembly.shared.get(("states", form, chosen), lambda: States(assembly.balance(form), chosen))
+
+
+def _is_full(program: BalanceProgram) -> bool:
+    return program.mass_product is not None or is_best_full((program.speeds,) * 2, len(program.mass_rows), many=True)
+
+
+def _of_least_size(
+    assembly: Assembly, form: FormName, kept: NDArray[np.intp], slope: FloatArray, multipliers: FloatArray
+) -> FloatArray:
+    """Return the multipliers of all constraints from those of the independent ones, shape (constraints, samples)."""
+    program, samples = assembly.balance(form), slope.shape[1]
+    # Forces, and moments divided by a length, along displacements and rotations times a length.
+    sizes = multiplier_sizes(assembly, form)[:, None]
+    columns = motion_scales(assembly.in_coordinates(form), scene_length(assembly))[:, None]
+    even, forces = slope * sizes[program.slope_rows] * columns[program.slope_columns], multipliers / sizes[kept]
+    if not _is_full(program):
+        return _states(assembly, form, kept).least_size(even, forces) * sizes
+    found = np.full((program.constraints, samples), np.nan)
+    known = np.flatnonzero(np.all(np.isfinite(even), axis=0) & np.all(np.isfinite(forces), axis=0))
+    step = max(1, _CHUNK // (program.constraints * program.speeds))
+    for first in range(0, len(known), step):
+        part = known[first : first + step]
+        full = np.zeros((len(part), program.constraints, program.speeds))
+        full[:, program.slope_rows, program.slope_columns] = even[:, part].T
+        found[:, part] = least_size(full, kept, forces[:, part].T).T
+    return found * sizes
+
+
+def _solved(
+    assembly: Assembly,
+    form: FormName,
+    state: tuple[FloatArray, FloatArray, FloatArray],
+    kept: NDArray[np.intp],
+    values: tuple[FloatArray, ...],
+) -> tuple[FloatArray, FloatArray]:
+    """Return accelerations and the multipliers of the independent constraints."""
+    program, (t, q, u) = assembly.balance(form), state
+    n, m, samples = program.speeds, program.constraints, len(t)
+    mass, bias, _, _, gamma, slope, _ = values
+    if not _is_full(program):
+        return _states(assembly, form, kept).solve(t, (mass, bias, gamma, slope))
+    found_a, found_l = np.zeros((n, samples)), np.zeros((len(kept), samples))
+    size = n + len(kept)
+    step = max(1, _CHUNK // max(1, size * size))
+    for first in range(0, samples, step):
+        part = slice(first, min(first + step, samples))
+        count = part.stop - part.start
+        if program.mass_product is not None:
+            full_mass = masses_at(assembly, t[part], q[:, part].T, u[:, part].T, assembly.parameter_values)
+        else:
+            full_mass = np.zeros((count, n, n))
+            full_mass[:, program.mass_rows, program.mass_columns] = mass[:, part].T
+        full_slope = np.zeros((count, m, n))
+        full_slope[:, program.slope_rows, program.slope_columns] = slope[:, part].T
+        matrix = np.zeros((count, size, size))
+        matrix[:, :n, :n] = full_mass
+        matrix[:, :n, n:] = -np.swapaxes(full_slope[:, kept], 1, 2)
+        matrix[:, n:, :n] = full_slope[:, kept]
+        right = -np.concatenate([bias[:, part].T, gamma[kept][:, part].T], axis=1)
+        scale = np.sqrt(np.maximum(np.abs(matrix).max(axis=1), np.abs(matrix).max(axis=2))) if size else right
+        scale[scale == 0.0] = 1.0
+        try:
+            solution = np.linalg.solve(matrix / scale[:, :, None] / scale[:, None, :], (right / scale)[..., None])
+        except np.linalg.LinAlgError:
+            raise SolveError(
+                "the forces do not determine the accelerations somewhere along the run",
+                advice="The mechanism passes a singular position exactly, or something without mass is free.",
+            ) from None
+        solved = solution[..., 0] / scale
+        found_a[:, part] = solved[:, :n].T
+        found_l[:, part] = solved[:, n:].T
+    return found_a, found_l
+
+
+class ReactionSolver:
+    """Reactions of one assembled mode.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    t, q, u
+        A state in the coordinates of the form, at which the rank of the constraints is decided.
+    """
+
+    def __init__(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> None:
+        self.assembly = assembly
+        big_q, _ = maximal_state(assembly, np.array([t]), q[:, None], u[:, None])
+        self._length = scene_length(assembly)
+        sizes = motion_scales(assembly.maximal, self._length)
+        self.finding = find_rank(balance_of(assembly, "dae"), t, big_q[:, 0], sizes)
+        self._of_constraint = {one.key: i for i, one in enumerate(assembly.maximal.constraints)}
+        self._release = assembly.shared.get(
+            "release",
+            lambda: release_program(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.parameters),
+        )
+
+    def for_rows(self, rows: FloatArray) -> ReactionSolver:
+        """Return the same for states that have parameters of their own, where no constraint is redundant.
+
+        Parameters
+        ----------
+        rows
+            Values of the parameters, shape (parameters, samples).
+        """
+        twin = copy.copy(self)
+        twin.assembly = self.assembly.with_rows(rows)
+        return twin
+
+    def at(self, t: FloatArray, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return all reactions, of shape (number, samples), and the power of constraints that move with time."""
+        assembly = self.assembly
+        big_q, big_u = maximal_state(assembly, t, q, u)
+        found = [
+            accelerations_and_multipliers(assembly, "dae", t[part], big_q[:, part], big_u[:, part], kept)
+            for part, kept in self._kept_along(self.finding, "dae", t, big_q)
+        ]
+        a, multipliers, drift = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
+        values = np.zeros((len(assembly.reactions), len(t)))
+        released = None
+        if self._release is not None:
+            kernel = assembly.kernel(self._release.program, vectorized=True)
+            (released,) = kernel(t[None, :], big_q, big_u, a, multipliers)
+        for i, reaction in enumerate(assembly.reactions):
+            if reaction.axis >= 0:
+                rows = {} if self._release is None else self._release.rows
+                # Where another rigid connection shares the load, no share is known.
+                values[i] = released[rows[reaction.path]] if released is not None and reaction.path in rows else np.nan
+            elif reaction.key in self._of_constraint:
+                values[i] = reaction.sign * multipliers[self._of_constraint[reaction.key]]
+        power = -np.sum(multipliers * drift, axis=0) if len(multipliers) else np.zeros(len(t))
+        return values, power
+
+    def _kept_along(
+        self, finding: RankFinding, form: FormName, t: FloatArray, q: FloatArray
+    ) -> list[tuple[slice, NDArray[np.intp]]]:
+        if not finding.redundant:
+            return [(slice(None), np.asarray(finding.kept, dtype=np.intp))]
+        equations, balance = self.assembly.in_coordinates(form), balance_of(self.assembly, form)
+        scales, sizes = motion_scales(equations, self._length), coordinate_scales(equations, self._length)
+        return kept_along(finding, balance, t, q, scales, sizes)
+
+    def own_accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, finding: RankFinding) -> FloatArray:
+        """Return the accelerations of the form's coordinates, with what is known of its constraints."""
+        if self.assembly.form == "reduced" and self.assembly.balance("reduced").mass_product is not None:
+            rates = self.assembly.shared.get("accelerations", lambda: acceleration_program(self.assembly))
+            if rates is not None:
+                found: FloatArray = self.assembly.kernel(rates.program, vectorized=True)(t[None, :], q, u)[-1]
+                return found
+        form = self.assembly.form
+        parts = [
+            accelerations_at(self.assembly, form, t[part], q[:, part], u[:, part], kept)
+            for part, kept in self._kept_along(finding, form, t, q)
+        ]
+        return np.concatenate(parts, axis=1)

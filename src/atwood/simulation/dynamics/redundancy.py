@@ -1,0 +1,211 @@
+"""Which constraints follow from others: asked at the start and at admissible positions near by.
+
+A rank that drops everywhere means a redundant design; one that drops at the start alone means a singular position,
+which must not be taken for additional freedom.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.errors import KernelEvaluationError
+from atwood.linalg.matrices import scaled, to_array
+from atwood.simulation.dynamics.balance import Balance
+from atwood.simulation.dynamics.rank import CLEAR, SINGULAR, independent_rows, open_directions, review_rows, row_sizes
+
+__all__ = ["RankFinding", "find_rank", "kept_along", "review_kept"]
+
+
+_ADMISSIBLE = 1e-9
+"""How well a position near the start must fulfil the constraints to be asked for their rank."""
+
+_STEPS = (1e-2, 3e-2, 3e-2)
+"""How far away the positions are that are asked, relative to the scene's sizes."""
+
+_MOVE = 0.2
+"""Between two looks at which constraints are kept nothing moves by more of its size; an angle by so many radians."""
+
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+"""The angle whose multiples are spread most evenly."""
+
+
+@dataclass(frozen=True)
+class RankFinding:
+    """What the constraints of a form determine.
+
+    Attributes
+    ----------
+    kept
+        Numbers of constraints that are independent.
+    redundant
+        Numbers of constraints that follow from the others, everywhere.
+    rank
+        Number of independent constraints.
+    rank_at_start
+        The same at the start position alone.
+    lost_at_start
+        Numbers of independent constraints that follow from the others at the start position.
+    errors
+        How far rounding can take the slopes of each constraint.
+    """
+
+    kept: tuple[int, ...]
+    redundant: tuple[int, ...]
+    rank: int
+    rank_at_start: int
+    lost_at_start: tuple[int, ...] = ()
+    errors: FloatArray = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
+
+    @property
+    def starts_singular(self) -> bool:
+        """Whether the start is a singular position."""
+        return self.rank_at_start < self.rank
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """The constraints' slopes at a place, columns scaled, with their errors, and the rows that are independent."""
+
+    slope: FloatArray
+    errors: FloatArray
+    kept: list[int]
+
+    def smallest(self, kept: list[int], units: FloatArray) -> FloatArray:
+        """Return the singular values of some rows in given units."""
+        return np.asarray(np.linalg.svd(self.slope[kept] / units[kept, None], compute_uv=False))
+
+
+def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> RankFinding:
+    """Find the rank of the constraints.
+
+    Parameters
+    ----------
+    balance
+        The balance of forces of the form.
+    t, q
+        Time and position of the start.
+    scales
+        Size of a displacement along each speed.
+    """
+    count = balance.constraints
+    if count == 0:
+        return RankFinding((), (), 0, 0)
+    here = _look(balance, t, q, scales)
+    sizes = row_sizes(here.slope, np.ones(len(scales)))
+    everything = list(range(count))
+    if len(here.kept) == count and here.smallest(everything, sizes)[-1] > CLEAR:
+        return RankFinding(tuple(everything), (), count, count)
+    nearby, is_movable = _nearby(balance, t, q, scales, here)
+    if is_movable and not nearby:
+        # It looks movable here and is not: a singular position, and no reason to call a constraint redundant.
+        left = [i for i in everything if i not in set(here.kept)]
+        return RankFinding(tuple(everything), (), count, len(here.kept), tuple(left))
+    best = max([here, *nearby], key=lambda place: len(place.kept))
+    redundant = tuple(i for i in everything if i not in set(best.kept))
+    lost = _lost(here, nearby, best.kept)
+    errors = np.max([place.errors for place in (here, *nearby)], axis=0)
+    return RankFinding(tuple(best.kept), redundant, len(best.kept), len(best.kept) - len(lost), lost, errors)
+
+
+def review_kept(finding: RankFinding, balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> RankFinding:
+    """Return a finding with other independent constraints if those that were kept have become a poor choice.
+
+    Which components of a joint's constraint follow from others changes as the mechanism turns.
+
+    Parameters
+    ----------
+    finding
+        What is known.
+    balance, t, q, scales
+        See `find_rank`.
+    """
+    if not finding.redundant or not finding.kept:
+        return finding
+    slope = scaled(balance.held(t, q, np.zeros_like(scales)).slope, scales)
+    kept = tuple(review_rows(slope, finding.errors, finding.kept))
+    if kept == finding.kept or len(kept) < len(finding.kept):  # at a singular position no choice is a good one
+        return finding
+    redundant = tuple(i for i in range(balance.constraints) if i not in set(kept))
+    return replace(finding, kept=kept, redundant=redundant)
+
+
+def kept_along(
+    finding: RankFinding, balance: Balance, t: FloatArray, q: FloatArray, scales: FloatArray, sizes: FloatArray
+) -> list[tuple[slice, NDArray[np.intp]]]:
+    """Return which constraints to keep along a motion: stretches of its samples, with the constraints for each.
+
+    Parameters
+    ----------
+    finding, balance, scales
+        See `review_kept`.
+    t, q
+        Times and coordinates, of shape (samples,) and (number, samples).
+    sizes
+        Size of each coordinate.
+    """
+    parts = [0]
+    kept = [finding.kept]
+    way = np.concatenate([[0.0], np.cumsum(np.max(np.abs(np.diff(q, axis=1)) / sizes[:, None], axis=0, initial=0.0))])
+    last = -np.inf
+    for i in range(len(t) if finding.redundant else 0):
+        if way[i] - last < _MOVE and not balance.errors.moves_by_itself:
+            continue
+        last = way[i]
+        finding = review_kept(finding, balance, float(t[i]), q[:, i], scales)
+        if finding.kept != kept[-1]:
+            parts.append(i)
+            kept.append(finding.kept)
+    ends = [*parts[1:], len(t)]
+    found = zip(parts, ends, kept, strict=True)
+    return [(slice(a, b), np.asarray(one, dtype=np.intp)) for a, b, one in found if b > a]
+
+
+def _look(balance: Balance, t: float, q: FloatArray, scales: FloatArray, miss: float = 0.0) -> _Place:
+    slope = scaled(balance.held(t, q, np.zeros_like(scales)).slope, scales)
+    errors = balance.errors.of_slopes(t, q, scales, miss)
+    kept = independent_rows(slope, errors)
+    return _Place(to_array(slope), errors, kept)
+
+
+def _nearby(balance: Balance, t: float, q: FloatArray, scales: FloatArray, here: _Place) -> tuple[list[_Place], bool]:
+    """Return admissible places near by, and whether there seem to be any."""
+    # Constraints on velocities alone keep nothing from being reached.
+    holding = [i for i in here.kept if i in set(balance.holonomic.tolist())]
+    admissible = open_directions(here.slope[holding], CLEAR)
+    still, found = np.zeros_like(scales), []
+    for attempt, step in enumerate(_STEPS, 1):
+        if not len(admissible):
+            break
+        # any direction that no symmetry singles out
+        along = np.sin(attempt * _GOLDEN * np.arange(1.0, len(admissible) + 1.0)) @ admissible
+        way = step * scales * along / np.linalg.norm(along)
+        # From a singular position, Newton's method falls back into it unless something holds it away.
+        held = np.where(np.arange(len(scales)) == np.argmax(np.abs(along)), 0.0, scales)
+        for free, iterations in ((scales, 12), (held, 30)):
+            try:
+                nearby, _ = balance.project(t, balance.turning.moved(t, q, way), still, free, iterations)
+                miss = balance.misses(t, nearby, still, scales)[0]
+                if miss <= _ADMISSIBLE:
+                    found.append(_look(balance, t, nearby, scales, miss))
+                    break
+            except (KernelEvaluationError, np.linalg.LinAlgError):
+                continue  # a law has no value there: that says nothing about the start
+    return found, bool(len(admissible))
+
+
+def _lost(here: _Place, nearby: list[_Place], kept: list[int]) -> tuple[int, ...]:
+    """Return which independent constraints follow from the others at the start, or all but follow."""
+    if not nearby or not kept:
+        return ()
+    ones = np.ones(here.slope.shape[1])
+    units = np.max([row_sizes(place.slope, ones) for place in (here, *nearby)], axis=0)
+    away = max(float(place.smallest(kept, units)[-1]) for place in nearby)
+    missing = int(np.sum(here.smallest(kept, units) < SINGULAR * away))
+    if not missing:
+        return ()
+    left = independent_rows(here.slope[kept], here.errors[kept], len(kept) - missing)
+    return tuple(one for i, one in enumerate(kept) if i not in set(left))

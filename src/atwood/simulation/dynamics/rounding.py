@@ -1,0 +1,168 @@
+"""How far rounding can take the slopes of conditions: what they were computed from is off by a little, too.
+
+Coordinates are known to a few units in the last place, of the larger of their value and of what counts as large for
+them; parameters and every operation round as well (`atwood.codegen.rounding`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
+from atwood.expr import Program
+from atwood.forms.assembly import Assembly
+from atwood.simulation.dynamics.kinematic_map import Turning
+
+__all__ = ["RowErrors"]
+
+
+_GROWN = 10.0
+"""Errors are looked at again once a coordinate, or the time that has passed, is so many times as large as before."""
+
+_ASIDE = 0.1
+"""Relative to the scales: how far from a place errors about it are looked at; there, nothing is exact or infinite."""
+
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+"""The angle whose multiples are spread most evenly."""
+
+
+class RowErrors:
+    """How far rounding can take each condition: its value, and its slopes along the speeds.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    program, groups
+        The program of (t, q, u), and the names of the output groups, that values and entries of slopes come from.
+    laws
+        The law that each condition belongs to. What a law holds are components of one vector as a rule, in axes that
+        could be any: each is as uncertain as the most uncertain one.
+    places
+        The row and the column of each entry.
+    turning
+        How the coordinates move with the speeds.
+    of_coordinates
+        Whether the entries are derivatives by coordinates, and not along the speeds.
+    """
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        program: Program,
+        groups: tuple[str, str],
+        laws: Sequence[Hashable],
+        places: tuple[Any, Any],
+        turning: Turning,
+        of_coordinates: bool = False,
+    ) -> None:
+        self._assembly, self._program, self._groups, self._turning = assembly, program, groups, turning
+        self._rows, self._columns = (np.asarray(one, dtype=np.intp) for one in places)
+        number = {law: i for i, law in enumerate(dict.fromkeys(laws))}
+        self._laws = np.array([number[law] for law in laws], dtype=np.intp)
+        self._of_coordinates = of_coordinates and not turning.is_plain
+        self._first: float | None = None
+        self._reach = self._passed = 0.0
+        self._values = self._entries = self._tangent = np.zeros(0)
+        self._known: tuple[FloatArray, FloatArray] | None = None
+
+    def near(self, t: float, q: FloatArray, scales: FloatArray) -> FloatArray:
+        """Return how far rounding can take values and slopes where coordinates are of like size, shape (rows,).
+
+        Parameters
+        ----------
+        t, q
+            Time and coordinates.
+        scales
+            Size of a displacement along each speed.
+        """
+        reach, first = float(np.max(np.abs(q), initial=0.0)), self._first is None
+        passed = 0.0 if self._first is None else abs(t - self._first)
+        if first or reach > _GROWN * self._reach or (self.moves_by_itself and passed > _GROWN * self._passed):
+            self._first = t if self._first is None else self._first
+            self._reach, self._passed = max(reach, self._reach, 1.0), max(passed, self._passed)
+            aside = _ASIDE * scales * np.sin(_GOLDEN * np.arange(1.0, len(scales) + 1.0))
+            self._learn(t, self._turning.moved(t, q, aside), scales)
+            self._known = None
+        if self._known is None or self._known[0] is not scales:
+            found = self._shared(np.maximum(self._values, self._of_rows(self._entries, self._tangent, scales)))
+            self._known = scales, found
+        return self._known[1]
+
+    @cached_property
+    def moves_by_itself(self) -> bool:
+        """Whether the conditions depend on time."""
+        return any(one.operation == "symbol" and one in self._program.inputs[0].symbols for one in self._program.nodes)
+
+    def _learn(self, t: float, q: FloatArray, scales: FloatArray) -> None:
+        values, entries = (_spread(one) for one in self._rough(t, q, scales, 1.0))
+        tangent = self._tangent_at(t, q)
+        if len(self._entries):
+            values, entries = np.maximum(values, self._values), np.maximum(entries, self._entries)
+            tangent = np.maximum(tangent, self._tangent)
+        self._values, self._entries, self._tangent = values, entries, tangent
+
+    def of_slopes(self, t: float, q: FloatArray, scales: FloatArray, miss: float = 0.0) -> FloatArray:
+        """Return how far rounding can take slopes at a place that is known no better than the values, shape (rows,).
+
+        Parameters
+        ----------
+        t, q, scales
+            See `near`.
+        miss
+            By how much the place misses what it was to meet, relative to the scales.
+        """
+        tangent = self._tangent_at(t, q)
+        values, found = self._rough(t, q, scales, 1.0)
+        errors = self._of_rows(_spread(found), tangent, scales)
+        sizes = np.maximum(self._of_rows(np.max(np.abs(found), axis=1), tangent, scales), errors / ROUGHNESS)
+        unknown = np.divide(_spread(values), sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
+        off = max(miss, float(np.max(unknown, initial=0.0))) / ROUGHNESS
+        if off > 1.0:
+            errors = self._of_rows(_spread(self._rough(t, q, scales, off)[1]), tangent, scales)
+        return self._shared(errors)
+
+    def _shared(self, errors: FloatArray) -> FloatArray:
+        """Return for each condition the largest error of those of its law."""
+        largest = np.zeros(len(errors))
+        np.maximum.at(largest, self._laws, errors)
+        return largest[self._laws]
+
+    def _rough(self, t: float, q: FloatArray, scales: FloatArray, off: float) -> tuple[FloatArray, FloatArray]:
+        """Return values and entries, each in as many ways, with coordinates off by so many roundings."""
+        rough, count = self._assembly.shared.get(("rough", id(self._program)), self._made)[1], len(self._laws)
+        speeds = np.zeros(len(self._program.inputs[2].symbols))
+        places = q[:, None] * roughly(len(q))
+        steps = off * scales[:, None] * (roughly(len(scales), len(q)) - 1.0)
+        places = places + (steps if self._turning.is_plain else self._turning.tangent(t, q) @ steps)
+        found = rough(self._assembly.parameter_values, t * roughly(1), places, speeds)
+        found = np.where(np.all(np.isfinite(found), axis=1, keepdims=True), found, 0.0)  # others say that it has none
+        return found[:count], found[count:]
+
+    def _made(self) -> tuple[Program, RoughProgram]:
+        """Return the rough program, with its program, so that the identity of that stays its own."""
+        by_name = {one.name: one.expressions for one in self._program.outputs}
+        values, entries = (by_name[name] for name in self._groups)
+        return self._program, RoughProgram(self._program, (*values, *entries))
+
+    def _tangent_at(self, t: float, q: FloatArray) -> FloatArray:
+        return np.abs(self._turning.tangent(t, q)) if self._of_coordinates else np.zeros(0)
+
+    def _of_rows(self, entries: FloatArray, tangent: FloatArray, scales: FloatArray) -> FloatArray:
+        """Return the sizes of rows from those of their entries."""
+        count = len(self._laws)
+        if len(tangent):
+            full = np.zeros((count, len(tangent)))
+            full[self._rows, self._columns] = entries
+            return np.asarray(np.linalg.norm(full @ tangent * scales, axis=1))
+        squares = np.bincount(self._rows, (entries * scales[self._columns]) ** 2, count)
+        return np.asarray(np.sqrt(squares))
+
+
+def _spread(values: FloatArray) -> FloatArray:
+    return np.asarray(np.max(values, axis=1, initial=-np.inf) - np.min(values, axis=1, initial=np.inf))

@@ -1,0 +1,139 @@
+"""Sizes of a scene: what counts as small for each coordinate, speed and force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.expr import InputGroup, OutputGroup, Program
+from atwood.forms.assembly import Assembly, FormName
+from atwood.mechanics.build import extent
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.model.values.units import parse_unit
+
+__all__ = [
+    "Scales",
+    "coordinate_scales",
+    "find_scales",
+    "motion_names",
+    "motion_scales",
+    "multiplier_sizes",
+    "scene_length",
+    "total_mass",
+]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Sizes of a scene.
+
+    Attributes
+    ----------
+    length
+        Extent of the scene, m.
+    time
+        Time in which something happens, s.
+    force
+        Size of a force, N.
+    """
+
+    length: float
+    time: float
+    force: float
+
+
+def scene_length(assembly: Assembly) -> float:
+    """Return the extent of a scene, from its parameters and start values that are lengths; 1 m if it has none."""
+    sizes = [extent(assembly.mechanism)]
+    for path, value in assembly.flat.start.items():
+        observable = assembly.start_observables.get(path)
+        if observable is not None and observable.unit == "m":
+            sizes.append(abs(value))
+    return max(sizes) or 1.0
+
+
+def coordinate_scales(equations: Equations, length: float) -> FloatArray:
+    """Return the size of each coordinate: the extent for a length, one radian for an angle, else one."""
+    sizes = np.array([length if one.unit == "m" else 1.0 for one in equations.names])
+    for chart in equations.charts:
+        if chart.kind == "rodrigues":
+            sizes[list(chart.coordinates)] = 0.25  # the tangent of a quarter of an angle
+    return sizes
+
+
+def motion_scales(equations: Equations, length: float) -> FloatArray:
+    """Return the size of a displacement along each speed: the extent, or one radian."""
+    return np.array([length if one.unit == "m/s" else 1.0 for one in equations.speed_names])
+
+
+def multiplier_sizes(assembly: Assembly, form: FormName) -> FloatArray:
+    """Return the size of each constraint's multiplier beside that of a force: for a moment, the extent.
+
+    Unlike the size of a displacement, it does not depend on where the scene starts. Where a constraint is neither in
+    lengths nor in angles, its multiplier counts by its own powers of a length.
+    """
+    length = extent(assembly.mechanism) or scene_length(assembly)
+    units = {one.key[:2]: one.unit for one in assembly.reactions}
+    found = [units.get(one.key[:2], "N") for one in assembly.in_coordinates(form).constraints]
+    # A force is of one power of a length.
+    return np.array([length ** (parse_unit(unit).exponents[1] - 1) for unit in found])
+
+
+def motion_names(equations: Equations) -> tuple[str, ...]:
+    """Return what moves with each speed: a coordinate, or the speed's own name where none does so alone."""
+    alone = dict(zip(equations.rates, equations.names, strict=True))
+    return tuple(
+        alone[speed].name if speed in alone else one.name
+        for speed, one in zip(equations.speeds, equations.speed_names, strict=True)
+    )
+
+
+def find_scales(
+    assembly: Assembly,
+    length: float,
+    speeds: FloatArray,
+    accelerations: FloatArray,
+    sizes: FloatArray,
+    span: float,
+) -> Scales:
+    """Return the sizes of a scene from its start.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    length
+        Its extent.
+    speeds, accelerations
+        At the start.
+    sizes
+        Size of a displacement along each speed.
+    span
+        Length of the run, s.
+    """
+    times = [span]
+    with np.errstate(divide="ignore"):
+        times += (sizes / np.abs(speeds)).tolist()
+        times += np.sqrt(sizes / np.abs(accelerations)).tolist()
+    parameters = assembly.mechanism.table.values
+    gravity = next((v for s, v in parameters.items() if s.name == "gravity"), 0.0)
+    if gravity:
+        times.append(float(np.sqrt(length / abs(gravity))))
+    time = min(t for t in times if t > 0.0)
+    return Scales(length, time, (total_mass(assembly) or 1.0) * length / time**2)
+
+
+def total_mass(assembly: Assembly) -> float:
+    """Return the mass of all that moves, at the start, kg."""
+
+    def make() -> Program:
+        masses, graph = assembly.equations.masses, assembly.mechanism.table.graph
+        found = [graph.convert(one.mass) for one in masses.bodies.values()]
+        found += [graph.convert(m) for one in masses.coupled for row in one.masses for m in row]
+        found += [graph.convert(one.mass) for _, one in masses.varying]
+        time = InputGroup("t", (assembly.mechanism.time,))
+        return Program("masses", (time,), assembly.parameters, (OutputGroup("masses", tuple(found)),))
+
+    return float(sum(assembly.kernel(assembly.shared.get("masses", make))([assembly.flat.t_start])[0]))

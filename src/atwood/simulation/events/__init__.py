@@ -1,0 +1,1 @@
+"""Events and modes: event functions, time events, sampling."""

@@ -1,0 +1,142 @@
+"""What a time event does to the state: nothing, unless a prescribed motion jumps there.
+
+A jump of acceleration, or of a force, leaves positions and velocities as they are. A jump of velocity is an impact:
+impulses act along all constraints, and what is free keeps its momentum. A jump of position is refused, since no
+motion leads across it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import KernelEvaluationError, SolveError
+from atwood.expr import depends_on
+from atwood.forms.assembly import Assembly
+from atwood.linalg.matrices import scaled, to_array
+from atwood.mechanics.dynamics.equations import Constraint
+from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
+from atwood.simulation.dynamics.rank import RANK
+from atwood.simulation.dynamics.reactions import maximal_state
+from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.events.modes import Happening, generalized_speeds, plastic_impact
+
+__all__ = ["pass_time_event"]
+
+
+_IN_PLACE = 1e-7
+"""Relative to the scene's size: by how much a prescribed motion may jump and still counts as continuous."""
+
+_SAME_SPEED = 1e-9
+"""Relative to the largest speed: by how much velocities may differ without an impact."""
+
+_HOLDS = 1e-6
+"""Relative to the largest speed: by how much velocities after an impact may miss a constraint."""
+
+
+def pass_time_event(
+    before: Assembly, after: Assembly, t: float, q: FloatArray, u: FloatArray, length: float
+) -> tuple[FloatArray, FloatArray, tuple[Happening, ...]]:
+    """Return the state just after a time event, and the impacts, one for each part whose motion jumps in speed.
+
+    Parameters
+    ----------
+    before, after
+        The scene on both sides of the event.
+    t, q, u
+        Time and state just before it, in the coordinates of the form.
+    length
+        Extent of the scene, m.
+
+    Raises
+    ------
+    SolveError
+        If a prescribed position jumps, or prescribed velocities are infinite or contradict each other after the event.
+    """
+    if not after.shared.get("motion switches", lambda: bool(_switching(after))):
+        return q, u, ()
+    big_q, big_u = (x[:, 0] for x in maximal_state(before, np.array([t]), q[:, None], u[:, None]))
+    sizes = motion_scales(after.maximal, length)
+    balance = balance_of(after, "dae")
+    was, now = balance_of(before, "dae").at(t, big_q, big_u), _values_after(after, balance, t, big_q, big_u)
+    rows = balance.row_scales(now, t, big_q, sizes)
+    _check_places(after, t, (was, now), sizes, rows)
+    if after.form == "dae":  # a jump as small as rounding allows leaves nothing that would have to be caught up with
+        q, u = balance.project(t, big_q, big_u, sizes)
+        big_q = q
+    fastest = max(float(np.max(np.abs(x), initial=0.0)) for x in (big_u / sizes, was.drift / rows, now.drift / rows))
+    jumps = np.abs(now.rate - was.rate) / rows
+    constraints = after.maximal.constraints
+    faster = [constraints[i].key for i in np.flatnonzero(jumps > _SAME_SPEED * fastest)]
+    if not faster:
+        return q, u, ()
+    laws = {part: law for part, law, _ in reversed(faster)}
+    message = "the speed of the prescribed motion jumps: an impact"
+    impacts = tuple(Happening(t, part, law, message, "", True) for part, law in reversed(laws.items()))
+    big_u = plastic_impact(after, balance, impacts[0], (t, big_q, big_u), sizes)
+    left = np.abs(now.slope @ big_u + now.drift) / rows
+    if np.max(left) > _HOLDS * fastest:
+        raise SolveError(
+            f"at t = {t:.9g} prescribed motions jump in speed, and no velocities meet them all",
+            where=constraints[int(np.argmax(left))].label,
+            advice="Two drives, or a drive and a fixed part, contradict each other from there on.",
+        )
+    if after.form == "dae":
+        return q, big_u, impacts
+    return q, generalized_speeds(after, t, q, big_u, sizes), impacts
+
+
+def _values_after(after: Assembly, balance: Balance, t: float, q: FloatArray, u: FloatArray) -> BalanceValues:
+    """Return the balance just after an event; refuse motions that are infinitely fast there."""
+    try:
+        return balance.at(t, q, u)
+    except KernelEvaluationError as error:
+        raise SolveError(
+            f"at t = {t:.9g} its prescribed motion switches to one without a finite value, speed or acceleration",
+            where=_switching(after)[0],
+            advice="Look at the function just after that time: a root of the time since then starts infinitely fast.",
+        ) from error
+
+
+def _check_places(
+    after: Assembly, t: float, sides: tuple[BalanceValues, BalanceValues], sizes: FloatArray, rows: FloatArray
+) -> None:
+    """Refuse motions that jump in position."""
+    was, now = sides
+    constraints = after.maximal.constraints
+    moved = np.abs(now.value - was.value) / rows
+    worst = int(np.argmax(moved))
+    by = ""
+    if moved[worst] > _IN_PLACE:
+        by = _in_words(after, constraints[worst], float(now.value[worst] - was.value[worst]))
+    else:  # by half a turn, at which the sine of an angle is zero again, the constraint is turned over
+        slopes = [to_array(scaled(one.slope, sizes, rows)) for one in sides]
+        over = np.flatnonzero(np.sum(slopes[0] * slopes[1], axis=1) < -RANK)
+        if not len(over):
+            return
+        worst, by = int(over[0]), " by more than a quarter turn"
+    raise SolveError(
+        f"at t = {t:.9g} its prescribed motion jumps{by}, and nothing can move so far at once",
+        where=constraints[worst].label,
+        advice="Prescribe a motion that is continuous; its speed may jump, which is an impact.",
+    )
+
+
+def _switching(assembly: Assembly) -> list[str]:
+    """Return the parts with a constraint that reads a relation of functions of time, or may do so through a link."""
+    found = []
+    for path, local in assembly.mechanism.locals_.items():
+        read = (*assembly.mechanism.relations.symbols, *local.signal_symbols.values())
+        if any(depends_on(one.value, read) for one in local.constraints):
+            found.append(path)
+    return found
+
+
+def _in_words(assembly: Assembly, constraint: Constraint, jump: float) -> str:
+    """Return by how much a constraint jumps; nothing where it has no unit of its own."""
+    path, law, _ = constraint.key
+    for one in assembly.mechanism.locals_[path].constraints:
+        if one.law.name == law:
+            unit = {"N": "m", "N*m": "rad"}.get(one.law.options.unit)
+            return "" if unit is None else f" by {abs(jump):.3g} {unit}"
+    return ""

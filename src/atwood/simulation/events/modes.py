@@ -1,0 +1,449 @@
+"""Events and modes: what is watched, and how a state is taken into another mode.
+
+An event maps (mode, q, u) to (mode, q, u). States pass between modes through maximal coordinates, which both share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import SolveError
+from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, jacobian
+from atwood.forms.assembly import Assembly
+from atwood.forms.event_program import event_program
+from atwood.forms.places import to_maximal
+from atwood.linalg.matrices import is_full, scaled, to_array
+from atwood.mechanics.dynamics.equations import Constraint
+from atwood.mechanics.outputs.event_functions import Watch, list_watches
+from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
+from atwood.simulation.dynamics.kinematic_map import resting_place, turning_of
+from atwood.simulation.dynamics.line_signs import actual_sides
+from atwood.simulation.dynamics.orientation_coordinates import CHART, Reassemble, chart_watches, enter_charts
+from atwood.simulation.dynamics.rank import least_norm
+from atwood.simulation.dynamics.reactions import ReactionSolver, maximal_state
+from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.problem.problem import Plan
+
+if TYPE_CHECKING:
+    from atwood.codegen.sundials.events import EventCode, EventData
+
+__all__ = ["EventProbe", "Happening", "enter_mode", "find_watches", "generalized_speeds", "plastic_impact"]
+
+
+@dataclass(frozen=True)
+class Happening:
+    """An event that has happened.
+
+    Attributes
+    ----------
+    time
+        s.
+    part, law
+        Whose event it is.
+    message
+        What has happened, in words.
+    target
+        The mode it led to, or ``"stop"``; empty where no mode changed.
+    impact
+        Whether velocities jumped.
+    """
+
+    time: float
+    part: str
+    law: str
+    message: str
+    target: str
+    impact: bool
+
+    def describe(self) -> str:
+        """Return what happened, where and when."""
+        return f"at t = {self.time:.9g} s, {self.part}: {self.message}"
+
+
+def find_watches(assembly: Assembly) -> tuple[Watch, ...]:
+    """Return what is watched in the modes of an assembly."""
+    return assembly.shared.get(
+        "watches",
+        lambda: (
+            *list_watches(assembly.mechanism, assembly.equations, assembly.reactions, assembly.modes),
+            *chart_watches(assembly.equations),  # last: of what happens at the same time, the others come first
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class _Needs:
+    """Whether events read reactions, or accelerations."""
+
+    reactions: bool
+    accelerations: bool
+
+
+def _find_needs(assembly: Assembly, watches: Sequence[Watch]) -> _Needs:
+    symbols, accelerations = [one.symbol for one in assembly.reactions], assembly.equations.accelerations
+    return _Needs(
+        any(depends_on(one.value, symbols) for one in watches),
+        any(depends_on(one.value, accelerations) for one in watches),
+    )
+
+
+class EventProbe:
+    """The events of one mode as a function of the solver's state.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    t, q, u
+        The state at the start of the mode.
+    tolerance
+        Relative tolerance of the run. A one-sided event that starts within ten times this of zero, as a rope does that
+        has just gone slack, happens only when it has passed zero by as much; else errors of a step would set it off.
+    """
+
+    def __init__(self, plan: Plan, t: float, q: FloatArray, u: FloatArray, tolerance: float) -> None:
+        self.plan = plan
+        self.assembly = assembly = plan.assembly
+        self.watches = find_watches(assembly)
+        self.needs = assembly.shared.get("watched needs", lambda: _find_needs(assembly, self.watches))
+        self.reactions = ReactionSolver(assembly, t, q, u) if self.needs.reactions else None
+        self.kernel = (
+            assembly.kernel(assembly.known_program("events", "events", lambda: [one.value for one in self.watches]))
+            if self.watches
+            else None
+        )
+        scales = plan.scales
+        sizes = {"m": scales.length, "N": scales.force, "m/s": scales.length / scales.time}
+        small = [10.0 * tolerance * sizes.get(one.unit, 1.0) for one in self.watches]
+        self._shift = np.zeros(len(small))
+        values = np.asarray(self.values(t, q, u)) if self.watches else np.zeros(0)
+        self.broken = next(
+            (one for one, v, s in zip(self.watches, values, small, strict=True) if one.direction * v > s), None
+        )
+        for i, (one, value) in enumerate(zip(self.watches, values, strict=True)):
+            if abs(value) <= small[i]:
+                self._shift[i] = -one.direction * small[i]
+
+    @property
+    def directions(self) -> tuple[int, ...]:
+        """Direction of each event."""
+        return tuple(one.direction for one in self.watches)
+
+    @property
+    def rough(self) -> tuple[int, ...]:
+        """Numbers of the events whose exact time does not matter."""
+        return tuple(i for i, one in enumerate(self.watches) if one.target == CHART)
+
+    def values(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+        """Return the value of each event at a state, shifted where it starts at zero."""
+        assert self.kernel is not None
+        reactions: Any = [0.0] * len(self.assembly.reactions)
+        accelerations = np.zeros_like(u)
+        if self.reactions is not None:
+            found, _ = self.reactions.at(np.array([t]), q[:, None], u[:, None])
+            reactions = found[:, 0]
+        if self.needs.accelerations and len(u):
+            accelerations, _ = self.plan.balance.accelerate(t, q, u, self.plan.kept)
+        values: FloatArray = np.asarray(self.kernel([t], q, u, accelerations, reactions)[0]) + self._shift
+        return values
+
+    def compiled(self, for_ida: bool) -> EventData | None:
+        """Return the same as machine code, for one session; None if nothing is watched, or it cannot be compiled.
+
+        Parameters
+        ----------
+        for_ida
+            Whether SUNDIALS is to call it.
+        """
+        if not self.watches or not len(self.assembly.equations.coordinates):
+            return None
+        kept, maximal = self.plan.finding.kept, () if self.reactions is None else self.reactions.finding.kept
+
+        def make() -> EventCode | None:
+            program = event_program(self.assembly, [one.value for one in self.watches], kept, maximal)
+            if program is None or any(node.operation == "external" for node in program.nodes):
+                return None
+            try:
+                from atwood.codegen.sundials.events import compile_events
+            except ImportError:  # no compiler
+                return None
+            return compile_events(program, for_ida)
+
+        code = self.assembly.shared.get(("event code", kept, maximal, for_ida), make)
+        return None if code is None else code.bind(self.assembly.parameter_values, self._shift)
+
+    def function(self) -> Callable[[float, FloatArray, FloatArray], FloatArray] | None:
+        """Return the events as a function of the solver's vector; None if nothing is watched."""
+        if not self.watches:
+            return None
+        n, m = len(self.assembly.equations.coordinates), len(self.assembly.equations.speeds)
+        return lambda t, y, yp: self.values(t, y[:n], y[n : n + m])
+
+    def broken_at_start(self, t: float) -> Happening | None:
+        """Return the first event whose one-sided bound does not hold from the outset."""
+        return None if self.broken is None else self._happening(t, self.broken)
+
+    def between(self, start: float, end: float) -> Happening | None:
+        """Return the first event between two times in which nothing is free to move; None if there is none."""
+        if not self.watches:
+            return None
+        nothing = np.zeros(0)
+        before, after = self.values(start, nothing, nothing), self.values(end, nothing, nothing)
+        found: list[tuple[float, Watch]] = []
+        for i, watch in enumerate(self.watches):
+            if before[i] == 0.0 or np.sign(before[i]) == np.sign(after[i]):
+                continue
+            if watch.direction and np.sign(after[i] - before[i]) != watch.direction:
+                continue
+            low, high = start, end
+            while high - low > 4e-16 * max(abs(low), abs(high), end - start):
+                middle = 0.5 * (low + high)
+                if not low < middle < high:
+                    break
+                same = np.sign(self.values(middle, nothing, nothing)[i]) == np.sign(before[i])
+                low, high = (middle, high) if same else (low, middle)
+            found.append((high, watch))
+        return self._happening(*min(found, key=lambda one: one[0])) if found else None
+
+    def name(self, t: float, events: Sequence[int]) -> Happening:
+        """Return what happened when the driver reports an event."""
+        watch = next(one for one, sign in zip(self.watches, events, strict=True) if sign)
+        return self._happening(t, watch)
+
+    def _happening(self, t: float, watch: Watch) -> Happening:
+        return Happening(t, watch.part, watch.law, watch.message, watch.target, watch.impact)
+
+
+def enter_mode(
+    state: tuple[float, FloatArray, FloatArray],
+    assembly: Assembly,
+    happening: Happening,
+    reassemble: Reassemble,
+    length: float,
+) -> tuple[Assembly, FloatArray, FloatArray]:
+    """Return the scene in the mode that an event leads to, with its state.
+
+    Parameters
+    ----------
+    state
+        Time, coordinates and speeds just before the event.
+    assembly
+        The scene before the event.
+    happening
+        The event.
+    reassemble
+        Gives the scene in other modes and charts.
+    length
+        Extent of the scene, m.
+    """
+    t, q, u = state
+    big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
+    sides = actual_sides(assembly, t, q, u, assembly.form)
+    after = reassemble({**assembly.modes, happening.part: happening.target}, sides, assembly.orientation)
+    sizes = motion_scales(after.maximal, length)
+    balance = balance_of(after, "dae")
+    if happening.impact:
+        met, _ = balance.project(t, big_q, big_u, sizes)
+        _check_in_place(happening, balance.turning.difference(t, big_q, met) / sizes)
+        big_u = plastic_impact(after, balance, happening, (t, met, big_u), sizes)
+        big_q = met
+    if after.form == "dae":
+        return after, big_q, big_u
+    q, u = _to_reduced(assembly, after, t, (q, u), (big_q, big_u), length, happening)
+    return *enter_charts(after, q, reassemble), u
+
+
+_IN_PLACE = 1e-5
+"""Relative to the scene's sizes: how far a change of mode may move anything."""
+
+
+def _check_in_place(happening: Happening, moved: FloatArray) -> None:
+    """Refuse a change of mode that would move bodies."""
+    farthest = float(np.max(np.abs(moved), initial=0.0))
+    if not farthest <= _IN_PLACE:
+        raise SolveError(
+            f"at t = {happening.time:.6g} a change of mode ({happening.message}) would move something at once by "
+            f"{farthest:.3g} of the scene's size",
+            where=happening.part,
+            advice="The position does not belong to the mode: change the start, or when the mode is entered.",
+        )
+
+
+def plastic_impact(
+    after: Assembly,
+    balance: Balance,
+    happening: Happening,
+    state: tuple[float, FloatArray, FloatArray],
+    sizes: FloatArray,
+) -> FloatArray:
+    """Return the velocities after an impact: the nearest admissible ones in the metric of the masses.
+
+    Impulses act along the constraints only: ``M (u+ - u-) = G^T Lambda``, ``G u+ + g_t = 0``. One that is one-sided, as
+    a rope is that can only pull, bears impulses of one sign: an impact that needs the other one is refused.
+
+    Parameters
+    ----------
+    after, balance
+        The scene after the impact, and its balance of forces in maximal coordinates.
+    happening
+        What the impact is told as.
+    state
+        Time, coordinates and speeds just before it, in maximal coordinates.
+    sizes
+        Size of a displacement along each speed.
+    """
+    t, q, u = state
+    now = balance.at(t, q, u)
+    velocities, impulses = _solve_impact(now, u, sizes, balance.row_scales(now, t, q, sizes))
+    size = float(np.max(np.abs(impulses), initial=0.0))
+    for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
+        if abs(impulse) > 1e-9 * size and _is_refused(after, one, state, one.sign * impulse):
+            raise SolveError(
+                f"at t = {t:.6g} the impact ({happening.message}, {happening.part}) needs an impulse of the sign that "
+                "this one-sided constraint does not bear: a rope would have to push",
+                where=one.key[0],
+                advice="Several ropes that jerk at once, of which some go slack, cannot be solved yet.",
+            )
+    return velocities
+
+
+_SIZES = (1e-9, 1e9)
+"""Between these, beside the impulses, lies any force that an event could compare a reaction with."""
+
+
+def _is_refused(
+    after: Assembly, constraint: Constraint, state: tuple[float, FloatArray, FloatArray], impulse: float
+) -> bool:
+    """Return whether events of its part let go of a constraint for a reaction of this sign, however small or large.
+
+    A limit in both directions, or one that is not zero, makes no constraint one-sided.
+    """
+    part, own = constraint.key[0], [one.symbol for one in after.reactions if one.key == constraint.key]
+    watches = [one for one in _watches_of_reactions(after) if one.part == part and depends_on(one.value, own)]
+    if not watches:
+        return False
+    t, q, u = state
+    equations = after.maximal
+    known: dict[Expression, float] = dict(zip(after.parameters, after.parameter_values, strict=True))
+    known |= {equations.time: t, **dict(zip(equations.coordinates, q, strict=True))}
+    known |= dict(zip((*equations.speeds, *equations.accelerations), (*u, *np.zeros_like(u)), strict=True))
+    known |= dict.fromkeys((one.symbol for one in after.reactions), 0.0)
+
+    def lets_go(reaction: float) -> bool:
+        values = evaluate([one.value for one in watches], {**known, **dict.fromkeys(own, reaction)})
+        return any(one.direction * value > 0.0 for one, value in zip(watches, values, strict=True))
+
+    refused, other = (all(lets_go(sign * size * impulse) for size in _SIZES) for sign in (1.0, -1.0))
+    return refused and not other
+
+
+def _watches_of_reactions(assembly: Assembly) -> tuple[Watch, ...]:
+    """Return the events that read reactions, in maximal coordinates."""
+    symbols = [one.symbol for one in assembly.reactions]
+
+    def make() -> tuple[Watch, ...]:
+        every = list_watches(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.modes)
+        return tuple(one for one in every if depends_on(one.value, symbols))
+
+    return assembly.shared.get("watches of reactions", make)
+
+
+def _solve_impact(
+    now: BalanceValues, u: FloatArray, sizes: FloatArray, rows: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return velocities after an impact, and impulses: those of least size where constraints depend on each other.
+
+    All is written in displacements of the scene's size, and impulses come out as their work along these: what is small
+    beside the rest is then small in truth, and not in its unit.
+    """
+    if not is_full(now.mass):
+        from atwood.linalg.sparse import solve_bordered
+
+        solved = solve_bordered(now.mass, now.slope, -(now.mass @ u), now.drift)
+        if solved is not None:
+            return solved[0], solved[1] * rows
+    m, n = len(now.gamma), len(u)
+    mass, slope = sizes[:, None] * to_array(now.mass) * sizes, to_array(scaled(now.slope, sizes, rows))
+    mass = mass / (np.max(np.abs(mass), initial=0.0) or 1.0)
+    matrix = np.block([[mass, -slope.T], [slope, np.zeros((m, m))]])
+    found = np.linalg.lstsq(matrix, np.concatenate([mass @ (u / sizes), -now.drift / rows]), rcond=1e-12)[0]
+    return found[:n] * sizes, found[n:]
+
+
+def _to_reduced(
+    before: Assembly,
+    after: Assembly,
+    t: float,
+    own: tuple[FloatArray, FloatArray],
+    maximal: tuple[FloatArray, FloatArray],
+    length: float,
+    happening: Happening,
+) -> tuple[FloatArray, FloatArray]:
+    """Find the generalized coordinates, with quaternions, that give the same maximal coordinates and speeds."""
+    equations = after.regular
+    own_turning, turning = turning_of(after, "regular"), turning_of(after, "dae")
+    program, rows, columns = after.shared.get("change of mode", lambda: _maximal_places(after))
+    kernel = after.kernel(program)
+    names = tuple(c.name for c in equations.names)
+    known = [name for name in names if name in before.observables]
+    q, still = resting_place(equations), np.zeros(len(equations.speeds))
+    if known:
+        read = before.kernel(before.observer(tuple(known)))
+        idle = [0.0] * len(before.reactions)
+        values = read([t], *own, np.zeros_like(own[1]), idle)[0]
+        for name, value in zip(known, values, strict=True):
+            q[names.index(name)] = value
+    turned = {chart.body: list(chart.coordinates) for chart in after.maximal.charts}
+    for chart in equations.charts:
+        if chart.body in turned:
+            q[list(chart.coordinates)] = maximal[0][turned[chart.body]]
+    q = own_turning.normalized(q)
+    scales = motion_scales(after.maximal, length)
+    matrix = np.zeros((len(scales), len(still)))
+    for _ in range(30):
+        now, _, entries = kernel([t], q, still)
+        matrix[rows, columns] = entries
+        miss = turning.difference(t, turning.normalized(np.asarray(now)), maximal[0]) / scales
+        step = least_norm(matrix / scales[:, None], miss)
+        q = own_turning.moved(t, q, step)
+        if float(np.max(np.abs(step), initial=0.0)) < 1e-14 * max(1.0, float(np.max(np.abs(q), initial=0.0))):
+            break
+    _check_in_place(happening, miss)
+    return q, generalized_speeds(after, t, q, maximal[1], scales)
+
+
+def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return the generalized speeds, with quaternions, that give the same speeds in maximal coordinates.
+
+    Parameters
+    ----------
+    after
+        The scene.
+    t, q
+        Time and generalized coordinates.
+    speeds, sizes
+        Speeds in maximal coordinates, and the size of a displacement along each.
+    """
+    program, rows, columns = after.shared.get("change of mode", lambda: _maximal_places(after))
+    still = np.zeros(len(after.regular.speeds))
+    matrix = np.zeros((len(sizes), len(still)))
+    _, drift, matrix[rows, columns] = after.kernel(program)([t], q, still)
+    return least_norm(matrix / sizes[:, None], (speeds - np.asarray(drift)) / sizes)
+
+
+def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
+    """Return the program that gives maximal coordinates, their speeds and the slopes of these, and where slopes go.
+
+    Speeds of bodies change with generalized speeds as their places do with displacements along these.
+    """
+    equations = after.regular
+    placing = to_maximal(after, "regular")
+    slope = jacobian(list(placing.outputs[1].expressions), list(equations.speeds))
+    outputs = (*placing.outputs, OutputGroup("slopes", tuple(slope.entries)))
+    program = Program(f"{after.flat.name} change of mode", placing.inputs, after.parameters, outputs)
+    return program, slope.rows, slope.columns

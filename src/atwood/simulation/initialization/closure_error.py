@@ -1,0 +1,157 @@
+"""How far a joint is from closing, in metres and radians, at any place of the mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.expr import Expression, depends_on, evaluate, live
+from atwood.forms.assembly import Assembly
+from atwood.mechanics.build import resolve_signals
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.dynamics.forces import local_map
+from atwood.model.local.laws import LocalConnector, LocalConstraint, LocalPart
+
+__all__ = ["Gap", "find_gaps"]
+
+
+_NOTHING = 1e-9
+"""What is less, in radians or as a share of the scene's extent, is rounding."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """What a joint lacks.
+
+    The least displacement of one of its connectors with which it would close, the other staying where it is; and the
+    least rotation.
+
+    Attributes
+    ----------
+    part
+        Path of the joint, or of whatever holds by a constraint.
+    distance
+        m.
+    angle
+        rad.
+    """
+
+    part: str
+    distance: float
+    angle: float
+
+    def describe(self, length: float) -> str:
+        """Return the gap in words, as in ``0.1 m`` or ``0.1 m and 3 deg``, without what is rounding."""
+        said = []
+        if self.distance > _NOTHING * length * max(1.0, self.angle):
+            said.append(f"{self.distance:.4g} m")
+        if self.angle > _NOTHING:
+            said.append(f"{np.degrees(self.angle):.4g} deg")
+        return " and ".join(said) or "nothing"
+
+    def size(self, length: float) -> float:
+        """Return how large it is for a scene of a given extent."""
+        return float(np.hypot(self.distance / length, self.angle))
+
+
+def find_gaps(assembly: Assembly, equations: Equations, t: float, q: FloatArray, length: float) -> list[Gap]:
+    """Return the gaps of all joints that close loops, and of ties, in the order of declaration.
+
+    Parameters
+    ----------
+    assembly, equations
+        The scene, in generalized coordinates.
+    t, q
+        Time and coordinates.
+    length
+        Extent of the scene, m.
+    """
+    table = {**assembly.mechanism.table.values, **assembly.known_relations}
+    place = {**table, equations.time: t, **dict(zip(equations.coordinates, np.asarray(q).tolist(), strict=True))}
+    signals = resolve_signals(assembly.mechanism, equations.site, equations.kinematics, equations.read)
+    rows: dict[str, list[LocalConstraint]] = {}
+    for one in equations.constraints:
+        if one.value is not None:
+            local = equations.locals_[one.key[0]]
+            rows.setdefault(one.key[0], []).extend(c for c in local.constraints if (c.law.name, c.index) == one.key[1:])
+    found = []
+    for path, constraints in rows.items():
+        local = equations.locals_[path]
+        mapping = {**local_map(equations.site, local, equations.kinematics), **signals}
+        wanted = _read(local, constraints, mapping)
+        numbers = dict(zip(wanted, evaluate([mapping[s] for s in wanted], place), strict=True))
+        known = {**table, equations.time: t, **numbers}
+        lengths = [c.value for c in constraints if c.law.options.unit == "N"]
+        turns = [c.value for c in constraints if c.law.options.unit != "N"]
+        distance = _least(lengths, local, known, _shifted, length)
+        found.append(Gap(path, distance, _least(turns, local, known, _rotated, 1.0)))
+    return found
+
+
+def _read(
+    local: LocalPart, constraints: Iterable[LocalConstraint], mapping: Mapping[Expression, Expression]
+) -> list[Expression]:
+    """Return the symbols that are needed to evaluate constraints wherever the connectors of their part are."""
+    read = {node for node in live([c.value for c in constraints]) if node.is_symbol}
+    for symbols in local.connectors.values():
+        read.update((*symbols.position, *symbols.orientation))
+    return [symbol for symbol in mapping if symbol in read]
+
+
+Numbers = Mapping[Expression, float]
+Moved = Callable[[LocalConnector, Numbers, FloatArray], dict[Expression, float]]
+
+
+def _shifted(symbols: LocalConnector, known: Numbers, by: FloatArray) -> dict[Expression, float]:
+    """Return the numbers of a connector after a displacement, in world axes."""
+    return {s: known[s] + float(d) for s, d in zip(symbols.position, by, strict=False) if s in known}
+
+
+def _rotated(symbols: LocalConnector, known: Numbers, by: FloatArray) -> dict[Expression, float]:
+    """Return the numbers of a connector after a rotation: by an angle in the plane, else by a rotation vector."""
+    if symbols.axes is None:
+        return {s: known[s] + float(by[0]) for s in symbols.orientation if s in known}
+    angle = float(np.linalg.norm(by))
+    n = by / angle if angle > 0.0 else by
+    found = {}
+    for axis in symbols.axes:
+        v = np.array([known.get(component, 0.0) for component in axis])
+        turned = v * np.cos(angle) + np.cross(n, v) * np.sin(angle) + n * (n @ v) * (1.0 - np.cos(angle))
+        found.update({s: float(x) for s, x in zip(axis, turned, strict=True) if s in known})
+    return found
+
+
+def _least(values: Sequence[Expression], local: LocalPart, known: Numbers, moved: Moved, unit: float) -> float:
+    """Return the size of the least movement of a connector that makes values zero; without one, their own size.
+
+    What counts as one is given by `unit`: the extent of the scene, or a radian.
+    """
+    if not values:
+        return 0.0
+    miss = np.array(evaluate(values, known))
+    own = float(np.linalg.norm(miss))
+    is_turn = moved is _rotated
+    for symbols in reversed(list(local.connectors.values())):
+        read = symbols.orientation if is_turn else symbols.position
+        if not read or not any(depends_on(value, list(read)) for value in values):
+            continue
+        n = 1 if is_turn and symbols.axes is None else 3 if is_turn else len(symbols.position)
+        by = np.zeros(n)
+
+        def at(d: FloatArray, symbols: LocalConnector = symbols) -> FloatArray:
+            return np.array(evaluate(values, {**known, **moved(symbols, known, d)}))
+
+        h = 1e-6 * max(own, 1e-3 * unit)
+        for _ in range(50):
+            now = at(by)
+            if float(np.linalg.norm(now)) <= 1e-13 * max(own, unit):
+                break
+            slope = np.array([(at(by + h * e) - at(by - h * e)) / (2.0 * h) for e in np.eye(n)]).T
+            # Of all movements that would do to first order the least one: not only the least change of this one.
+            by = np.linalg.lstsq(slope, slope @ by - now, rcond=1e-9)[0]
+        if float(np.linalg.norm(at(by))) <= 1e-9 * max(own, unit) and np.all(np.isfinite(by)):
+            return float(np.linalg.norm(by))
+    return own

@@ -1,0 +1,199 @@
+"""Loops that Newton's method does not close from the guess: where else they close, or how near they come.
+
+The method of Levenberg and Marquardt (Nocedal and Wright, Numerical Optimization, section 10.3) makes the sum of
+squares of what is missed as small as it gets, from the rough place and from others around it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import KernelEvaluationError
+from atwood.forms.assembly import Assembly
+from atwood.linalg.matrices import LARGEST_FULL, scaled, to_array
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.simulation.initialization.system import System
+
+__all__ = ["Nearest", "closest", "closest_of_all", "places_around", "units_of_rows"]
+
+
+_SHIFTS = (0.1, 0.2, 0.3, 0.5, 0.5, 0.8, 0.8, 1.2, 1.2, 1.8, 1.8, 2.5, 2.5, 3.1, 3.1)
+"""How far other places to begin from are, at most: rad, or shares of the scene's size."""
+
+_ALIKE = 3
+"""Where so many other places lead to what was found first, no more are tried."""
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The place found that misses least.
+
+    Attributes
+    ----------
+    coordinates
+        The place.
+    missing
+        What is missed there, in the units of each row.
+    size
+        Root of the sum of squares, each over its unit.
+    """
+
+    coordinates: FloatArray
+    missing: FloatArray
+    size: float
+
+
+def units_of_rows(assembly: Assembly, equations: Equations, system: System, length: float) -> FloatArray:
+    """Return what counts as one in each row of a system: the scene's extent for what is missed in metres, else 1.
+
+    Parameters
+    ----------
+    assembly, equations
+        The scene.
+    system
+        Its conditions.
+    length
+        Extent of the scene, m.
+    """
+    found = []
+    for one in equations.constraints if system.constraints else ():
+        if one.value is not None:
+            found.append(length if is_length(equations, one.key) else 1.0)
+    found += [length if target.observable.unit == "m" else 1.0 for target in system.targets]
+    return np.array(found)
+
+
+def is_length(equations: Equations, key: tuple[str, str, int]) -> bool:
+    """Return whether a constraint misses by a length: then its multiplier is a force, else a torque."""
+    local = equations.locals_[key[0]]
+    law = next(c.law for c in local.constraints if (c.law.name, c.index) == key[1:])
+    return str(law.options.unit) == "N"
+
+
+def closest(
+    system: System, units: FloatArray, scales: FloatArray, t: float, q: FloatArray, iterations: int = 300
+) -> Nearest:
+    """Return the place near another one where the sum of squares of what is missed is least.
+
+    Parameters
+    ----------
+    system
+        What is to be met.
+    units
+        What counts as one in each row.
+    scales
+        Size of a displacement along each speed.
+    t, q
+        Time and coordinates to begin from.
+    iterations
+        The largest number of steps.
+
+    Raises
+    ------
+    KernelEvaluationError
+        If something has no value where it begins.
+    """
+    assert system.turning is not None
+    still = np.zeros_like(scales)
+
+    def look(place: FloatArray) -> tuple[FloatArray, FloatArray]:
+        missing, matrix = system.at(t, place, still)
+        return missing / units, to_array(scaled(matrix, scales, units))
+
+    missing, slopes = look(q)
+    cost = float(missing @ missing)
+    damping, growth = 1e-3 * max(float(np.max(np.sum(slopes**2, axis=0), initial=0.0)), 1e-12), 2.0
+    for _ in range(iterations):
+        gradient = slopes.T @ missing
+        if float(np.max(np.abs(gradient), initial=0.0)) <= 1e-14 * max(1.0, cost) or cost < 1e-30:
+            break
+        step = -np.linalg.solve(slopes.T @ slopes + damping * np.eye(len(scales)), gradient)
+        longest = float(np.max(np.abs(step)))
+        step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
+        expected = -float(step @ gradient) - 0.5 * float(np.sum((slopes @ step) ** 2))
+        trial = system.turning.moved(t, q, scales * step)
+        try:
+            new_missing, new_slopes = look(trial)
+            new_cost = float(new_missing @ new_missing)
+        except KernelEvaluationError:
+            new_cost = np.inf
+        gain = 0.5 * (cost - new_cost) / expected if expected > 0.0 else -1.0
+        if new_cost < cost:
+            is_done = longest < 1e-10 and cost - new_cost <= 1e-15 * cost
+            q, missing, slopes, cost = trial, new_missing, new_slopes, new_cost
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3)
+            growth = 2.0
+            if is_done:
+                break
+        else:
+            if longest < 1e-12:
+                break
+            damping, growth = damping * growth, 2.0 * growth
+    return Nearest(q, missing * units, cost**0.5)
+
+
+def places_around(
+    system: System, scales: FloatArray, t: float, q: FloatArray, hangs: bool = False
+) -> Iterator[FloatArray]:
+    """Yield a place and then others around it, the same ones each time, farther and farther away.
+
+    Parameters
+    ----------
+    system, scales, t, q
+        See `closest`.
+    hangs
+        Whether the first of the others has free points lower, each more than the one before.
+    """
+    assert system.turning is not None
+    random = np.random.default_rng(20)
+    yield q
+    if hangs:
+        yield system.turning.moved(t, q, _lowered(system, scales))
+    for size in _SHIFTS if len(scales) <= LARGEST_FULL else ():
+        yield system.turning.moved(t, q, size * scales * random.uniform(-1.0, 1.0, len(scales)))
+
+
+def _lowered(system: System, scales: FloatArray) -> FloatArray:
+    """Return the displacement that lowers free points, each by a little more than the one before."""
+    heights = [i for i, one in enumerate(system.speed_names) if one.endswith(".position.z'")]
+    down = np.zeros(len(scales))
+    down[heights] = -0.3 * (1.0 + np.arange(len(heights)) / max(len(heights), 1)) * scales[heights]
+    return down
+
+
+def closest_of_all(
+    system: System,
+    units: FloatArray,
+    scales: FloatArray,
+    t: float,
+    q: FloatArray,
+    is_enough: Callable[[Nearest], bool] = lambda nearest: nearest.size < 1e-12,
+) -> Nearest | None:
+    """Return the least of what `closest` finds from a place and from others around it; None if nothing has a value.
+
+    Parameters
+    ----------
+    system, units, scales, t, q
+        See `closest`.
+    is_enough
+        Whether to look no further.
+    """
+    best: Nearest | None = None
+    alike = 0
+    for place in places_around(system, scales, t, q):
+        try:
+            found = closest(system, units, scales, t, place)
+        except (KernelEvaluationError, np.linalg.LinAlgError):
+            continue
+        # Of places that miss alike the first is the nearest to the guess.
+        if best is None or found.size < best.size * (1.0 - 1e-6) - 1e-13:
+            best, alike = found, 0
+        elif found.size < best.size * (1.0 + 1e-6) + 1e-13:
+            alike += 1
+        if is_enough(best) or alike == _ALIKE:
+            break
+    return best

@@ -1,0 +1,114 @@
+"""What can move without inertia, which no force may act on: named before a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import StartError
+from atwood.forms.assembly import Assembly
+from atwood.linalg.matrices import Matrix, is_full, scaled
+from atwood.simulation.dynamics.rank import open_directions
+from atwood.simulation.dynamics.scales import motion_names
+
+__all__ = ["check_inertia"]
+
+
+def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatArray) -> None:
+    """Refuse a direction in which something can move without inertia.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    mass, slope
+        The mass matrix, and the derivatives of the independent constraints, along the speeds.
+    sizes
+        Size of a displacement along each speed.
+
+    Raises
+    ------
+    StartError
+        If there is one; it names the part.
+    """
+    n = mass.shape[0]
+    if n == 0:
+        return
+    sizes = _sizes_of_inertia(mass, sizes)
+    if not is_full(mass):
+        from atwood.linalg.sparse import without_inertia
+
+        moving = without_inertia(mass, slope, sizes)
+        if moving is not None:
+            raise _without_inertia(assembly, moving)
+        return
+    weighed = mass * sizes[:, None] * sizes[None, :]
+    if _is_clearly_positive(weighed):
+        return
+    if slope.shape[0]:
+        free = open_directions(scaled(slope, sizes))
+    else:
+        free = np.eye(n)
+    if not len(free):
+        return
+    values, vectors = np.linalg.eigh(free @ weighed @ free.T)
+    if values[0] > 1e-14 * max(values[-1], 1e-300):
+        return
+    raise _without_inertia(assembly, np.abs(vectors[:, 0] @ free))
+
+
+def _is_clearly_positive(weighed: FloatArray) -> bool:
+    """Return whether there is inertia in every direction, free or not: then what is free need not be found."""
+    try:
+        np.linalg.cholesky(weighed - 1e-12 * np.trace(weighed) * np.eye(len(weighed)))
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def _sizes_of_inertia(mass: Matrix, sizes: FloatArray) -> FloatArray:
+    """Return displacements that move as much inertia along each speed: a satellite is small beside its orbit.
+
+    What has none along a speed keeps its size beside the others.
+    """
+    own = np.asarray(mass.diagonal(), dtype=float)
+    has = own > 0.0
+    if not np.any(has):
+        return sizes
+    even = np.where(has, 1.0 / np.sqrt(np.where(has, own, 1.0)), 0.0)
+    return np.where(has, even, sizes * np.median(even[has] / sizes[has]))
+
+
+def _without_inertia(assembly: Assembly, moving: FloatArray) -> StartError:
+    every = motion_names(assembly.equations)
+    names = [name for name, size in zip(every, moving, strict=True) if size > 0.1 * np.max(moving)]
+    units = dict(zip(every, (one.unit for one in assembly.equations.speed_names), strict=True))
+    turns = all(units[name] == "rad/s" for name in names)
+    where = _part_of(assembly, names[0])
+    acting = _acting_on(assembly, where)
+    return StartError(
+        f"something without inertia is free to move along {', '.join(names)}: "
+        "a force would accelerate it without bound" + (f", as {' and '.join(acting)} would" if acting else ""),
+        where=where,
+        advice=f"Give it a {'moment of inertia' if turns else 'mass'}, or hold it with a joint.",
+    )
+
+
+def _part_of(assembly: Assembly, name: str) -> str:
+    """Return the part, or the connector, that a coordinate belongs to."""
+    path = name.rpartition(".")[0]
+    head, _, last = path.rpartition(".")
+    return head if last in ("position", "velocity", "spin") and head else path
+
+
+def _acting_on(assembly: Assembly, where: str) -> list[str]:
+    """Return the parts whose forces act on a body without inertia: it has this name, or hangs on the joint that has."""
+    graph, bodies = assembly.mechanism.graph, assembly.mechanism.bodies
+    hanging = {bodies.body_of[node] for joint in graph.joints if joint.part == where for node in (joint.a, joint.b)}
+    own = {one.index for one in bodies.bodies if one.name == where or one.index in hanging} - {0}
+    found: dict[str, None] = {}
+    for (path, _), node in graph.node_of.items():
+        local = assembly.mechanism.locals_[path]
+        if bodies.body_of[node] in own and (local.loads or local.potentials or local.dissipations or local.lagrangians):
+            found[path] = None
+    return list(found)

@@ -1,0 +1,132 @@
+"""Mechanisms that cannot move: what holds them, and what would have to let go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from atwood.errors import TopologyError
+from atwood.expr import depends_on
+from atwood.forms.assembly import Assembly
+from atwood.linalg.matrices import LARGEST_FULL, scaled, to_array
+from atwood.mechanics.dynamics.equations import Constraint
+from atwood.simulation.dynamics.balance import balance_of
+from atwood.simulation.dynamics.rank import independent_rows
+from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.initialization.start import Start, maximal_state
+
+__all__ = ["Immobile", "find_immobile", "refuse_immobile"]
+
+
+_SHOWN = 4
+
+
+@dataclass(frozen=True)
+class Immobile:
+    """A mechanism in which nothing can move: a structure, whose forces are those of statics.
+
+    Attributes
+    ----------
+    freed
+        Joint laws and ties with the degrees of freedom that there would be without each; those that give fewest first.
+        None where there are too many to try each.
+    surplus
+        How many of its constraints follow from the others, so that their reactions are not unique; 0 where that was
+        not looked at.
+    """
+
+    freed: tuple[tuple[str, int], ...] | None
+    surplus: int
+
+    def describe(self) -> str:
+        """Return what it is, and what would have to let go, as a sentence."""
+        text = "nothing can move: joints and ties hold every body where it is"
+        if self.surplus:
+            text += f", {self.surplus} of their constraints to spare"
+        if self.freed is None:
+            text += f" (with more than {LARGEST_FULL} speeds it is not tried what would happen if one let go)"
+        elif self.freed:
+            ways = [f"{name} ({count})" for name, count in self.freed[:_SHOWN]]
+            more = len(self.freed) - _SHOWN
+            text += f"; degrees of freedom if one let go: {', '.join(ways)}" + (f" and {more} more" if more > 0 else "")
+        else:
+            text += "; it takes more than one of them to let go"
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        freed = None
+        if self.freed is not None:
+            freed = [{"path": path, "degrees_of_freedom": count} for path, count in self.freed]
+        return {"freed": freed, "surplus": self.surplus}
+
+
+def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | None:
+    """Return why nothing can move; None if something can, or is driven.
+
+    Parameters
+    ----------
+    assembly
+        The scene, in either form.
+    freedom
+        Its degrees of freedom.
+    start
+        Its start.
+    """
+    equations = assembly.maximal
+    values = [one.value if one.value is not None else one.rate for one in equations.constraints]
+    if freedom > 0 or not equations.speeds:
+        return None
+    if equations.prescribed or any(depends_on(value, assembly.mechanism.relations.roots) for value in values):
+        return None  # driven
+    if len(equations.speeds) > LARGEST_FULL:
+        return Immobile(None, 0)
+    scales = motion_scales(equations, start.length)
+    q, _ = maximal_state(assembly, start)
+    balance = balance_of(assembly, "dae")
+    rows = scaled(to_array(balance.at(start.time, q, np.zeros_like(scales)).slope), scales)
+    errors = balance.errors.of_slopes(start.time, q, scales)
+    groups: dict[str, list[int]] = {}
+    for i, one in enumerate(equations.constraints):
+        groups.setdefault(_name(assembly, one), []).append(i)
+    found = []
+    for name, numbers in groups.items():
+        others = np.delete(np.arange(len(rows)), numbers)
+        left = len(scales) - len(independent_rows(rows[others], errors[others]))
+        if left > 0:
+            found.append((name, left))
+    found.sort(key=lambda one: one[1])
+    return Immobile(tuple(found), len(rows) - len(independent_rows(rows, errors)))
+
+
+def refuse_immobile(assembly: Assembly, freedom: int, start: Start) -> None:
+    """Raise if nothing can move, and nothing is driven or may let go later: this is seldom what was meant.
+
+    Parameters
+    ----------
+    assembly, freedom, start
+        See `find_immobile`.
+
+    Raises
+    ------
+    TopologyError
+        If it is so; it says what would have to let go.
+    """
+    found = find_immobile(assembly, freedom, start) if freedom <= 0 and not assembly.modes else None
+    if found is None:
+        return
+    raise TopologyError(
+        found.describe(),
+        where=found.freed[0][0] if found.freed else assembly.flat.name,
+        advice="Look at the axes and places of the joints; if it is meant as a structure, say structure=True "
+        "(on the command line: --structure).",
+    )
+
+
+def _name(assembly: Assembly, one: Constraint) -> str:
+    """Return the path of a law; of the part alone where it has no other law that holds."""
+    part, law, _ = one.key
+    laws = {other.key[1] for other in assembly.maximal.constraints if other.key[0] == part}
+    return part if len(laws) == 1 else f"{part}.{law}"

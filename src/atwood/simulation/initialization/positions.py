@@ -1,0 +1,178 @@
+"""Positions at the start: the configuration near the guesses that fulfils the constraints and what is fixed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import KernelEvaluationError, StartError
+from atwood.forms.assembly import Assembly
+from atwood.linalg.matrices import Matrix
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.simulation.dynamics.kinematic_map import Turning, resting_place, roughly_turned, turning_of
+from atwood.simulation.dynamics.rank import row_sizes
+from atwood.simulation.initialization.assembly_branch import wrongly_turned
+from atwood.simulation.initialization.errors import Failed, explain_positions, far_from_guess, wrong_way_round
+from atwood.simulation.initialization.loop_closure import closest, places_around, units_of_rows
+from atwood.simulation.initialization.system import MET, System, counted, newton
+from atwood.simulation.initialization.targets import Level, said
+
+__all__ = ["Positions", "solve_positions"]
+
+
+_NEAR = 1.0
+"""How far what is guessed may be moved where only a place far off fulfils all: rad, or shares of the scene's size."""
+
+
+@dataclass(frozen=True)
+class Positions:
+    """Where a scene starts.
+
+    Attributes
+    ----------
+    coordinates
+        The start.
+    rough
+        Where bodies were placed by what is said of them, before the constraints moved them.
+    free, repeated
+        Coordinates that nothing determines, and fixed values that follow from others.
+    """
+
+    coordinates: FloatArray
+    rough: FloatArray
+    free: tuple[str, ...]
+    repeated: tuple[str, ...]
+
+
+def solve_positions(
+    assembly: Assembly, equations: Equations, level: Level, scales: FloatArray, length: float, t: float
+) -> Positions:
+    """Return coordinates that fulfil constraints and what is fixed.
+
+    Parameters
+    ----------
+    assembly, equations
+        The scene.
+    level
+        What is said of positions.
+    scales
+        Size of a displacement along each speed.
+    length
+        Extent of the scene, m.
+    t
+        Time of the start, s.
+
+    Raises
+    ------
+    StartError
+        If a loop cannot close, or what is fixed contradicts itself or the constraints.
+    """
+    every = [*level.guessed, *level.fixed]
+    turning = turning_of(assembly, "regular")
+    q, is_direct = said(equations.coordinates, every, resting_place(equations))
+    q = _turned(equations, turning, q)
+    if not is_direct:
+        system = System(assembly, equations, every, False)
+        near = _brought_near(system, equations, scales, t, q)
+        if _far_off(system, t, near) > 1.0:  # what is said may fit together but for whole turns
+            system = System(assembly, equations, every, False, whole_turns=True)
+            other = _brought_near(system, equations, scales, t, q)
+            near = other if _far_off(system, t, other) < 1e-3 else near
+        q = near
+    rough = q
+    system = System(assembly, equations, level.fixed, True)
+    q, missing, matrix = newton(system, scales, t, q)
+    if not _is_met(missing) or wrongly_turned(assembly, equations, t, q):
+        failed = Failed(assembly, equations, level, scales, length, t, rough, q, missing)
+        q, matrix = _elsewhere(failed, system)
+    errors = system.errors.of_slopes(t, q, scales)
+    tangent = None if turning.is_plain else turning.tangent(t, q)
+    for chart in equations.charts:  # what turns at all has no orientation, whichever coordinate shows it here
+        assert tangent is not None
+        tangent[list(chart.coordinates)] = np.max(np.abs(tangent[list(chart.coordinates)]), axis=0)
+    names = [one.name for one in equations.names]
+    return Positions(q, rough, *counted(names, tangent, level.fixed, system.constraints, matrix, errors))
+
+
+def _is_met(missing: FloatArray) -> bool:
+    return float(np.max(np.abs(missing), initial=0.0)) <= MET
+
+
+def _elsewhere(failed: Failed, system: System) -> tuple[FloatArray, Matrix]:
+    """Return the place nearest to the guess, of those that other ways lead to; raise what says why there is none."""
+    assembly, equations, t, scales = failed.assembly, failed.equations, failed.time, failed.scales
+    assert system.turning is not None
+    units = units_of_rows(assembly, equations, system, failed.length)
+    hangs = not failed.level.guessed  # where no place is preferred, what nothing holds up is down
+    best: tuple[float, FloatArray, Matrix] | None = None
+    wrong = wrongly_turned(assembly, equations, t, failed.nearest) if _is_met(failed.missing) else []
+    for number, place in enumerate(places_around(system, scales, t, failed.rough, hangs)):
+        try:
+            near = closest(system, units, scales, t, place, iterations=40)
+            if not near.size < 0.1:
+                continue
+            q, missing, matrix = newton(system, scales, t, near.coordinates)
+            if not _is_met(missing):
+                continue
+        except (KernelEvaluationError, np.linalg.LinAlgError):
+            continue
+        turned = wrongly_turned(assembly, equations, t, q)
+        if turned:
+            wrong = turned
+            continue
+        off = float(np.linalg.norm(system.turning.difference(t, failed.rough, q) / scales))
+        if best is None or off < best[0]:
+            best = off, q, matrix
+        if number == 0 or (hangs and number == 1):
+            return q, matrix
+    if best is None:
+        raise wrong_way_round(failed, wrong[0]) if wrong else explain_positions(failed)
+    if _strays(failed, best[1]):
+        raise far_from_guess(failed, best[1], wrong)
+    return best[1], best[2]
+
+
+def _strays(failed: Failed, q: FloatArray) -> bool:
+    """Return whether a place is so far from what is guessed that it is not what was meant."""
+    if not failed.level.guessed:
+        return False
+    system = System(failed.assembly, failed.equations, failed.level.guessed, False)
+    before, after = (system.at(failed.time, place, np.zeros_like(failed.scales))[0] for place in (failed.rough, q))
+    sizes = [failed.length if one.observable.unit == "m" else 1.0 for one in failed.level.guessed]
+    return bool(np.any((np.abs(after) - np.abs(before)) / np.array(sizes) > _NEAR))
+
+
+def _brought_near(system: System, equations: Equations, scales: FloatArray, t: float, q: FloatArray) -> FloatArray:
+    """Return a configuration near what is said of it; orientations begin elsewhere where they do not get there."""
+    near: FloatArray | None = None
+    try:
+        near, missing, _ = newton(system, scales, t, q, iterations=20)
+        if not equations.charts or _is_met(missing):
+            return near
+    except KernelEvaluationError:
+        if not equations.charts:
+            raise
+    turned = roughly_turned(equations, lambda trial: _far_off(system, t, trial), q)
+    found = newton(system, scales, t, turned, iterations=20)[0]
+    # What is said may not fit together; then the better of the two is what was meant.
+    return near if near is not None and _far_off(system, t, near) <= _far_off(system, t, found) else found
+
+
+def _far_off(system: System, t: float, q: FloatArray) -> float:
+    """Return how far a configuration is from what is asked for; infinite where that has no value."""
+    try:
+        missing, matrix = system.at(t, q, np.zeros(system.speeds))
+    except KernelEvaluationError:
+        return np.inf
+    rows = row_sizes(matrix, np.ones(matrix.shape[1]))
+    return float(np.sum((missing / np.where(rows > 0.0, rows, 1.0)) ** 2))
+
+
+def _turned(equations: Equations, turning: Turning, q: FloatArray) -> FloatArray:
+    """Return rough coordinates whose orientations mean something."""
+    for chart in equations.charts:
+        if not np.any(q[list(chart.coordinates)]):
+            raise StartError("coordinates of an orientation that are all zero mean nothing", where=chart.body)
+    return turning.normalized(q)

@@ -1,0 +1,74 @@
+"""Speeds at the start: a linear problem, once positions are known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.forms.assembly import Assembly
+from atwood.linalg.matrices import scaled
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.simulation.dynamics.rank import certain, least_norm, row_scales
+from atwood.simulation.dynamics.scales import motion_names
+from atwood.simulation.initialization.errors import contradicted, contradiction, freedom_at
+from atwood.simulation.initialization.system import System, counted
+from atwood.simulation.initialization.targets import Level, said
+
+__all__ = ["solve_speeds"]
+
+
+_MET = 1e-8
+"""Relative to its terms: how well each condition must be met."""
+
+
+def solve_speeds(
+    assembly: Assembly, equations: Equations, level: Level, scales: FloatArray, t: float, q: FloatArray
+) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
+    """Return speeds that fulfil constraints and what is fixed; which nothing determines, and what repeats others.
+
+    Parameters
+    ----------
+    assembly, equations
+        The scene.
+    level
+        What is said of speeds.
+    scales
+        Size of a displacement along each speed.
+    t, q
+        Time and coordinates of the start.
+
+    Raises
+    ------
+    StartError
+        If what is fixed contradicts itself or the constraints.
+    """
+    u, is_direct = said(equations.speeds, [*level.guessed, *level.fixed], np.zeros(len(equations.speeds)))
+    if level.guessed and not is_direct:
+        rough = System(assembly, equations, level.guessed, False, of_speeds=True)
+        missing, matrix = rough.at(t, q, u)
+        u = u - scales * least_norm(scaled(matrix, scales), missing)
+    system = System(assembly, equations, level.fixed, True, of_speeds=True)
+    errors = system.errors.of_slopes(t, q, scales)
+    for _ in range(3):  # linear: the second pass takes out rounding
+        missing, matrix = system.at(t, q, u)
+        if not np.any(missing):
+            break
+        rows = row_scales(matrix, scales, errors)
+        u = u - scales * least_norm(scaled(matrix, scales, rows), missing / rows)
+    missing, matrix = system.at(t, q, u)
+    if missing.size:
+        rows = row_scales(matrix, scales, errors)
+        # Each equation is measured by its own terms, so that what is small beside another speed is not lost.
+        own = abs(matrix) @ np.abs(u)
+        own[system.constraints :] += [abs(x.value) for x in level.fixed]
+        # What is summed up within an equation rounds, even if all that comes out of it is zero.
+        fastest = float(np.max(np.abs(u / scales), initial=0.0))
+        own += certain(errors, rows) * fastest / _MET
+        share = np.abs(missing) / np.where(own > 0.0, own, 1.0)
+        if not float(np.max(share)) <= _MET:
+            freedom = freedom_at(assembly, equations, scales, t, q)
+            held = contradicted(equations, share[: system.constraints])
+            raise contradiction(level.fixed, share[system.constraints :], freedom, held=held)
+        matrix = scaled(matrix, scales)
+    names = motion_names(equations)
+    return u, *counted(names, None, level.fixed, system.constraints, matrix, errors)

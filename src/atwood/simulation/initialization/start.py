@@ -1,0 +1,167 @@
+"""Consistent start values, from what the user fixes and guesses.
+
+Positions first: Newton's method finds the configuration nearest to the guesses that fulfils the constraints and
+everything that is fixed. Then speeds, a linear problem of the same kind. Accelerations and multipliers follow from the
+balance of forces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import AtwoodError, KernelEvaluationError, StartError
+from atwood.expr import evaluate, jacobian
+from atwood.forms.assembly import Assembly
+from atwood.forms.places import to_maximal
+from atwood.forms.starting import starting
+from atwood.simulation.dynamics.kinematic_map import resting_place, turning_of
+from atwood.simulation.dynamics.orientation_coordinates import Reassemble, enter_charts, from_regular, own_names
+from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, scene_length
+from atwood.simulation.dynamics.undefined_values import missing_at
+from atwood.simulation.initialization.positions import solve_positions
+from atwood.simulation.initialization.speeds import solve_speeds
+from atwood.simulation.initialization.targets import sort_targets
+
+__all__ = ["Start", "find_start", "maximal_state", "own_state", "settle"]
+
+
+@dataclass(frozen=True)
+class Start:
+    """A consistent start in generalized coordinates.
+
+    Attributes
+    ----------
+    time
+        s.
+    coordinates, speeds
+        Of the reduced form, with orientations as quaternions.
+    length
+        Extent of the scene, m.
+    free_coordinates, free_speeds
+        Names of the coordinates that nothing fixed, and of those whose speed nothing fixed: they kept their guess as
+        far as they could. A speed that is the rate of no coordinate has its own name.
+    repeated
+        Paths of fixed values that follow from the others.
+    rough
+        Coordinates at which bodies were placed by what is said of them, before constraints and what is fixed were
+        met; see `atwood.simulation.initialization.report`.
+    """
+
+    time: float
+    coordinates: FloatArray
+    speeds: FloatArray
+    length: float
+    free_coordinates: tuple[str, ...]
+    free_speeds: tuple[str, ...]
+    repeated: tuple[str, ...]
+    rough: FloatArray
+
+
+def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
+    """Return a start in the coordinates of the form of an assembly."""
+    if assembly.form == "reduced":
+        return from_regular(assembly, start.coordinates), start.speeds
+    return maximal_state(assembly, start)
+
+
+def maximal_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
+    """Return a start in maximal coordinates, whatever the form of an assembly."""
+    q, u = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
+    return turning_of(assembly, "dae").normalized(np.asarray(q, dtype=float)), np.asarray(u, dtype=float)
+
+
+def settle(assembly: Assembly, start: Start, reassemble: Reassemble) -> tuple[Assembly, FloatArray, FloatArray]:
+    """Return an assembly in charts that are regular at a start, with the start in its coordinates.
+
+    Parameters
+    ----------
+    assembly, start
+        The scene and its start.
+    reassemble
+        Gives the scene in other charts.
+    """
+    if assembly.form == "reduced":
+        return *enter_charts(assembly, start.coordinates, reassemble), start.speeds
+    return assembly, *own_state(assembly, start)
+
+
+def find_start(assembly: Assembly) -> Start:
+    """Find a consistent start.
+
+    Parameters
+    ----------
+    assembly
+        The scene, with its start values and guesses.
+
+    Raises
+    ------
+    StartError
+        If a start value names no quantity, or they contradict each other or the constraints.
+    """
+    before = starting(assembly)
+    if before is not assembly:
+        return _taken_up(assembly, before, find_start(before))
+    equations, length = assembly.regular, scene_length(assembly)
+    if not 1e-100 < length < 1e100:
+        raise StartError(
+            f"its extent, {length:g} m, is beyond what can be computed with",
+            where=assembly.flat.name,
+            advice="Look at its lengths and at the start values that are lengths.",
+        )
+    positions, speeds = sort_targets(assembly, equations)
+    scales = motion_scales(equations, length)
+    t = assembly.flat.t_start
+    try:
+        at = solve_positions(assembly, equations, positions, scales, length, t)
+        u, free_u, repeated_u = solve_speeds(assembly, equations, speeds, scales, t, at.coordinates)
+    except KernelEvaluationError as error:
+        raise _without_value(assembly, t, error) from error
+    free = own_names(assembly, at.free)
+    return Start(t, at.coordinates, u, length, free, free_u, (*at.repeated, *repeated_u), at.rough)
+
+
+def _without_value(assembly: Assembly, t: float, error: KernelEvaluationError) -> AtwoodError:
+    """Return the error that names the law that has no value where bodies are placed if nothing is said of them."""
+    at_rest = resting_place(assembly.equations)
+    found = missing_at(assembly, t, at_rest, np.zeros(len(assembly.equations.speeds)))
+    if found is None:
+        return error
+    why = f" ({found.reason})" if found.reason else ""
+    return StartError(
+        f"{found.quantity} has no value where the start puts the bodies at first{why}",
+        where=found.part,
+        advice="Give start values or guesses, of places and orientations, with which it has one.",
+    )
+
+
+def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
+    """Return a start in the coordinates and speeds that constraints on velocities leave.
+
+    Raises
+    ------
+    StartError
+        If the equations were made for another start, which gave their constants of integration.
+    """
+    before, after = starting.regular, assembly.regular
+    q = dict(zip(before.coordinates, start.coordinates.tolist(), strict=True))
+    u = dict(zip(before.speeds, start.speeds.tolist(), strict=True))
+    place = {**assembly.mechanism.table.values, **assembly.known_relations, before.time: start.time, **q}
+    sizes = np.maximum(coordinate_scales(before, start.length), np.abs(start.coordinates))
+    slopes_of = assembly.shared.get(
+        "slopes of integrals", lambda: [jacobian([one.value], before.coordinates) for one in after.integrals]
+    )
+    for one, slopes in zip(after.integrals, slopes_of, strict=True):
+        (missed,) = evaluate([one.value], place)
+        terms = np.abs(evaluate(slopes.entries, place)) * sizes[list(slopes.columns)]
+        if not abs(missed) <= 1e-9 * float(np.max(terms, initial=0.0)):
+            raise StartError(
+                f"the equations were made for another start, and a constant of integration differs by {missed:g}",
+                where=one.keys[-1][0],
+                advice="Assemble the scene anew, or give the start to `with_values`.",
+            )
+    kept = [before.coordinates.index(symbol) for symbol in after.coordinates]
+    speeds = np.array([u[symbol] for symbol in after.speeds])
+    return replace(start, coordinates=start.coordinates[kept], speeds=speeds, rough=start.rough[kept])

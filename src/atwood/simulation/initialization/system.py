@@ -1,0 +1,198 @@
+"""The conditions of a start in numbers, and Newton's method on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.expr import Expression, OutputGroup, Program, jacobian
+from atwood.forms.assembly import Assembly
+from atwood.forms.program import state_groups
+from atwood.linalg.matrices import (
+    Matrix,
+    from_entries,
+    is_full,
+    scaled,
+    to_array,
+)
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.simulation.dynamics.kinematic_map import turning_of
+from atwood.simulation.dynamics.rank import FREE, independent_rows, least_norm, open_directions, row_scales
+from atwood.simulation.dynamics.rounding import RowErrors
+from atwood.simulation.initialization.targets import Target
+
+__all__ = ["MET", "Conditions", "System", "counted", "newton", "start_conditions"]
+
+
+MET = 1e-11
+"""Relative to the scene's sizes: how well a start condition must be met."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """The conditions of a start as a program, with their derivatives; the same for all values of a structure."""
+
+    program: Program
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    shape: tuple[int, int]
+
+
+def start_conditions(
+    assembly: Assembly, equations: Equations, targets: Sequence[Target], constrained: bool, of_speeds: bool
+) -> Conditions:
+    """Return the conditions of a start.
+
+    Parameters
+    ----------
+    assembly, equations
+        The scene.
+    targets
+        What is to be met.
+    constrained
+        Whether the constraints are among the conditions, before the targets.
+    of_speeds
+        Whether they are on speeds, or on coordinates.
+    """
+
+    def make() -> Conditions:
+        constraints: list[Expression] = []
+        if constrained and of_speeds:
+            constraints = [one.rate for one in equations.constraints]
+        elif constrained:
+            constraints = [one.value for one in equations.constraints if one.value is not None]
+        unknowns = equations.speeds if of_speeds else equations.coordinates
+        expressions = [*constraints, *(one.observable.value for one in targets)]
+        entries = jacobian(expressions, list(unknowns)) if expressions else None
+        outputs = (
+            OutputGroup("values", tuple(expressions)),
+            OutputGroup("slopes", tuple(entries.entries) if entries else ()),
+        )
+        program = Program(f"{assembly.flat.name} start", state_groups(equations), assembly.parameters, outputs)
+        places = (tuple(entries.rows), tuple(entries.columns)) if entries else ((), ())
+        return Conditions(program, *places, (len(expressions), len(unknowns)))
+
+    return assembly.shared.get(("start", tuple(one.path for one in targets), constrained, of_speeds), make)
+
+
+class System:
+    """Values and derivatives of targets and constraints along the speeds: of places, or of speeds themselves.
+
+    Parameters
+    ----------
+    assembly, equations, targets, constrained, of_speeds
+        See `start_conditions`.
+    whole_turns
+        Whether angles are met that differ by whole turns from what is said, also where they count their turns.
+    """
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        equations: Equations,
+        targets: Sequence[Target],
+        constrained: bool,
+        of_speeds: bool = False,
+        whole_turns: bool = False,
+    ) -> None:
+        made = start_conditions(assembly, equations, targets, constrained, of_speeds)
+        turning = turning_of(assembly, "regular")
+        self.turning = None if of_speeds else turning
+        self.program = made.program
+        self.kernel = assembly.kernel(made.program)
+        self.rows, self.columns, self.shape = made.rows, made.columns, made.shape
+        places = made.rows, made.columns
+        held = [one.key[:2] for one in equations.constraints if of_speeds or one.value is not None]
+        laws = [*(held if constrained else []), *(one.path for one in targets)]
+        self.errors = RowErrors(assembly, made.program, ("values", "slopes"), laws, places, turning, not of_speeds)
+        self.targets, self.constraints = targets, made.shape[0] - len(targets)
+        self.wrapped = [one.observable.periodic or (whole_turns and one.observable.unit == "rad") for one in targets]
+        self.speed_names = tuple(one.name for one in equations.speed_names)
+        self.speeds = len(equations.speeds)
+
+    def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, Matrix]:
+        """Return what is missing in each equation, and the derivatives."""
+        values, slopes = self.kernel([t], q, u)
+        matrix = from_entries(self.rows, self.columns, slopes, self.shape)
+        if self.turning is not None and not self.turning.is_plain:
+            matrix = to_array(matrix) @ self.turning.tangent(t, q)
+        missing = np.asarray(values, dtype=float)
+        for i, target in enumerate(self.targets, start=self.constraints):
+            missing[i] -= target.value
+            if self.wrapped[i - self.constraints]:
+                missing[i] = np.remainder(missing[i] + np.pi, 2.0 * np.pi) - np.pi
+        return missing, matrix
+
+
+def newton(
+    system: System, scales: FloatArray, t: float, q: FloatArray, iterations: int = 60
+) -> tuple[FloatArray, FloatArray, Matrix]:
+    """Move to the nearest configuration that fulfils a system; return it with what is missing, scaled."""
+    still = np.zeros_like(scales)
+    assert system.turning is not None
+    missing, matrix = system.at(t, q, still)
+    errors = system.errors.near(t, q, scales)
+    rows = row_scales(matrix, scales, errors)
+    for _ in range(iterations):
+        size = float(np.max(np.abs(missing / rows), initial=0.0))
+        if size < 1e-15:
+            break
+        step = scales * least_norm(scaled(matrix, scales, rows), missing / rows)
+        longest = float(np.max(np.abs(step / scales), initial=0.0))
+        step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
+        for _ in range(8):
+            trial = system.turning.moved(t, q, -step)
+            new_missing, new_matrix = system.at(t, trial, still)
+            if float(np.max(np.abs(new_missing / rows))) < size or longest < 1e-9:
+                break
+            step *= 0.5
+        if float(np.max(np.abs(new_missing / rows))) >= size and size < MET:
+            break
+        q, missing, matrix = trial, new_missing, new_matrix
+        rows = row_scales(matrix, scales, errors)
+    # What hardly changes with any coordinate, as where links line up, is measured by the scene.
+    sizes = np.maximum(rows, 1e-4 * max(np.max(rows, initial=0.0), np.max(scales, initial=0.0)))
+    return q, missing / sizes, scaled(matrix, scales)
+
+
+def counted(
+    names: Sequence[str],
+    tangent: FloatArray | None,
+    fixed: Sequence[Target],
+    constraints: int,
+    matrix: Matrix,
+    errors: FloatArray,
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return which coordinates or speeds nothing determines, and which fixed values repeat others.
+
+    Parameters
+    ----------
+    names
+        Of the coordinates or speeds.
+    tangent
+        How coordinates move with the speeds; None where each has its own.
+    fixed, constraints
+        What is fixed, and how many constraints come before that.
+    matrix
+        Derivatives of both, columns scaled.
+    errors
+        How far rounding can take each row.
+    """
+    if 0 in matrix.shape:
+        return tuple(names), ()
+    kept = independent_rows(matrix, errors, before=constraints)
+    repeated = tuple(t.path for i, t in enumerate(fixed, start=constraints) if i not in set(kept))
+    if len(kept) == matrix.shape[1]:
+        return (), repeated
+    if not is_full(matrix):
+        from atwood.linalg.sparse import free_columns
+
+        rows = row_scales(matrix, np.ones(matrix.shape[1]), errors)
+        found = free_columns(scaled(matrix, np.ones(matrix.shape[1]), rows))
+        return tuple(n for n, is_free in zip(names, found, strict=True) if is_free), repeated
+    directions = open_directions(matrix[kept])
+    moved = np.abs(directions if tangent is None else directions @ tangent.T)
+    return tuple(n for i, n in enumerate(names) if np.max(moved[:, i], initial=0.0) > FREE), repeated

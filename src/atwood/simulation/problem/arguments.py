@@ -1,0 +1,128 @@
+"""What the arguments of a run may be; runs, sweeps and comparisons share them."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+
+from atwood.arguments import (
+    CALLBACK,
+    FLAG,
+    TEXT,
+    Kind,
+    Refused,
+    either,
+    number,
+    one_of,
+    optional,
+    show,
+    whole,
+)
+from atwood.errors import AtwoodError, UsageError
+from atwood.forms.dae import LEVELS
+from atwood.model.values.units import parse_quantity, parse_unit
+from atwood.simulation.problem.options import SOLVERS
+from atwood.topology.charts import ORIENTATIONS
+
+__all__ = [
+    "FORM",
+    "FORMS",
+    "LEVEL",
+    "LIMITS",
+    "NAME",
+    "ORIENTATION",
+    "OUTPUTS",
+    "PROGRESS",
+    "RTOL",
+    "SAMPLES",
+    "SOLVER",
+    "STRUCTURE",
+    "T_END",
+    "check_span",
+]
+
+FORMS = ("reduced", "dae")
+
+_LONGEST, _SHORTEST = 1e30, 1e-30
+"""s. Beyond, squares and fourth powers of times soon have no floating-point numbers."""
+
+_MOST = 10_000_000
+"""Output times, and samples, that a run can hold."""
+
+_TOO_MANY_STEPS = 1e9
+"""A largest step that asks for more steps than this asks for a run without an end."""
+
+
+def _time(value: Any) -> float:
+    if isinstance(value, str):
+        try:
+            value = parse_quantity(value, parse_unit("s"), "t_end")
+        except AtwoodError as error:
+            raise Refused(f"{error.message[:1].upper()}{error.message[1:]}.") from None
+    return float(_SECONDS.read(value))
+
+
+_SECONDS = number(least=-_LONGEST, most=_LONGEST)
+
+
+def _times(value: Any) -> Any:
+    if isinstance(value, (str, bytes, set, frozenset, dict)):
+        raise Refused
+    if isinstance(value, np.ndarray) and value.dtype.kind not in "fiu":
+        raise Refused
+    times = np.array(value if isinstance(value, np.ndarray) else [_SECONDS.read(one) for one in value], dtype=float)
+    if times.ndim != 1 or not len(times) or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
+        raise Refused
+    return times
+
+
+FORM = one_of(FORMS)
+LEVEL = one_of(LEVELS)
+ORIENTATION = one_of(ORIENTATIONS)
+SOLVER = one_of(("auto", *SOLVERS))
+NAME = optional(TEXT)
+T_END = optional(Kind(f"seconds, at most {_LONGEST:g}, or text such as '2 min'", _time))
+RTOL = number("a relative tolerance between 0 and 1, such as 1e-8", above=0.0, below=1.0)
+OUTPUTS = either(
+    whole(f"the number of output times, 2 to {_MOST:,}", 2, _MOST),
+    Kind("the times themselves, s, finite and rising", _times),
+)
+LIMITS = {
+    "max_steps": optional(whole("a whole number of steps, at least 1", 1, 10**18)),
+    "max_seconds": optional(number("a number of seconds above 0", above=0.0)),
+}
+SAMPLES = whole(f"a whole number of samples, 1 to {_MOST:,}", 1, _MOST)
+STRUCTURE = FLAG
+PROGRESS = optional(CALLBACK)
+
+
+def check_span(begin: float, end: float, max_step: float | None = None) -> None:
+    """Refuse a run that does not go forwards, that takes no time, or that would take too many steps.
+
+    Parameters
+    ----------
+    begin, end
+        Times of its start and of its end, s.
+    max_step
+        The largest step, s.
+
+    Raises
+    ------
+    UsageError
+        If it is so.
+    """
+    span = end - begin
+    if not span > 0.0 or not np.isfinite(span):
+        raise UsageError(f"the end, t = {end:g}, is not after the start, t = {begin:g}", advice="Give a later t_end.")
+    if span < _SHORTEST or span < 1e3 * sys.float_info.epsilon * max(abs(begin), abs(end)):
+        raise UsageError(
+            f"from the start, t = {begin:g}, to the end, t = {end!r}, is too short a time to be told in numbers",
+            advice="Give a later t_end.",
+        )
+    if max_step is not None and span / max_step > _TOO_MANY_STEPS:
+        raise UsageError(
+            f"max_step cannot be {show(max_step)}, which asks for {span / max_step:.0e} steps to t = {end:g}",
+            advice=f"Give at least {span / _TOO_MANY_STEPS:.0e} s.",
+        )

@@ -1,0 +1,83 @@
+"""From an assembled scene to the problem that an explicit method solves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import TYPE_CHECKING
+
+from atwood.forms.accelerations import AccelerationProgram, acceleration_program
+from atwood.forms.assembly import Assembly
+from atwood.integrators.explicit_problem import CompiledRates, ExplicitProblem
+from atwood.integrators.protocol import FloatArray, Values
+
+if TYPE_CHECKING:
+    from atwood.integrators.dop853.native import CompiledAccelerations
+
+__all__ = ["compiled_rates", "explicit_problem"]
+
+
+def explicit_problem(
+    assembly: Assembly,
+    events: Callable[[float, FloatArray, FloatArray], Values] | None = None,
+    directions: tuple[int, ...] = (),
+    found: AccelerationProgram | None = None,
+) -> ExplicitProblem | None:
+    """Return the equations of a scene in the reduced form for an explicit method, with ``y = (q, u)``.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    events, directions
+        What is watched, as functions of (t, y, y'), and in which direction.
+    found
+        The accelerations, where they are there already.
+
+    Returns
+    -------
+    ExplicitProblem or None
+        None if the scene has no coordinates, or constraints are left among them.
+    """
+    program = found or assembly.shared.get("accelerations", lambda: acceleration_program(assembly))
+    n, m = len(assembly.reduced.coordinates), len(assembly.reduced.speeds)
+    if program is None or n == 0:
+        return None
+    kernel = assembly.kernel(program.program)
+
+    def rates(t: float, y: FloatArray) -> Sequence[float]:
+        found = kernel([t], y[:n], y[n:])
+        return [*(y[n:] if len(found) == 1 else found[0]), *found[-1]]
+
+    return ExplicitProblem(
+        size=n + m,
+        rates=rates,
+        events=events,
+        event_count=len(directions),
+        event_directions=directions,
+        compiled=_compiled(assembly, program),
+    )
+
+
+def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAccelerations:
+    """Return the accelerations of a scene as machine code, for any parameter values."""
+    from atwood.integrators.dop853.native import CompiledAccelerations
+
+    _, code = assembly.shared.get(("rates", id(found)), lambda: (found, CompiledAccelerations(found.program)))
+    return code
+
+
+def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], CompiledRates] | None:
+    """Return what gives each session compiled rates, made when they are first asked for; None if they cannot be."""
+    try:
+        from atwood.integrators.dop853 import native as explicit_native  # noqa: F401
+    except ImportError:  # no compiler: steps in Python
+        return None
+    if any(node.operation == "external" for node in found.program.nodes):
+        return None
+
+    @cache
+    def bound() -> Callable[[], CompiledRates]:
+        return compiled_rates(assembly, found).bind(assembly.parameter_values)
+
+    return lambda: bound()()

@@ -1,0 +1,89 @@
+"""Compiled functions of a mechanism with loops, which follow changes of its dependent coordinates."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from atwood.codegen.sundials.loop_residuals import LoopCallbacks, LoopData, compile_loop_callbacks
+from atwood.forms.loops import LoopProgram
+from atwood.integrators.protocol import FloatArray, LinearSolver, NativeCallbacks
+from atwood.simulation.dynamics.partitioning import POOR
+from atwood.simulation.problem.partition_arrays import choice_lists, loop_shape
+
+__all__ = ["CompiledLoops", "compile_loops"]
+
+
+def compile_loops(program: LoopProgram, linear_solver: LinearSolver) -> LoopCallbacks:
+    """Return the compiled functions for a matrix of one kind."""
+    return compile_loop_callbacks(
+        program.stack,
+        program.derivatives,
+        (program.slope_rows, program.slope_columns),
+        (program.rows, program.columns),
+        loop_shape(program),
+        sparse=linear_solver == "sparse",
+    )
+
+
+@dataclass
+class CompiledLoops:
+    """The compiled functions of a scene with its parameters, for as many sessions as ask for them.
+
+    Attributes
+    ----------
+    program
+        What they compute.
+    parameter_values
+        The values of the parameters.
+    sizes
+        The size of each speed.
+    """
+
+    program: LoopProgram
+    parameter_values: FloatArray
+    sizes: FloatArray
+    _sessions: weakref.WeakSet[LoopData] = field(default_factory=weakref.WeakSet)
+
+    def callbacks(
+        self,
+        code: LoopCallbacks,
+        dependent: tuple[tuple[int, ...], tuple[int, ...]],
+        review: Callable[[float, FloatArray], bool],
+    ) -> NativeCallbacks:
+        """Return the functions for one session.
+
+        Parameters
+        ----------
+        code
+            What `compile_loops` gave.
+        dependent
+            The choice at first: dependent displacements, and dependent speeds.
+        review
+            Looks at them anew at a time and a state, and returns whether others were chosen.
+        """
+        places, speeds = dependent
+        data = code.bind(self.parameter_values, choice_lists(self.program, speeds, places), self.sizes, POOR)
+        self._sessions.add(data)
+
+        def attend(t: float, y: FloatArray) -> bool | None:
+            return review(t, y) if data.take_attention() else None
+
+        return NativeCallbacks(
+            code.residual_address,
+            code.jacobian_address,
+            data.address,
+            code.weights_address,
+            data.set_weights,
+            attend=attend,
+            last_rate=lambda: data.rate,
+            keep=(code, data),
+            data_bytes=data.bytes,
+        )
+
+    def choose(self, places: tuple[int, ...], speeds: tuple[int, ...]) -> None:
+        """Make other displacements and speeds the dependent ones, in all sessions."""
+        lists = choice_lists(self.program, speeds, places)
+        for data in self._sessions:
+            data.choice[:] = lists

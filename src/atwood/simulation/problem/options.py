@@ -1,0 +1,160 @@
+"""How a run is made: its end, tolerances, outputs, limits and solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.errors import UsageError
+
+__all__ = ["SOLVERS", "RunOptions", "Samples", "sample_times"]
+
+
+SOLVERS = {
+    "ida": "SUNDIALS IDA",
+    "ida-sundae": "SUNDIALS IDA through scikit-sundae",
+    "explicit": "Dormand-Prince 8(5,3)",
+    "taylor": "Taylor series",
+}
+"""What can solve a scene, and what it is called."""
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run is made.
+
+    Attributes
+    ----------
+    t_end
+        Time of the end, s.
+    relative_tolerance
+        Error allowed in a step; absolute tolerances are this share of the scene's sizes.
+    outputs
+        Number of output times, evenly spread, or the times themselves.
+    max_steps, max_seconds
+        Limits of the run.
+    progress
+        Called with the time reached.
+    max_order, max_step
+        Limits for the method.
+    samples
+        A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it.
+    solver
+        A key of `SOLVERS`, or ``"auto"``; see `atwood.simulation.run.choice`.
+    structure
+        Whether it may be that nothing can move.
+    on_step
+        Called with the time before each step of the solver.
+    """
+
+    t_end: float
+    relative_tolerance: float = 1e-8
+    outputs: int | FloatArray = 201
+    max_steps: int | None = None
+    max_seconds: float | None = None
+    progress: Callable[[float], object] | None = None
+    max_order: int = 5
+    max_step: float | None = None
+    solver: str = "auto"
+    samples: int = 400
+    structure: bool = False
+    on_step: Callable[[float], object] | None = None
+
+    def out_of_time(self, t: float) -> str:
+        """Return what is said of a run that its limit of time ended, at a time of its own."""
+        return f"the limit of {self.max_seconds:g} s was used up (at t = {t:.9g})"
+
+    def out_of_steps(self, t: float) -> str:
+        """Return the same of its limit of steps."""
+        return f"the limit of {self.max_steps} steps was used up (at t = {t:.9g})"
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """When a run is sampled.
+
+    Attributes
+    ----------
+    times
+        Sample times, s.
+    shown
+        Which of them are outputs.
+    between
+        Which of them lie between those that the run was made with, and so change nothing in it.
+    """
+
+    times: FloatArray
+    shown: NDArray[np.bool_]
+    between: NDArray[np.bool_]
+
+    def with_more(self, times: FloatArray) -> Samples:
+        """Return the same with more in between."""
+        more = np.setdiff1d(times, self.times)
+        order = np.argsort(np.concatenate([self.times, more]))
+        no, yes = np.zeros(len(more), dtype=bool), np.ones(len(more), dtype=bool)
+        return Samples(
+            np.concatenate([self.times, more])[order],
+            np.concatenate([self.shown, no])[order],
+            np.concatenate([self.between, yes])[order],
+        )
+
+    def until(self, t: float, limit: float) -> Samples:
+        """Return those after one time up to another, which is among them."""
+        ahead = (self.times > t) & (self.times <= limit)
+        times, shown, between = self.times[ahead], self.shown[ahead], self.between[ahead]
+        if not len(times) or times[-1] != limit:
+            times, shown, between = np.append(times, limit), np.append(shown, False), np.append(between, False)
+        return Samples(times, shown, between)
+
+    def without_last_shown(self) -> Samples:
+        """Return the same, of which the last is no output."""
+        return Samples(self.times, np.append(self.shown[:-1], False), self.between)
+
+    def shows(self, t: float) -> bool:
+        """Return whether a time is that of an output."""
+        return bool(np.any(self.shown[self.times == t]))
+
+    @property
+    def own(self) -> FloatArray:
+        """The times that the run was made with."""
+        return self.times[~self.between]
+
+    def ends_of_blocks(self, count: int) -> NDArray[np.intp]:
+        """Return where to cut them into so many blocks, which are the same whatever lies between."""
+        own = np.flatnonzero(~self.between)
+        size = -(-len(own) // count)
+        return np.append(own[size - 1 : -1 : size] + 1, len(self.times))
+
+
+def sample_times(t: float, options: RunOptions) -> Samples:
+    """Return all samples, the start among them.
+
+    Parameters
+    ----------
+    t
+        Time of the start, s.
+    options
+        How the run is made.
+    """
+    if isinstance(options.outputs, (int, np.integer)):
+        asked = np.linspace(t, options.t_end, int(options.outputs))
+    else:
+        asked = options.outputs
+        if asked[0] < t or asked[-1] > options.t_end:
+            raise UsageError(
+                f"outputs go from {asked[0]:g} to {asked[-1]:g} s",
+                advice=f"Give times between {t:g} and {options.t_end:g}.",
+            )
+    filling = np.linspace(t, options.t_end, options.samples + 1)
+    near = 1e-9 * (options.t_end - t)
+    next_asked = np.minimum(np.searchsorted(asked, filling), len(asked) - 1)
+    distance = np.minimum(np.abs(asked[next_asked] - filling), np.abs(asked[np.maximum(next_asked - 1, 0)] - filling))
+    filling = filling[distance > near]
+    times = np.concatenate([asked, filling])
+    shown = np.concatenate([np.ones(len(asked), dtype=bool), np.zeros(len(filling), dtype=bool)])
+    order = np.argsort(times)
+    return Samples(times[order], shown[order], np.zeros(len(times), dtype=bool))

@@ -1,0 +1,383 @@
+"""From an assembled scene and its start to the problem that a driver solves."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.codegen import BoundKernel
+from atwood.errors import KernelEvaluationError, SolveError, StartError
+from atwood.forms.assembly import Assembly
+from atwood.forms.dae import keep_constraints
+from atwood.forms.program import FormProgram
+from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks
+from atwood.linalg.matrices import to_array
+from atwood.simulation.dynamics.balance import Balance, balance_of, solve_balance
+from atwood.simulation.dynamics.columns import columns_of
+from atwood.simulation.dynamics.determined_reactions import check_read_reactions
+from atwood.simulation.dynamics.partitioning import choose_dependent, review_choice
+from atwood.simulation.dynamics.redundancy import RankFinding, find_rank, review_kept
+from atwood.simulation.dynamics.scales import Scales, coordinate_scales, find_scales, motion_scales
+from atwood.simulation.initialization.massless import check_inertia
+from atwood.simulation.problem.not_compilable import announce, find_uncompiled
+
+if TYPE_CHECKING:
+    from atwood.forms.loops import LoopProgram
+    from atwood.simulation.problem.native_loops import CompiledLoops
+
+__all__ = ["Plan", "make_plan", "pack_state"]
+
+
+_HELD = 1e-7
+"""Relative to the scene's sizes: a projected state that misses a constraint by more has not met it."""
+
+
+@dataclass
+class Plan:
+    """What a run of one mode needs.
+
+    Attributes
+    ----------
+    assembly
+        The scene.
+    balance
+        The balance of forces in the coordinates of the form.
+    finding
+        Which of its constraints are independent.
+    scales
+        Sizes of the scene.
+    sizes, coordinate_sizes
+        Size of a displacement along each speed, and of each coordinate.
+    program
+        The form's programs; with loops in the reduced form, those for the dependent coordinates of the start.
+    dependent, dependent_speeds
+        With loops: the speeds along which displacements follow from constraints on positions, and the speeds that
+        follow from all constraints, at present. They differ only if there are constraints on velocities alone.
+    switches
+        How often they changed.
+    uncompiled
+        What keeps the scene from being compiled, in words; empty if nothing does.
+    """
+
+    assembly: Assembly
+    balance: Balance
+    finding: RankFinding
+    scales: Scales
+    sizes: FloatArray
+    coordinate_sizes: FloatArray
+    program: FormProgram
+    dependent: tuple[int, ...]
+    dependent_speeds: tuple[int, ...]
+    switches: int = 0
+    uncompiled: str = ""
+    _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
+    _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
+    _loops: CompiledLoops | None = field(default=None, repr=False)
+
+    @property
+    def kept(self) -> NDArray[np.intp] | None:
+        """Numbers of the independent constraints; None if all are."""
+        if not self.finding.redundant:
+            return None
+        return np.asarray(self.finding.kept, dtype=np.intp)
+
+    @property
+    def is_projected(self) -> bool:
+        """Whether outputs are projected onto the constraints; plain index 1 shows its drift instead."""
+        return self.balance.constraints > 0 and self.program.level != "index1"
+
+    def in_piece(self, assembly: Assembly) -> Plan:
+        """Return the plan of the same scene with other relations of functions of time, after a time event."""
+        balance = balance_of(assembly, assembly.form)
+        return replace(self, assembly=assembly, balance=balance, _kernels=None, _seen=None, _loops=None)
+
+    def kernels(self) -> tuple[BoundKernel, BoundKernel]:
+        """Return residual and Jacobian at present."""
+        if self._kernels is None:
+            assembly, program = self.assembly, self._present
+            many = program.derivative.by_columns
+            self._kernels = (assembly.kernel(program.residual), assembly.kernel(program.jacobian, vectorized=many))
+        return self._kernels
+
+    @property
+    def _present(self) -> FormProgram:
+        """The form's programs for the present dependent coordinates."""
+        if not self.dependent_speeds:
+            return self.program
+        return self.assembly.form_program(_kept_or_none(self.finding), self.dependent, self.dependent_speeds)
+
+    def review_dependent(self, t: float, q: FloatArray) -> bool:
+        """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
+        if not self.dependent_speeds:
+            return False
+        slope = to_array(self.balance.held(t, q, np.zeros_like(self.sizes)).slope)
+        speeds = review_choice(slope[list(self.finding.kept)], self.sizes, self.dependent_speeds)
+        holding = self.balance.holding(self.finding.kept)
+        is_same = len(holding) == len(speeds)
+        places = speeds if is_same else review_choice(slope[holding], self.sizes, self.dependent)
+        if (places, speeds) == (self.dependent, self.dependent_speeds):
+            return False
+        self.dependent, self.dependent_speeds = places, speeds
+        self._kernels = None
+        if self._loops is not None:
+            self._loops.choose(places, speeds)
+        self.switches += 1
+        return True
+
+    def better_kept(self, t: float, q: FloatArray) -> RankFinding | None:
+        """Return which constraints are better kept at a place; None if those that are will do."""
+        finding = review_kept(self.finding, self.balance, t, q, self.sizes)
+        return None if finding is self.finding else finding
+
+    def keep(self, finding: RankFinding, t: float, q: FloatArray) -> None:
+        """Keep other constraints from a place on; programs and sessions for those before have had their day."""
+        self.finding, self._kernels, self._loops = finding, None, None
+        if self.dependent_speeds:
+            slope = to_array(self.balance.held(t, q, np.zeros_like(self.sizes)).slope)
+            self.dependent, self.dependent_speeds = _dependent(self.balance, finding, slope, self.sizes)
+        self.program = self.assembly.form_program(finding.kept, self.dependent, self.dependent_speeds)
+
+    def review_output(self, t: float, q: FloatArray) -> bool:
+        """Do the same at an output, unless compiled functions tell by themselves when it is time to.
+
+        These look at the speeds alone.
+        """
+        return (self._loops is None or self.dependent != self.dependent_speeds) and self.review_dependent(t, q)
+
+    def check_held(self, t: float, q: FloatArray, u: FloatArray) -> None:
+        """Refuse a state that misses constraints even after it has been projected onto them: they contradict.
+
+        Raises
+        ------
+        SolveError
+            If it does; it names the constraint that is missed most.
+        """
+        now = self.balance.at(t, q, u)
+        rows = self.balance.row_scales(now, t, q, self.sizes)
+        misses = np.maximum(np.abs(now.value / rows), np.abs(now.rate / rows) * self.scales.time)
+        if not np.all(misses <= _HELD):
+            worst = int(np.argmax(np.where(np.isfinite(misses), misses, np.inf)))
+            raise SolveError(
+                f"at t = {t:.6g} the constraints cannot all hold: this is missed by {misses[worst]:.3g} of the scene's "
+                "size",
+                where=self.assembly.equations.constraints[worst].label,
+                advice="Drives or lengths contradict each other here, or the mechanism cannot go on from here.",
+            )
+
+    def between_steps(self, t: float) -> None:
+        """Review the dependent coordinates where the solver last asked for a Jacobian; for a driver's poll."""
+        if self._seen is not None:
+            seen, self._seen = self._seen, None
+            self.review_dependent(*seen)
+
+    def poll(self, solver: str) -> Callable[[float], None] | None:
+        """Return what a driver calls between two steps; compiled functions tell by themselves when it is time to."""
+        native = solver == "ida" and not self.uncompiled
+        return self.between_steps if self.dependent_speeds and not native else None
+
+    def problem(
+        self,
+        events: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
+        directions: tuple[int, ...] = (),
+    ) -> ImplicitProblem:
+        """Return the problem for a driver; its functions follow changes of the dependent coordinates."""
+        size = self.program.size
+
+        def residual(t: float, y: FloatArray, yp: FloatArray) -> Sequence[float]:
+            values: Sequence[float] = self.kernels()[0]([t], y, yp)[0]
+            return values
+
+        def jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> Sequence[float] | FloatArray:
+            kernel = self.kernels()[1]
+            if self.program.derivative.by_columns:
+                return columns_of(kernel, size, [t], y, yp, [cj]).T.ravel()
+            values: Sequence[float] = kernel([t], y, yp, [cj])[0]
+            return values
+
+        def full_jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> FloatArray:
+            self._seen = (t, self.program.split(y)[0].copy())
+            full = np.zeros(size * size)
+            present = self._present
+            full[present.columns * size + present.rows] = self.kernels()[1]([t], y, yp, [cj])[0]
+            return full
+
+        pattern = (self.program.rows, self.program.columns)
+        if self.dependent_speeds:
+            pattern = (np.tile(np.arange(size), size), np.repeat(np.arange(size), size))
+        return ImplicitProblem(
+            size=size,
+            residual=residual,
+            jacobian=full_jacobian if self.dependent_speeds else jacobian,
+            pattern=pattern,
+            algebraic=self.program.algebraic,
+            events=events,
+            event_count=len(directions),
+            event_directions=directions,
+            native=self._native(),
+        )
+
+    def _native(self) -> Callable[[LinearSolver], NativeCallbacks] | None:
+        """Return what compiles residual and Jacobian; None if nothing can."""
+        if self.uncompiled:
+            return None
+        return self.compiled_loops if self.dependent_speeds else self.compiled
+
+    def compiled_loops(self, linear_solver: LinearSolver) -> NativeCallbacks:
+        """Return residual and Jacobian of the reduced form with loops as machine code, for one session."""
+        from atwood.simulation.problem.native_loops import CompiledLoops, compile_loops
+
+        shared, kept = self.assembly.shared, self.finding.kept
+        if self._loops is None:
+            program = shared.get(("loops", kept), lambda: _loop_program(self.assembly, kept))
+            self._loops = CompiledLoops(program, self.assembly.parameter_values, self.sizes)
+        made = self._loops.program
+        code = shared.get(("loops", kept, linear_solver), lambda: compile_loops(made, linear_solver))
+        coordinates = self.program.coordinates
+
+        def review(t: float, y: FloatArray) -> bool:
+            return self.review_dependent(t, y[:coordinates])
+
+        return self._loops.callbacks(code, (self.dependent, self.dependent_speeds), review)
+
+    def compiled(self, linear_solver: LinearSolver) -> NativeCallbacks:
+        """Return residual and Jacobian as machine code, for one session."""
+        from atwood.codegen import compile_ida_callbacks
+
+        program = self.program
+        _, code = self.assembly.shared.get(
+            ("ida", id(program), linear_solver),
+            lambda: (
+                program,  # kept, so that its identity stays its own
+                compile_ida_callbacks(
+                    program.residual,
+                    program.jacobian,
+                    program.rows,
+                    program.columns,
+                    program.size,
+                    sparse=linear_solver == "sparse",
+                    by_columns=program.derivative.by_columns,
+                ),
+            ),
+        )
+        data = code.bind(self.assembly.parameter_values)
+        return NativeCallbacks(
+            code.residual_address,
+            code.jacobian_address,
+            data.address,
+            code.weights_address,
+            data.set_weights,
+            keep=(code, data),
+            data_bytes=ctypes.sizeof(data),
+        )
+
+    @property
+    def angles(self) -> tuple[int, ...]:
+        """Unknowns that are angles, whose size does not say how accurate they must be."""
+        return tuple(i for i, one in enumerate(self.assembly.equations.names) if one.unit == "rad")
+
+    def tolerances(self, relative: float) -> FloatArray:
+        """Return the absolute tolerance of each unknown; multipliers are kept out of the error test."""
+        program = self.program
+        loose = np.full(program.multipliers + program.extra, 1e3 * max(self.scales.force, 1.0))
+        return np.concatenate([relative * self.coordinate_sizes, relative * (self.sizes / self.scales.time), loose])
+
+
+def _loop_program(assembly: Assembly, kept: tuple[int, ...]) -> LoopProgram:
+    from atwood.forms.loops import loop_program
+
+    equations = keep_constraints(assembly.equations, kept)
+    return loop_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)
+
+
+def _kept_or_none(finding: RankFinding) -> tuple[int, ...] | None:
+    return finding.kept if finding.redundant else None
+
+
+def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
+    """Prepare a run from a consistent state in the coordinates of the form.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    t, q, u
+        The state.
+    length
+        Extent of the scene, m.
+    span
+        Length of the run, s.
+
+    Raises
+    ------
+    StartError
+        If the forces do not determine the accelerations.
+    """
+    equations = assembly.equations
+    balance = balance_of(assembly, assembly.form)
+    sizes, coordinate_sizes = motion_scales(equations, length), coordinate_scales(equations, length)
+    finding = find_rank(balance, t, q, sizes)
+    check_read_reactions(assembly, t, q, u, length)
+    try:
+        now = balance.at(t, q, u)
+    except KernelEvaluationError as error:
+        raise StartError(
+            f"at the start a law has no value: {error.message}",
+            where=assembly.flat.name,
+            advice="Do two points coincide that a spring, damper or rope joins? Give start positions that part them.",
+        ) from error
+    slope = now.slope[list(finding.kept)] if finding.kept else now.slope[:0]
+    check_inertia(assembly, now.mass, slope, sizes)
+    if finding.starts_singular:
+        raise _singular_start(assembly, finding)
+    dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
+    if assembly.form == "reduced" and finding.kept:
+        dependent = _dependent(balance, finding, to_array(now.slope), sizes)
+    program = assembly.form_program(_kept_or_none(finding), *dependent)
+    kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
+    accelerations, _ = solve_balance(now, kept, t)
+    scales = find_scales(assembly, length, u, accelerations, sizes, span)
+    uncompiled = find_uncompiled(assembly, program.residual)
+    if uncompiled:
+        announce(assembly, uncompiled)
+    return Plan(assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent, uncompiled=uncompiled)
+
+
+def _dependent(
+    balance: Balance, finding: RankFinding, slope: FloatArray, sizes: FloatArray
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the speeds whose displacements follow from constraints on positions, and those that follow from all."""
+    places, speeds = (
+        choose_dependent(slope[list(one)], sizes) for one in (balance.holding(finding.kept), finding.kept)
+    )
+    return places, speeds
+
+
+def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
+    constraints = assembly.equations.constraints
+    lost = [constraints[i].label for i in finding.lost_at_start]
+    return StartError(
+        "the start is a singular position, from which the mechanism could go on in more than one way: "
+        f"{', '.join(lost)} {'follows' if len(lost) == 1 else 'follow'} from the other constraints here "
+        "and nowhere near",
+        where=constraints[finding.lost_at_start[0]].key[0],
+        advice="Start a little away from it, on the side that you mean.",
+    )
+
+
+def pack_state(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return consistent y and y' from a state that fulfils the constraints."""
+    now = plan.balance.at(t, q, u)
+    accelerations, multipliers = solve_balance(now, plan.kept, t)
+    if plan.assembly.form == "dae":
+        tail = [multipliers, np.zeros(plan.program.extra)]
+    else:
+        tail = []
+    y = np.concatenate([q, u, *tail])
+    yp = np.concatenate([plan.balance.turning.rates(t, q, u), accelerations, *(np.zeros_like(x) for x in tail)])
+    return y, yp

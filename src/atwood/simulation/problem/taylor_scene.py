@@ -1,0 +1,157 @@
+"""From an assembled scene to a run with the Taylor-series method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from math import inf
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from atwood.errors import UsageError
+from atwood.expr import Expression, live, substitute
+from atwood.expr.series.taylor import TaylorPrograms, taylor_programs
+from atwood.forms.accelerations import AccelerationProgram, acceleration_program
+from atwood.forms.assembly import Assembly
+from atwood.integrators.explicit_problem import ExplicitProblem, Stepper
+from atwood.integrators.explicit_session import ExplicitSession
+from atwood.integrators.protocol import Budget, FloatArray, SolverOptions
+from atwood.integrators.taylor.problem import REACH, TaylorProblem
+
+if TYPE_CHECKING:
+    from atwood.integrators.taylor.native import CompiledRecurrences
+
+__all__ = ["open_taylor", "recurrences", "taylor_problem"]
+
+_LANES = 8
+
+
+def recurrences(assembly: Assembly) -> TaylorPrograms:
+    """Return the recurrences of a scene in the reduced form, with the state (q, u).
+
+    Raises
+    ------
+    UsageError
+        If the scene has no coordinates, or constraints are left among them.
+    UnsupportedError
+        If a law switches with the motion, or calls a function that the graph does not look into.
+    """
+    found = assembly.shared.get("accelerations", lambda: acceleration_program(assembly))
+    if found is None or not len(assembly.reduced.coordinates):
+        raise UsageError(
+            "the Taylor-series method needs a scene without closed loops in which something can move",
+            where=assembly.flat.name,
+            advice="Use the solver 'ida'.",
+        )
+    is_partial = assembly.shared.get(("partial", id(found)), lambda: _has_partial_branch(assembly, found))
+    chosen = assembly.known_relations if is_partial else {}
+    key = ("recurrences", id(found), tuple(chosen.values()))
+    return assembly.shared.get(key, lambda: (found, _make(found, chosen)))[1]
+
+
+_PARTIAL = frozenset({"sqrt", "log", "pow", "asin", "acos", "tan", "atan2", "div"})
+"""Operations that have no value, or no series, somewhere."""
+
+
+def _has_partial_branch(assembly: Assembly, found: AccelerationProgram) -> bool:
+    """Return whether a branch that a relation of functions of time leaves out could be without a value.
+
+    A series is of all that there is, whatever is chosen of it. Then each piece has recurrences of its own, in which
+    there is only what acts.
+    """
+    symbols = {one.symbol for one in assembly.relations}
+    nodes = found.program.nodes if symbols else ()
+    branches = [
+        one
+        for node in nodes
+        if node.operation == "select" and node.arguments[0] in symbols
+        for one in node.arguments[1:]
+    ]
+    return any(node.operation in _PARTIAL and not node.is_parametric for node in live(branches))
+
+
+def _make(found: AccelerationProgram, chosen: Mapping[Expression, float]) -> TaylorPrograms:
+    program = found.program
+    (time,), q, u = (group.symbols for group in program.inputs)
+    results = substitute(program.results, chosen)
+    rates = u if len(program.outputs) == 1 else ()  # else the program gives them
+    return taylor_programs(program.name, time, [*q, *u], [*rates, *results], program.parameters, _LANES)
+
+
+def taylor_problem(assembly: Assembly, stop_time: float = inf, has_events: bool = False) -> TaylorProblem:
+    """Return what the Taylor-series method is given of a scene; errors as for `recurrences`.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    stop_time
+        The end of the stretch in which the same laws act.
+    has_events
+        Whether events are looked for.
+    """
+    programs = recurrences(assembly)
+    return TaylorProblem(
+        programs=programs,
+        parameters=np.asarray(assembly.parameter_values, dtype=np.float64),
+        stop_time=stop_time,
+        reach=REACH if has_events else inf,
+        compiled=_compiled(assembly, programs),
+    )
+
+
+def _compiled(
+    assembly: Assembly, programs: TaylorPrograms
+) -> Callable[[], tuple[CompiledRecurrences, FloatArray]] | None:
+    """Return what gives the machine code, made when it is first asked for; None if there is no compiler."""
+    try:
+        from atwood.integrators.taylor.native import CompiledRecurrences
+    except ImportError:
+        return None
+
+    @cache
+    def bound() -> tuple[CompiledRecurrences, FloatArray]:
+        key = ("compiled recurrences", id(programs))
+        _, code = assembly.shared.get(key, lambda: (programs, CompiledRecurrences(programs)))
+        return code, code.bind(assembly.parameter_values)
+
+    return bound
+
+
+def open_taylor(
+    problem: ExplicitProblem,
+    series: TaylorProblem,
+    options: SolverOptions,
+    t: float,
+    y: FloatArray,
+    budget: Budget | None = None,
+    stepper: Literal["auto", "compiled", "reference"] = "auto",
+) -> ExplicitSession:
+    """Start a run with the Taylor-series method.
+
+    Parameters
+    ----------
+    problem
+        The equations, of which the number of unknowns and the events are read.
+    series
+        Their recurrences.
+    options
+        Accuracy; `max_order` and `linear_solver` mean nothing here.
+    t, y
+        Start values.
+    budget
+        Limits of the session.
+    stepper
+        What takes the steps; ``"auto"`` takes compiled steps where they can be had.
+    """
+    takes: Stepper
+    if stepper == "compiled" or (stepper == "auto" and series.compiled is not None):
+        from atwood.integrators.taylor.native import CompiledStepper
+
+        takes = CompiledStepper(series, options)
+    else:
+        from atwood.integrators.taylor.reference import ReferenceStepper
+
+        takes = ReferenceStepper(series, options)
+    return ExplicitSession(problem, options, takes, t, y, budget)

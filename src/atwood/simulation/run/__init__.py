@@ -1,0 +1,1 @@
+"""Runs: the choice of solver, segments, sessions, and what is recorded."""

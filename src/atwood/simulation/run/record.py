@@ -1,0 +1,243 @@
+"""What is recorded of a run: samples of each stretch in one mode, projected where the form has constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.clock import TimeIsUp, more_time
+from atwood.errors import SolveError
+from atwood.forms.assembly import Assembly
+from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.projection import misses_of, project_safely, project_states
+from atwood.simulation.singular.crossing import Passage
+
+__all__ = ["Recorder", "Segment"]
+
+
+_PENDING = 512
+"""So many states of the solver are projected together, at most."""
+
+_LAST = 32
+"""The same where time may be short."""
+
+
+_Waiting: TypeAlias = Sequence[tuple[float, FloatArray, bool]]
+"""States of the solver, and whether they are outputs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A stretch of a run in one mode.
+
+    Attributes
+    ----------
+    plan
+        What it was run with.
+    impact
+        Whether it began with an impact.
+    time
+        Sample times, shape (samples,).
+    coordinates, speeds
+        Of the form, projected where the form has constraints, orientations with coordinates of size one; shape
+        (number, samples).
+    shown
+        Which samples are outputs.
+    held
+        By how much the solver's own states missed the constraints on position and velocity, shape (2, samples).
+    passages
+        Singular positions that it passed through.
+    after_time_event
+        Whether it began at a time event, at which energy that comes or goes is work of inputs and drives.
+    """
+
+    plan: Plan
+    impact: bool
+    time: FloatArray
+    coordinates: FloatArray
+    speeds: FloatArray
+    shown: NDArray[np.bool_]
+    held: FloatArray
+    passages: tuple[Passage, ...] = ()
+    after_time_event: bool = False
+
+    @property
+    def assembly(self) -> Assembly:
+        """The scene in this mode."""
+        return self.plan.assembly
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Samples that are done: shapes (samples,), (number, samples) and (2, samples)."""
+
+    time: FloatArray
+    q: FloatArray
+    u: FloatArray
+    shown: NDArray[np.bool_]
+    held: FloatArray
+
+    def without_last(self) -> _Block:
+        return self.first(len(self.time) - 1)
+
+    def first(self, count: int) -> _Block:
+        return _Block(self.time[:count], self.q[:, :count], self.u[:, :count], self.shown[:count], self.held[:, :count])
+
+
+class Recorder:
+    """Takes up samples of a segment; they are projected many at a time.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.passages: list[Passage] = []
+        # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
+        self._samples: tuple[tuple[_Block, ...], list[tuple[float, FloatArray, bool]]] = ((), [])
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample; minus infinity if there is none."""
+        blocks, pending = self._samples
+        if pending:
+            return pending[-1][0]
+        return float(blocks[-1].time[-1]) if blocks else -np.inf
+
+    def take(self, t: float, y: FloatArray, shown: bool) -> None:
+        """Record a state of the solver; one at the time of the last takes its place, as after an event.
+
+        Raises
+        ------
+        SolveError
+            If states cannot be projected, since constraints contradict each other; what came before is kept.
+        """
+        blocks, pending = self._samples
+        if t == self.end:
+            if pending:
+                pending[-1] = (t, y, shown)
+                return
+            last = blocks[-1].without_last()
+            blocks = (*blocks[:-1], last) if len(last.time) else blocks[:-1]
+            self._samples = (blocks, [(t, y, shown)])
+            return
+        pending.append((t, y, shown))
+        if len(pending) >= _PENDING:
+            self.settle()
+
+    def take_many(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_]) -> None:
+        """Record states of the solver after the last sample, one row each."""
+        if len(t):
+            self.settle()
+            self._finish(t, y, shown)
+
+    def pass_over(self, passage: Passage, t: FloatArray, shown: NDArray[np.bool_]) -> None:
+        """Record a passage, in place of all samples since its start; its states are not to be projected.
+
+        Parameters
+        ----------
+        passage
+            The passage, with its path.
+        t, shown
+            Sample times on its way, and which of them are outputs.
+        """
+        assert passage.path is not None
+        self._rewind(passage.path.start)
+        self.settle()
+        self.passages.append(passage)
+        if len(t):
+            q, u, _ = passage.path.at(t)
+            q = self.plan.balance.turning.normalized(q)
+            self._add(_Block(t, q, u, shown.copy(), misses_of(self.plan, t, q, u)))
+
+    def note(self, passages: Sequence[Passage]) -> None:
+        """Record passages that the solver made by itself; states quite near the place cannot be projected well."""
+        self.settle()
+        for passage in passages:
+            self.passages.append(passage)
+            for block in self._samples[0]:
+                inside = passage.has_in_its_middle(block.time)
+                if passage.path is not None and inside.any():
+                    q, u, _ = passage.path.at(block.time[inside])
+                    block.q[:, inside], block.u[:, inside] = self.plan.balance.turning.normalized(q), u
+
+    def _rewind(self, t: float) -> None:
+        """Forget all samples after a time."""
+        blocks, pending = self._samples
+        kept = (one.first(int(np.searchsorted(one.time, t, side="right"))) for one in blocks)
+        self._samples = (tuple(one for one in kept if len(one.time)), [one for one in pending if one[0] <= t])
+
+    def settle(self) -> None:
+        """Project all that waits."""
+        self._settle(len(self._samples[1]))
+
+    def _settle(self, count: int) -> None:
+        """Project the first of what waits."""
+        pending = self._samples[1]
+        if not pending:
+            return
+        t = np.array([one[0] for one in pending[:count]])
+        y = np.array([one[1] for one in pending[:count]])
+        self._finish(t, y, np.array([one[2] for one in pending[:count]]), pending[count:])
+
+    def last(self) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+        """Return time, coordinates and speeds of the last sample, and by how much the constraints were missed."""
+        self.settle()
+        block = self._samples[0][-1]
+        return float(block.time[-1]), block.q[:, -1], block.u[:, -1], block.held[:, -1]
+
+    def close(self) -> float:
+        """Show the last sample, and return its time; what there is no time left to project is dropped."""
+        with more_time():
+            try:
+                while self._samples[1]:
+                    self._settle(_LAST)
+            except TimeIsUp:
+                self._samples = self._samples[0], []
+        if self._samples[0]:
+            self._samples[0][-1].shown[-1] = True
+        return self.end
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing has been recorded, and nothing waits."""
+        return not any(self._samples)
+
+    def segment(self, impact: bool, after_time_event: bool = False) -> Segment:
+        """Return what was recorded."""
+        self.settle()
+        blocks = self._samples[0]
+        q, u, held = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u", "held"))
+        time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
+        return Segment(self.plan, impact, time, q, u, shown, held, tuple(self.passages), after_time_event)
+
+    def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: _Waiting = ()) -> None:
+        q, u = (part.copy() for part in self.plan.program.split(y.T))
+        q = self.plan.balance.turning.normalized(q)
+        if not self.plan.balance.constraints:
+            self._add(_Block(t, q, u, shown, np.zeros((2, len(t)))), waiting)
+            return
+        made = project_states(self.plan, t, q, u)
+        if not self.plan.is_projected:
+            self._add(_Block(t, q, u, shown, made.held), waiting)
+            return
+        block = _Block(t, made.coordinates, made.speeds, shown, made.held)
+        for i in np.flatnonzero(made.doubtful):
+            try:
+                block.q[:, i], block.u[:, i] = project_safely(self.plan, float(t[i]), q[:, i], u[:, i])
+            except SolveError:
+                self._add(block.first(int(i)))
+                raise
+        self._add(block, waiting)
+
+    def _add(self, block: _Block, waiting: _Waiting = ()) -> None:
+        blocks = self._samples[0]
+        self._samples = ((*blocks, block) if len(block.time) else blocks, list(waiting))

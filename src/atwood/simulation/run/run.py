@@ -1,0 +1,382 @@
+"""Runs: from start to end through all modes, with projected outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.clock import GRACE, Clock, TimeIsUp
+from atwood.errors import AtwoodError, SolveError, StartError, TopologyError, UnsupportedError
+from atwood.forms.assembly import Assembly
+from atwood.forms.shared import Shared
+from atwood.integrators.protocol import Statistics
+from atwood.simulation.dynamics.orientation_coordinates import CHART, Reassemble, Restated, enter_charts, to_regular
+from atwood.simulation.dynamics.scales import scene_length
+from atwood.simulation.dynamics.undefined_values import missing_at
+from atwood.simulation.events.impacts_in_time import pass_time_event
+from atwood.simulation.events.modes import EventProbe, Happening, enter_mode
+from atwood.simulation.events.time_events import Schedule, find_schedule
+from atwood.simulation.initialization.mobility import refuse_immobile
+from atwood.simulation.initialization.start import Start, settle
+from atwood.simulation.problem.arguments import check_span
+from atwood.simulation.problem.options import RunOptions, Samples, sample_times
+from atwood.simulation.problem.problem import Plan, make_plan
+from atwood.simulation.run.choice import Choice, check_solver, choose, describe_choices
+from atwood.simulation.run.record import Recorder, Segment
+from atwood.simulation.run.segment import Outcome, Stretch, run_stretch
+from atwood.simulation.run.tolerances import allowed
+from atwood.simulation.singular.crossing import Passage
+from atwood.topology.charts import Orientation
+
+__all__ = ["Run", "run", "run_out_of_time"]
+
+
+_CHATTER = 50
+"""So many changes of mode without time passing end a run."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What a run produced.
+
+    Attributes
+    ----------
+    assembly
+        The scene as it was assembled at the start.
+    segments
+        The stretches between changes of mode; none where time was used up before the start was recorded.
+    happenings
+        Events, in order.
+    statistics
+        What the solver did.
+    status
+        ``"finished"``, ``"stopped"`` by an event, or ``"step_limit"``, ``"time_limit"``, ``"interrupted"``,
+        ``"failed"``.
+    message
+        Why it ended, in words.
+    start
+        The start; None where time was used up before it was found.
+    options
+        What was asked for.
+    choices
+        What solved it and why, one after the other.
+    restated
+        When which orientation went on in other coordinates, since these came near to where they are singular.
+    again
+        Makes the same run with other options, and with samples in between that change nothing.
+    """
+
+    assembly: Assembly
+    segments: tuple[Segment, ...]
+    happenings: tuple[Happening, ...]
+    statistics: Statistics
+    status: str
+    message: str
+    start: Start | None
+    options: RunOptions
+    choices: tuple[Choice, ...]
+    restated: tuple[Restated, ...] = ()
+    again: Callable[[RunOptions, FloatArray], Run] | None = None
+
+    @property
+    def passages(self) -> tuple[Passage, ...]:
+        """Singular positions that it passed through, or came too close to, in order."""
+        return tuple(one for segment in self.segments for one in segment.passages if one.is_told)
+
+    @property
+    def solver(self) -> str:
+        """What solved it, at last: a key of `SOLVERS`."""
+        return self.choices[-1].solver
+
+    @property
+    def why(self) -> str:
+        """What solved it and why, as a sentence."""
+        return describe_choices(self.choices)
+
+
+def run(
+    assembly: Assembly, start: Start, options: RunOptions, reassemble: Reassemble, clock: Clock | None = None
+) -> Run:
+    """Run a scene from its start to its end.
+
+    Parameters
+    ----------
+    assembly, start
+        The scene and its start.
+    options
+        How.
+    reassemble
+        Gives the scene in other modes and charts, with lengths on a line signed as given.
+    clock
+        Its limit of time; one that begins now if not given.
+
+    Raises
+    ------
+    UsageError
+        If the end is not after the start.
+    TopologyError
+        If nothing can move, and no structure is meant.
+    SolveError
+        If the solver fails; what came before is in its `run` attribute.
+    """
+    t = start.time
+    check_span(t, options.t_end, options.max_step)
+    check_solver(options.solver)
+    options = allowed(options)
+    clock = Clock(options.max_seconds) if clock is None else clock
+
+    def prepared(options: RunOptions, between: FloatArray) -> _Walk:
+        samples = sample_times(t, options)
+        schedule = find_schedule(assembly, t, options.t_end).at_samples(samples.times)
+        _check_prescribed(schedule.rows(assembly, samples.times), samples.times)
+        walk = _Walk(assembly, start, options, reassemble, samples.with_more(between), again)
+        walk.prepare()
+        return walk
+
+    def again(options: RunOptions, between: FloatArray) -> Run:
+        return prepared(options, between).go()
+
+    try:
+        with clock.kept(GRACE):
+            walk = prepared(options, np.zeros(0))
+    except TimeIsUp:
+        return run_out_of_time(assembly, start, options)
+    with clock.kept():
+        return walk.go()
+
+
+def run_out_of_time(assembly: Assembly, start: Start | None, options: RunOptions) -> Run:
+    """Return a run whose time was used up before its start was recorded.
+
+    Parameters
+    ----------
+    assembly, start, options
+        As of `run`; no start where it was not found.
+    """
+    message = f"the limit of {options.max_seconds:g} s was used up before the start was found"
+    return Run(assembly, (), (), Statistics(), "time_limit", message, start, options, ())
+
+
+class _Walk:
+    """The way of a run through its modes."""
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        start: Start,
+        options: RunOptions,
+        reassemble: Reassemble,
+        samples: Samples,
+        again: Callable[[RunOptions, FloatArray], Run],
+    ) -> None:
+        self.start, self.options, self._other = start, options, reassemble
+        self.samples, self.again = samples, again
+        self._schedules: dict[int, tuple[Shared, Schedule]] = {}
+        self._plans: dict[tuple[float, ...], Plan] = {}
+        self._piece_start = start.time
+        self.segments: list[Segment] = []
+        self.happenings: list[Happening] = []
+        self.choices: list[Choice] = []
+        self.statistics = Statistics(error_test_failures=0, convergence_failures=0)
+        self.t = start.time
+        self.assembly, self.q, self.u = settle(assembly, start, reassemble)
+        self.assembly = self.first = self._in_piece(self.assembly)
+        self.restated: list[Restated] = []
+        self.impact, self.show = False, bool(samples.shown[0])
+        self.plan: Plan | None = None
+        self.probe: EventProbe | None = None
+        self.choice: Choice
+
+    def go(self) -> Run:
+        """Go from mode to mode to the end; whatever stops it on the way takes along what came before."""
+        try:
+            return self._go()
+        except TimeIsUp:  # while the scene was prepared in another mode
+            return self._run_so_far("time_limit", self.options.out_of_time(self.t))
+        except AtwoodError as error:
+            if self.segments and not hasattr(error, "run"):
+                error.run = self._run_so_far("failed", error.message)  # type: ignore[attr-defined]
+            raise
+
+    def _go(self) -> Run:
+        chatter = 0
+        while True:
+            before = self.t
+            recorder, outcome = self._stretch()
+            self.t = outcome.t
+            chatter = chatter + 1 if outcome.t - before < 1e-9 * (self.options.t_end - self.start.time) else 0
+            if outcome.happening is None:
+                if outcome.status == "finished" and outcome.t < self.options.t_end:
+                    _, self.q, self.u, _ = recorder.last()
+                    self.impact, chatter = False, 0
+                    continue
+                return self._made(outcome.status, outcome.message, outcome)
+            is_chart = outcome.happening.target == CHART
+            if not is_chart:
+                self.happenings.append(outcome.happening)
+            if outcome.happening.target == "stop":
+                return self._made("stopped", outcome.happening.describe(), outcome)
+            if chatter > _CHATTER:
+                endless = f"{outcome.happening.part} changes its mode endlessly at t = {self.t:.9g}"
+                return self._made("failed", endless, outcome)
+            self._change_chart(outcome.happening, recorder) if is_chart else self._enter(outcome.happening, recorder)
+            if self.t >= self.options.t_end:
+                return self._made("finished", "", outcome)
+
+    def _stretch(self) -> tuple[Recorder, Outcome]:
+        """Run one stretch in the present mode, until the next time event at most."""
+        options, schedule = self.options, self._schedule(self.assembly)
+        self.t = schedule.reached(self.t)
+        after_time_event = schedule.piece(self.t) != schedule.piece(self._piece_start)
+        if after_time_event:
+            self._pass_time_event()
+        t, q, u = self.t, self.q, self.u
+        self.prepare()
+        assert self.plan is not None
+        assert self.probe is not None
+        limit = schedule.next(t, options.t_end)
+        ahead = self.samples.until(t, limit)
+        if limit < options.t_end:  # the state just after it is shown
+            ahead = ahead.without_last_shown()
+        stretch = Stretch(self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics)
+        recorder = Recorder(self.plan)
+        outcome = run_stretch(stretch, recorder, t, q, u)
+        if recorder.is_empty and outcome.error is not None:  # not even the start could be projected
+            raise outcome.error
+        if recorder.is_empty:  # nor was there time to
+            return recorder, outcome
+        self.segments.append(recorder.segment(self.impact, after_time_event))
+        self.statistics = self.statistics + outcome.statistics
+        self.restated += outcome.restated
+        for choice in outcome.choices:
+            if not self.choices or choice.solver != self.choices[-1].solver:
+                self.choices.append(choice)
+        self.choice = outcome.choices[-1]
+        return recorder, outcome
+
+    def prepare(self) -> None:
+        """Make all that is needed in the present mode, and between two time events, if it is not there."""
+        t, q, u, options = self.t, self.q, self.u, self.options
+        plan = self.plan
+        if plan is None:
+            plan = self._plan()
+            if not self.segments and not options.structure:
+                refuse_immobile(self.assembly, len(plan.assembly.equations.speeds) - plan.finding.rank, self.start)
+            self._plans, self.probe = {}, None
+            self.choice = choose(plan, options, t, q, u)
+        self._plans.setdefault(self.assembly.relation_values, plan)
+        if self.probe is None:
+            self.probe = EventProbe(plan, t, q, u, options.relative_tolerance)
+        self.plan = plan
+
+    def _plan(self) -> Plan:
+        """Return the plan of a mode from the present state; if a law has no value there, it is named."""
+        span = self.options.t_end - self.start.time
+        try:
+            return make_plan(self.assembly, self.t, self.q, self.u, self.start.length, span)
+        except UnsupportedError:
+            raise
+        except AtwoodError as error:
+            found = missing_at(self.assembly, self.t, self.q, self.u)
+            if found is None:
+                raise
+            raise StartError(
+                f"{found.describe()}, so that there is nothing to start from",
+                where=found.part,
+                advice="Do two points coincide that a spring, damper or rope joins? Give start positions that part "
+                "them; or look at the formula of the law.",
+            ) from error
+
+    def _schedule(self, assembly: Assembly) -> Schedule:
+        """Return the time events of a scene in one mode."""
+        key = id(assembly.shared)
+        if key not in self._schedules:
+            schedule = find_schedule(assembly, self.start.time, self.options.t_end).at_samples(self.samples.own)
+            self._schedules[key] = assembly.shared, schedule  # kept, so that its identity stays its own
+        return self._schedules[key][1]
+
+    def _in_piece(self, assembly: Assembly) -> Assembly:
+        """Return a scene with the relations of functions of time that hold in the present piece of the run."""
+        schedule = self._schedule(assembly)
+        return schedule.applied(assembly, schedule.piece(self._piece_start))
+
+    def _reassemble(
+        self,
+        modes: Mapping[str, str],
+        sides: Mapping[tuple[str, str, str], float],
+        orientation: Orientation,
+    ) -> Assembly:
+        return self._in_piece(self._other(modes, sides, orientation))
+
+    def _pass_time_event(self) -> None:
+        """Go on with the relations of functions of time that hold after a time event."""
+        self._piece_start, before = self.t, self.assembly
+        self.assembly = self._in_piece(before)
+        length = self.start.length
+        self.q, self.u, impacts = pass_time_event(before, self.assembly, self.t, self.q, self.u, length)
+        self.show = self.samples.shows(self.t)
+        if impacts:  # both states are shown, as at any event
+            self.happenings += impacts
+            self.impact = self.show = True
+            self.segments[-1].shown[-1] = True
+        if self.plan is not None:
+            self.probe = None
+            known = self._plans.get(self.assembly.relation_values)
+            self.plan = self.plan.in_piece(self.assembly) if known is None else known
+            self.assembly = self.plan.assembly
+            self.plan.review_dependent(self.t, self.q)
+
+    def _change_chart(self, happening: Happening, recorder: Recorder) -> None:
+        """Go on in other coordinates of an orientation."""
+        _, q, self.u, _ = recorder.last()
+        self.assembly, self.q = enter_charts(self.assembly, to_regular(self.assembly, q), self._reassemble)
+        self.plan, self.impact, self.show = None, False, False
+        self.restated.append(Restated(self.t, happening.part))
+
+    def _enter(self, happening: Happening, recorder: Recorder) -> None:
+        """Enter the mode that an event leads to."""
+        _, q, u, _ = recorder.last()
+        self.assembly, self.q, self.u = enter_mode(
+            (self.t, q, u), self.assembly, happening, self._reassemble, self.start.length
+        )
+        self.plan, self.impact, self.show = None, happening.impact, True
+
+    def _made(self, status: str, message: str, outcome: Outcome) -> Run:
+        """Return the run, or raise with it what made it fail."""
+        if outcome.error is not None:
+            message = outcome.error.message
+        made = self._run_so_far(status, message)
+        if status == "failed":
+            error = outcome.error or SolveError(
+                message, where=self.assembly.flat.name, advice="Look at what came before: the error's `run`."
+            )
+            error.run = made  # type: ignore[attr-defined]
+            raise error
+        return made
+
+    def _run_so_far(self, status: str, message: str) -> Run:
+        parts = (self.first, tuple(self.segments), tuple(self.happenings), self.statistics, status, message)
+        return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.restated), self.again)
+
+
+def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
+    """Refuse motions that are prescribed for what is held, or twice over, where they contradict each other."""
+    prescribed = assembly.equations.prescribed
+    if not prescribed:
+        return
+    program = assembly.known_program("prescribed", "prescribed", lambda: [value for _, value in prescribed])
+    n, m = len(assembly.equations.coordinates), len(assembly.equations.speeds)
+    idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
+    misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])
+    if float(np.max(misses)) > 1e-9 * scene_length(assembly):
+        worst, moment = np.unravel_index(int(np.argmax(misses)), misses.shape)
+        part, law, _ = prescribed[int(worst)][0]
+        raise TopologyError(
+            f"it cannot hold: at t = {times[moment]:.6g} what is prescribed contradicts what is held, by "
+            f"{misses[worst, moment]:.3g}",
+            where=f"{part}.{law}",
+            advice="Two drives, or a drive and a fixed part, say different things about the same motion.",
+        )

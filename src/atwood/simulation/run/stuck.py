@@ -1,0 +1,42 @@
+"""What moves fastest where a solver cannot go on, for the error that says so."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from atwood.errors import SolveError
+from atwood.integrators.protocol import Advance
+from atwood.simulation.dynamics.scales import motion_names, motion_scales
+from atwood.simulation.problem.problem import Plan
+
+__all__ = ["explain_stuck"]
+
+
+def explain_stuck(plan: Plan, failed: Advance) -> SolveError | None:
+    """Return the error of a run that failed, with the motion that changes fastest there; None if nothing moves.
+
+    Changes of speeds are compared in units of the scene's length, or one radian, so that metres and radians compare.
+
+    Parameters
+    ----------
+    plan
+        What was solved.
+    failed
+        How it ended.
+    """
+    equations = plan.assembly.equations
+    _, speeds = plan.program.split(failed.y)
+    _, rates = plan.program.split(failed.yp)
+    sizes = motion_scales(equations, plan.scales.length)
+    changes = np.abs(np.where(np.isfinite(rates), rates, np.inf)) / sizes
+    if not len(changes) or not np.max(changes) > 0.0:
+        return None
+    fastest = int(np.argmax(changes))
+    unit = equations.speed_names[fastest].unit
+    name = motion_names(equations)[fastest]
+    return SolveError(
+        f"{failed.message}; what changes fastest there is {name}, at {speeds[fastest]:.3g} {unit} and by "
+        f"{rates[fastest]:.3g} {unit} in a second",
+        where=plan.assembly.flat.name,
+        advice=f"Look at what acts on {name}, and at what came before: the error's `run`.",
+    )

@@ -1,0 +1,75 @@
+"""Tolerances that rounding does not allow: which is the least that is taken, and which would do where a run fails."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+from atwood.errors import AtwoodError, SolveError
+from atwood.integrators.protocol import Advance, Budget, Status
+from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.run.session import Order, open_implicit_session
+
+__all__ = ["allowed", "too_tight"]
+
+LEAST = 1e-15
+"""The least relative tolerance: a few times the relative error of one operation."""
+
+_TIGHT = 1e-9
+"""Failures at larger tolerances have other causes than rounding."""
+
+_TRIAL = 300
+"""So many steps show whether a run gets on with a tolerance."""
+
+_ENOUGH = 1e-6
+"""The share of the run that they must cover at least."""
+
+
+def allowed(options: RunOptions) -> RunOptions:
+    """Return options with a tolerance that the arithmetic can meet; it is said in a warning if that is another one.
+
+    Parameters
+    ----------
+    options
+        What was asked for.
+    """
+    asked = options.relative_tolerance
+    if not 0.0 < asked < LEAST:
+        return options
+    warnings.warn(
+        f"rtol = {asked:g} is below what rounding allows: {LEAST:g} is taken instead, about the error of a few "
+        "operations",
+        stacklevel=4,
+    )
+    return replace(options, relative_tolerance=LEAST)
+
+
+def too_tight(order: Order, solver: str, failed: Advance) -> SolveError | None:
+    """Return the error of a run that failed since its tolerance is below what rounding allows; None if it is not.
+
+    Larger tolerances are tried from where it failed.
+
+    Parameters
+    ----------
+    order, solver
+        What was to be solved, and by which kind of IDA.
+    failed
+        How it ended.
+    """
+    options, t = order.options, failed.t
+    asked = options.relative_tolerance
+    if asked > _TIGHT or not t < order.end:
+        return None
+    for factor in (10.0, 100.0, 1000.0):
+        looser = replace(order, options=replace(options, relative_tolerance=factor * asked), budget=Budget(_TRIAL))
+        try:
+            found = open_implicit_session(looser, solver, t, failed.y, failed.yp).advance(order.end)
+        except AtwoodError:
+            continue
+        if found.status is not Status.FAILED and found.t - t >= _ENOUGH * (order.end - t):
+            return SolveError(
+                f"the relative tolerance, {asked:g}, is below what rounding allows here: {failed.message}",
+                where=order.plan.assembly.flat.name,
+                advice=f"With rtol={factor * asked:g} it goes on.",
+            )
+    return None

@@ -1,0 +1,1 @@
+"""Singular positions: the monitor that finds them and the crossing."""

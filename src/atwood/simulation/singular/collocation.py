@@ -1,0 +1,274 @@
+"""A stretch of a motion as polynomials of time, found where single steps cannot go.
+
+The polynomials fulfil the equations at the points of Gauss and Legendre, none of which lies in the middle of the
+stretch or at its ends (E. Hairer, S. P. Norsett and G. Wanner, *Solving Ordinary Differential Equations I*, section
+II.7). So they pass smoothly over a place in the middle where the equations determine nothing. They are found by
+repeated integration, with each state projected onto the constraints before forces are asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import TypeAlias
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from atwood.errors import AtwoodError
+from atwood.integrators.protocol import FloatArray
+from atwood.simulation.dynamics.reactions import accelerations_at
+from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.projection import Held, nearly_projected, project_safely, project_states
+
+__all__ = ["Arc", "Path", "find_arc", "follow"]
+
+States: TypeAlias = tuple[FloatArray, FloatArray]
+"""Coordinates and speeds, each of shape (number, times)."""
+
+_POINTS = 12
+"""Of the polynomials."""
+
+_DERIVATIVE = legendre.legder(np.eye(_POINTS + 1))
+"""Gives coefficients of the derivative of a polynomial from its own."""
+
+_LAST = 2
+"""What the last so many coefficients add up to tells the error of a polynomial."""
+
+_SWEEPS = 60
+_PATIENCE = 8
+"""In so many sweeps changes must become clearly smaller."""
+
+_CLOSE = 3e-2
+"""Once a sweep changes less, one Newton step is enough to project what it gave."""
+
+_SETTLED = 1e-14
+_ROUNDED = 1e-8
+"""Relative to the scene's sizes: changes that are smaller and do not shrink any more are those of rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """A motion from one time to another.
+
+    Attributes
+    ----------
+    start, end
+        When, s.
+    coordinates, speeds
+        Coefficients of Legendre polynomials of time, from -1 at the start to 1 at the end; shape (order, number).
+    error
+        Estimate of the largest error of its states, relative to the scene's sizes.
+    """
+
+    start: float
+    end: float
+    coordinates: FloatArray
+    speeds: FloatArray
+    error: float
+
+    def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return coordinates, speeds and accelerations at times, each of shape (number, times)."""
+        x = (2.0 * np.asarray(t, dtype=float) - self.start - self.end) / (self.end - self.start)
+        each = legendre.legvander(x, len(self.speeds) - 1)
+        slope = (_DERIVATIVE @ self.speeds) * (2.0 / (self.end - self.start))
+        return (each @ self.coordinates).T, (each @ self.speeds).T, (each[:, :-1] @ slope).T
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A motion as arcs, each beginning where the one before ends."""
+
+    arcs: tuple[Arc, ...]
+
+    @property
+    def start(self) -> float:
+        """When it begins, s."""
+        return self.arcs[0].start
+
+    @property
+    def end(self) -> float:
+        """When it ends, s."""
+        return self.arcs[-1].end
+
+    def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return coordinates, speeds and accelerations at times, each of shape (number, times)."""
+        t = np.asarray(t, dtype=float)
+        if len(self.arcs) == 1:
+            return self.arcs[0].at(t)
+        which = np.clip(np.searchsorted([one.start for one in self.arcs], t, side="right") - 1, 0, None)
+        shapes = (self.arcs[0].coordinates.shape[1], self.arcs[0].speeds.shape[1], self.arcs[0].speeds.shape[1])
+        found = tuple(np.zeros((number, len(t))) for number in shapes)
+        for i in np.unique(which):
+            for all_of, some in zip(found, self.arcs[i].at(t[which == i]), strict=True):
+                all_of[:, which == i] = some
+        return found[0], found[1], found[2]
+
+
+def find_arc(
+    plan: Plan,
+    t: float,
+    q: FloatArray,
+    u: FloatArray,
+    end: float,
+    guess: Callable[[FloatArray], States | None] | None = None,
+) -> Arc | None:
+    """Return how a motion goes on from a state; None where no smooth motion is found.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    t, q, u
+        A state that fulfils the constraints.
+    end
+        When the arc is to end. A place where constraints depend on each other may lie in the middle between.
+    guess
+        Gives coordinates and speeds at times, about, or None where it cannot; then they are those of the state.
+    """
+    x, _ = _points()
+    times = t + 0.5 * (end - t) * (x + 1.0)
+    try:
+        with np.errstate(all="ignore"):
+            known = None if guess is None else guess(times)
+            begin = known or (np.repeat(q[:, None], _POINTS, 1), np.repeat(u[:, None], _POINTS, 1))
+            return _settle(plan, (t, q, u), end, times, begin, known is None)
+    except AtwoodError:  # a state without a value, or without accelerations: nothing goes on smoothly here
+        return None
+
+
+@cache
+def _points() -> tuple[FloatArray, FloatArray]:
+    """Return the points, and the matrix that gives coefficients of the integral from values at them."""
+    x, weights = legendre.leggauss(_POINTS)
+    order = np.arange(_POINTS)
+    coefficients = (order + 0.5)[:, None] * (legendre.legvander(x, _POINTS - 1) * weights[:, None]).T
+    return x, np.asarray(legendre.legint(coefficients, lbnd=-1), dtype=np.float64)
+
+
+_REACH = legendre.legvander(legendre.leggauss(_POINTS)[0], _POINTS)
+"""Gives values at the points from coefficients."""
+
+
+def _settle(
+    plan: Plan,
+    begin: tuple[float, FloatArray, FloatArray],
+    end: float,
+    times: FloatArray,
+    guess: States,
+    is_far: bool,
+) -> Arc | None:
+    """Integrate the rates at the points again and again until nothing changes."""
+    t, q, u = begin
+    integral = _points()[1]
+    half = 0.5 * (end - t)
+    kept = np.asarray(plan.finding.kept, dtype=np.intp)
+    last, sizes = np.inf, []
+    places, speeds = guess
+    for _ in range(_SWEEPS):
+        held = _held(plan, times, places, speeds, is_far)
+        accelerations = accelerations_at(plan.assembly, plan.assembly.form, times, held.coordinates, held.speeds, kept)
+        turned = half * (integral @ accelerations.T)
+        turned[0] += u
+        later = (_REACH @ turned).T  # known already, and twice as near as what the places would follow from
+        rates = plan.balance.turning.rates_each(times, held.coordinates, held.hold(later))
+        moved = half * (integral @ rates.T)
+        moved[0] += q
+        now = (_REACH @ moved).T, later
+        change = _size(plan, now[0] - places, now[1] - speeds)
+        places, speeds = now
+        if not np.isfinite(change) or change > 1e3:
+            return None
+        sizes.append(change)
+        if len(sizes) > _PATIENCE and change > 0.3 * sizes[-_PATIENCE] and change > _ROUNDED:
+            return None
+        left = change * change / last if last < np.inf else change  # what the next sweep would change, about
+        if min(change, 10.0 * left) < _SETTLED or (change < _ROUNDED and change >= 0.5 * last):
+            rest = np.sum(np.abs(moved[-_LAST:]), axis=0), np.sum(np.abs(turned[-_LAST:]), axis=0)
+            return Arc(t, end, moved, turned, max(min(change, left), _size(plan, *rest)))
+        last, is_far = change, change > _CLOSE
+    return None
+
+
+def _held(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray, is_far: bool) -> Held:
+    """Return states near the constraints, or at first far from them, that are projected onto these."""
+    if not plan.balance.constraints:
+        return Held(q, u, lambda speeds: speeds)
+    if not is_far:
+        return nearly_projected(plan, t, q, u)
+    made = project_states(plan, t, q, u)
+    q, u = made.coordinates, made.speeds
+    bad = made.doubtful | ~np.all(np.isfinite(q), axis=0) | ~np.all(np.isfinite(u), axis=0)
+    for i in np.flatnonzero(bad):
+        q[:, i], u[:, i] = project_safely(plan, float(t[i]), q[:, i], u[:, i])
+    return Held(q, u, lambda speeds: speeds)
+
+
+def _size(plan: Plan, q: FloatArray, u: FloatArray) -> float:
+    """Return the size of a difference of states, relative to the scene's sizes."""
+    places = np.max(np.abs(q) / plan.coordinate_sizes[:, None], initial=0.0)
+    return float(max(places, np.max(np.abs(u) * plan.scales.time / plan.sizes[:, None], initial=0.0)))
+
+
+_SMALLEST = 1e-9
+"""Arcs of this length, relative to the whole, are not tried."""
+
+_TRIES, _FEWEST, _WORK = 600, 60, 60_000
+"""So many arcs are tried, fewer where there are many unknowns: so many divided by their number."""
+
+_NOISE, _LOUDEST = 1e-13, 2e-7
+"""Rounding, which grows with how near a singular position is, and where it hides which way a motion goes on."""
+
+
+def follow(
+    plan: Plan,
+    state: tuple[float, FloatArray, FloatArray],
+    end: float,
+    tolerance: float,
+    measure: Callable[[FloatArray, FloatArray], FloatArray],
+) -> Path | None:
+    """Return how a motion goes on past a singular position that it comes close to; None if it cannot be followed.
+
+    Arcs become so short that none of them leaps over what it should turn away from: a measure of how near the position
+    is falls on none of them to less than a half.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    state
+        Time, coordinates and speeds, which fulfil the constraints.
+    end
+        When the path is to end.
+    tolerance
+        The error of an arc, relative to the scene's sizes, where rounding leaves room for it.
+    measure
+        Gives the measure at times and places.
+    """
+    t, q, u = state
+    whole, arcs = end - t, []
+    h = 0.25 * whole
+    far = here = float(measure(np.array([t]), q[:, None])[0])
+    x = _points()[0]
+    for _ in range(int(np.clip(_WORK / plan.program.size, _FEWEST, _TRIES))):
+        h = min(h, end - t)
+        arc = find_arc(plan, t, q, u, t + h)
+        noise = _NOISE * far / here
+        if noise > _LOUDEST:
+            return None
+        if arc is not None and arc.error < max(tolerance, noise):
+            times = np.append(t + 0.5 * h * (x + 1.0), arc.end)
+            away = measure(times, arc.at(times)[0])
+            if np.min(away) >= 0.5 * here:
+                arcs.append(arc)
+                if arc.end >= end:
+                    return Path(tuple(arcs))
+                q, u, _ = (one[:, 0] for one in arc.at(np.array([arc.end])))
+                q, u = project_safely(plan, arc.end, q, u)
+                t, here, h = arc.end, float(away[-1]), 1.6 * h
+                continue
+        h *= 0.4
+        if h < _SMALLEST * whole:
+            return None
+    return None

@@ -1,0 +1,143 @@
+"""Singular positions that a run passed through, or came close to.
+
+Where all bars of a row of parallelograms lie in one line some constraints follow from the others, and how the
+mechanism goes on is not determined by where it is. Its motion until then goes on smoothly in one way only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.errors import SolveError
+from atwood.integrators.event_location import EventWatch, Root, State
+from atwood.integrators.protocol import FloatArray
+from atwood.mechanics.dynamics.equations import Constraint
+from atwood.simulation.events.modes import EventProbe
+from atwood.simulation.problem.problem import Plan
+from atwood.simulation.singular.collocation import Path
+
+__all__ = ["Passage", "events_on", "stuck_at"]
+
+_PIECES = 8
+"""In so many pieces a path is searched for events."""
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """A singular position that a run passed through, or came close to.
+
+    Attributes
+    ----------
+    time
+        When, s.
+    ways
+        How many more degrees of freedom the mechanism has there than near by; zero where it only comes close.
+    constraints
+        What follows from the other constraints there, and nowhere near.
+    parts
+        The parts that these belong to.
+    path
+        The motion over the place or past it; None where it could not be told.
+    gap
+        By how much the constraints do not quite hold there, relative to the scene's sizes.
+    """
+
+    time: float
+    ways: int
+    constraints: tuple[str, ...]
+    parts: tuple[str, ...]
+    path: Path | None
+    gap: float = 0.0
+
+    @property
+    def is_told(self) -> bool:
+        """Whether there is something to tell: not where a motion only came close, and could be followed."""
+        return self.ways > 0 or self.path is None
+
+    def has_in_its_middle(self, t: FloatArray) -> NDArray[np.bool_]:
+        """Return which times are so near that states are better taken from the path than projected."""
+        return np.asarray(np.abs(t - self.time) < 0.1 * self._half)
+
+    def leaves_open(self, t: FloatArray) -> NDArray[np.bool_]:
+        """Return at which times reactions are not determined, within rounding."""
+        return np.asarray(np.abs(t - self.time) < 1e-6 * self._half) if self.ways else np.zeros(len(t), dtype=bool)
+
+    @property
+    def _half(self) -> float:
+        return 0.0 if self.path is None else self.path.end - self.time
+
+    def describe(self) -> str:
+        """Return it as a sentence."""
+        more = len(self.constraints) - 3
+        said = ", ".join(self.constraints[:3]) + (f" and {more} more" if more > 0 else "")
+        follow = "follows" if len(self.constraints) == 1 else "follow"
+        if self.path is None:
+            return (
+                f"t = {self.time:.6g} s: came so close to a singular position, where {said} nearly {follow} from the "
+                "other constraints, that it could not be told which way the mechanism goes on: do not rely on what "
+                "comes after"
+            )
+        return (
+            f"t = {self.time:.6g} s: passed through a singular position, where {said} {follow} from the other "
+            f"constraints and there {'is one more way' if self.ways == 1 else f'are {self.ways} more ways'} to move; "
+            f"went on smoothly{self._fit}"
+        )
+
+    @property
+    def _fit(self) -> str:
+        """What is to be said of lengths that do not quite fit."""
+        if self.gap < 1e-12:
+            return ""
+        return f" (lengths fit there to {self.gap:.0e} of the scene's size, which was taken for exactly)"
+
+
+def stuck_at(constraint: Constraint, t: float, message: str) -> SolveError:
+    """Return the error of a solver that failed at a singular position.
+
+    Parameters
+    ----------
+    constraint
+        What nearly follows from the other constraints there.
+    t
+        When.
+    message
+        What the solver said.
+    """
+    return SolveError(
+        f"near t = {t:.6g} the mechanism comes to a singular position, where {constraint.label} nearly follows from "
+        f"the other constraints, too slowly or too closely to tell which way it goes on: {message}",
+        where=constraint.key[0],
+        advice="Change lengths, start or speed a little, so that it clearly passes through or stays away.",
+    )
+
+
+def events_on(path: Path, plan: Plan, probe: EventProbe) -> Root | None:
+    """Return the first event on a path; None if there is none.
+
+    Parameters
+    ----------
+    path
+        The motion.
+    plan, probe
+        The scene in its mode, and what is watched.
+    """
+    if not probe.watches:
+        return None
+    size, n, m = plan.program.size, plan.program.coordinates, len(plan.sizes)
+
+    def at(t: float) -> State:
+        q, u, a = (one[:, 0] for one in path.at(np.array([t])))
+        y, yp = np.zeros(size), np.zeros(size)
+        y[:n], y[n : n + m], yp[n : n + m] = plan.balance.turning.normalized(q), u, a
+        yp[:n] = plan.balance.turning.rates(t, y[:n], u)
+        return t, y, yp
+
+    watch = EventWatch(plan.problem(probe.function(), probe.directions), path.end - path.start)
+    watch.restart(at(path.start))
+    times = np.linspace(path.start, path.end, _PIECES + 1).tolist()
+    found = (watch.search(one, other, at) for one, other in pairwise(times))
+    return next((root for root in found if root is not None), None)

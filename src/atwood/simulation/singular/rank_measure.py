@@ -1,0 +1,248 @@
+"""How near states of a mechanism with loops are to a singular position, and where a motion passes through one.
+
+At a singular position some constraints follow from the others which nowhere near do so. The measure is the smallest
+singular value of the independent constraints' slopes, scaled; for large scenes one that is near it and costs less:
+how long the shortest displacement is that changes all constraints by about as much. Either falls to zero at an even
+rate as the position is approached, and rises again behind it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from atwood.integrators.protocol import FloatArray
+from atwood.linalg.matrices import scaled, to_array
+from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.projection import ConstraintsAt, constraints_at
+from atwood.simulation.singular.collocation import Arc
+
+__all__ = ["Loss", "Nearness", "crossing", "find_loss", "nearly_lost"]
+
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+
+_LOST = 1e-5
+"""The measure at a singular position, relative to that a little away from it: what is left is that of rounding."""
+
+_SMALL = 40
+"""Up to so many constraints singular values cost little."""
+
+_HOLDS = 5e-10
+"""Relative to the scene's sizes: what a place that constraints admit may miss them by.
+
+Where links nearly fit, two ways of moving come close to each other and do not meet; a motion turns from one into the
+other within the root of what is missing, and must not be carried across.
+"""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What is lost at a singular position.
+
+    Attributes
+    ----------
+    rank
+        By how much the number of independent constraints is less there than near by; zero if only those that were
+        kept depend on each other, and some that were left out take their places.
+    constraints
+        Numbers of constraints that follow from those before them there, and nowhere near.
+    gap
+        By how much the place misses the constraints, relative to the scene's sizes.
+    """
+
+    rank: int
+    constraints: tuple[int, ...]
+    gap: float = 0.0
+
+
+class Nearness:
+    """How far states are from a singular position.
+
+    Each constraint is measured by how much it has changed most so far: one that hardly changes where it is asked for is
+    just what is looked for.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.rows = np.zeros(plan.balance.constraints)
+
+    def learn(self, t: FloatArray, q: FloatArray) -> FloatArray:
+        """Learn from states how much constraints change, and return the measure there; see `at`."""
+        now = self._constraints(t, q)
+        self.rows = np.maximum(self.rows, np.max(now.rows, axis=0))
+        return self._of(now)
+
+    def at(self, t: FloatArray, q: FloatArray) -> FloatArray:
+        """Return the measure, shape (states,).
+
+        Parameters
+        ----------
+        t, q
+            Times and places near the constraints, of shape (states,) and (number, states).
+        """
+        return self._of(self._constraints(t, q))
+
+    def _of(self, now: ConstraintsAt) -> FloatArray:
+        share, count = now.rows / self.rows, len(now.value)
+        if now.normal is None and len(now.kept) <= _SMALL:
+            slopes = (now.slope * share[:, :, None])[:, now.kept]
+            if not slopes.shape[1]:
+                return np.ones(count)  # what constraints there are follow from what is eliminated
+            if not np.all(np.isfinite(slopes)):
+                return np.full(count, np.nan)
+            return np.asarray(np.linalg.svd(slopes, compute_uv=False)[:, -1])
+        right = np.sin(_GOLDEN * np.arange(1.0, now.value.shape[1] + 1.0)) * np.ones((count, 1))
+        with np.errstate(all="ignore"):
+            step = now.step(right / share)
+            size: FloatArray = np.linalg.norm(right[:, now.kept], axis=1) / np.linalg.norm(step, axis=1)
+        return size
+
+    def slope_at(self, t: float, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return slopes of all constraints at one place, scaled, and by how much positions miss them."""
+        now = self.plan.balance.held(t, q, np.zeros_like(self.plan.sizes))
+        slope = to_array(scaled(now.slope, self.plan.sizes, self.rows))
+        return slope, np.abs(now.value / self.rows)[self.plan.balance.holonomic]
+
+    def _constraints(self, t: FloatArray, q: FloatArray) -> ConstraintsAt:
+        return constraints_at(self.plan, t, q, np.zeros((len(self.plan.sizes), len(t))))
+
+
+def crossing(measure: Nearness, arc: Arc) -> tuple[float, float] | None:
+    """Return when an arc passes closest to a singular position, and how far away it is at its ends; None if never.
+
+    Parameters
+    ----------
+    measure
+        The measure.
+    arc
+        The motion.
+    """
+    middle, half = 0.5 * (arc.start + arc.end), 0.5 * (arc.end - arc.start)
+    far = np.inf
+    for _ in range(2):  # once more near by, where nothing else bends the measure
+        times = middle + half * _POINTS[0]
+        away = measure.at(times, arc.at(times)[0])
+        root = _sign_change(away)
+        if root is None:
+            return None
+        far = min(far, float(max(away[0], away[-1])))
+        middle, half = middle + half * root, 0.3 * half
+    return middle, far
+
+
+_POINTS = legendre.leggauss(12)
+
+_SERIES = (np.arange(12) + 0.5)[:, None] * (legendre.legvander(_POINTS[0], 11) * _POINTS[1][:, None]).T
+"""Gives coefficients of Legendre polynomials from values at the points."""
+
+
+def _sign_change(away: FloatArray) -> float | None:
+    """Return where a measure at the points of Gauss and Legendre falls to zero to rise again; None if it does not.
+
+    What falls to zero and rises again is smooth if its sign changes there.
+    """
+    x = _POINTS[0]
+    order, least = np.arange(len(x)), int(np.argmin(away))
+    if not np.all(np.isfinite(away)) or least in (0, len(x) - 1):
+        return None
+    smoothest, found = np.inf, None
+    for first in (least, least + 1):  # the right one of two is that whose coefficients die away
+        series = _SERIES @ np.where(order < first, -away, away)
+        tail = float(np.sum(np.abs(series[-2:])))
+        if tail < smoothest:
+            smoothest, found = tail, _root(series, float(x[first - 1]), float(x[first]))
+    return found
+
+
+def _root(series: FloatArray, below: float, above: float) -> float:
+    """Return where a series of Legendre polynomials is zero between two places of which it has the signs - and +.
+
+    By false position, the end that stays being given half its weight (M. Dowell and P. Jarratt, *A modified regula
+    falsi method*, BIT 11, 1971).
+    """
+    coefficients = series.tolist()
+    low, high = legendre.legval([below, above], series).tolist()
+    x, last = below, 0.0
+    for _ in range(_ROOT_STEPS):
+        if not above - below > _ROOTED:
+            break
+        x = (below * high - above * low) / (high - low) if low < 0.0 < high else 0.5 * (below + above)
+        value = _clenshaw(coefficients, x)
+        if value == 0.0:
+            break
+        if value < 0.0:
+            below, low, high = x, value, 0.5 * high if last < 0.0 else high
+        else:
+            above, high, low = x, value, 0.5 * low if last > 0.0 else low
+        last = value
+    return x
+
+
+_ROOT_STEPS, _ROOTED = 60, 1e-15
+
+
+def _clenshaw(coefficients: list[float], x: float) -> float:
+    """Return the value of a series of Legendre polynomials at one place; numbers one by one are fastest here."""
+    value = after = 0.0
+    for k in range(len(coefficients) - 1, 0, -1):
+        value, after = coefficients[k] + ((2 * k + 1) * x * value) / (k + 1) - (k + 1) / (k + 2) * after, value
+    return coefficients[0] + x * value - 0.5 * after
+
+
+def find_loss(measure: Nearness, arc: Arc, t: float, away: float) -> Loss | None:
+    """Return what is lost at a time of an arc; None if that is no singular position.
+
+    Parameters
+    ----------
+    measure
+        The measure.
+    arc
+        A motion.
+    t
+        When it comes closest to a singular position.
+    away
+        The measure a little away from it.
+    """
+    finding, least = measure.plan.finding, _LOST * away
+    q = measure.plan.balance.turning.normalized(arc.at(np.array([t]))[0][:, 0])
+    slope, misses = measure.slope_at(t, q)
+    kept = list(finding.kept)
+    if not np.linalg.svd(slope[kept], compute_uv=False)[-1] < least:
+        return None
+    if not np.max(misses, initial=0.0) < _HOLDS:
+        return None
+    lost = finding.rank - int(np.sum(np.linalg.svd(slope, compute_uv=False) > least))
+    if lost <= 0:
+        return Loss(0, ())
+    left = set(_independent(slope, least))
+    return Loss(lost, tuple(i for i in kept if i not in left), float(np.max(misses, initial=0.0)))
+
+
+def nearly_lost(measure: Nearness, t: float, q: FloatArray) -> int:
+    """Return the number of the constraint that most nearly follows from the others at a place."""
+    slope, _ = measure.slope_at(t, measure.plan.balance.turning.normalized(q))
+    kept = list(measure.plan.finding.kept)
+    left = np.linalg.svd(slope[kept])[0]
+    return kept[int(np.argmax(np.abs(left[:, -1])))]
+
+
+def _independent(slope: FloatArray, least: float) -> list[int]:
+    """Return the numbers of rows that depend on none before them, by what is left of each, whatever its size."""
+    kept: list[int] = []
+    basis = np.empty((min(slope.shape), slope.shape[1]))
+    for i, row in enumerate(slope):
+        known = basis[: len(kept)]
+        left = row - (known @ row) @ known
+        left = left - (known @ left) @ known
+        rest = float(np.linalg.norm(left))
+        if rest > 10.0 * least and len(kept) < len(basis):
+            basis[len(kept)] = left / rest
+            kept.append(i)
+    return kept

@@ -1,1 +1,0 @@
-"""From a kernel to a motion: start values, integration, events, accuracy."""

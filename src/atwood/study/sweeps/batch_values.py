@@ -1,0 +1,307 @@
+"""Parameters and starts of many runs as arrays."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.errors import AtwoodError
+from atwood.expr import Expression
+from atwood.forms.assembly import Assembly
+from atwood.forms.shared import Slot, find_slots
+from atwood.forms.starting import starting
+from atwood.mechanics.kinematics.mechanism import extent
+from atwood.model.declare.component import Component
+from atwood.model.declare.parameter_expressions import Deferred
+from atwood.model.local.flatten import flatten
+from atwood.simulation.initialization.many import meet_speeds, size_rows
+from atwood.simulation.initialization.start import find_start
+from atwood.simulation.initialization.system import start_conditions
+from atwood.simulation.initialization.targets import Level, sort_targets
+from atwood.study.sweeps.cases import Axis
+from atwood.study.sweeps.runs import Order
+
+__all__ = ["ParameterRows", "StartRows"]
+
+
+class ParameterRows:
+    """The parameters of each run, in the order of the programs' parameters.
+
+    Parameters
+    ----------
+    order
+        What is to be run.
+    """
+
+    def __init__(self, order: Order) -> None:
+        self._order = order
+        assembly = order.assembly
+        axes = [(k, axis) for k, axis in enumerate(order.cases.axes) if not axis.is_start]
+        # Constants that the start gives are parameters, too.
+        self.varies = bool(axes or assembly.mechanism.constants)
+        self._lock = threading.Lock()
+        if not self.varies:
+            return
+        assert assembly.source is not None
+        assert assembly.source.scene is not None
+        self._scene = assembly.source.scene.copy()
+        self._source = assembly.source
+        numbers = {symbol.name: i for i, symbol in enumerate(assembly.parameters)}
+        slots = [(slot, numbers.get(name)) for name, slot in find_slots(assembly.flat) if slot.part]
+        # What follows from what is varied: arguments of the programs, and what must stay as it is.
+        followers = {slot: number for slot, number in slots if _is_bound(self._scene, slot)}
+        followed = {slot.part for slot in followers}
+        self._direct: list[tuple[int, int]] = []
+        self._through: list[tuple[int, Axis]] = []
+        for k, axis in axes:
+            own = {slot: number for slot, number in slots if f"{slot.part}.{slot.name}" == axis.path}
+            numbers_of = [number for slot, number in own.items() if number is not None and slot.axis is None]
+            if len(numbers_of) == 1 and not followed & {slot.part for slot in own}:
+                self._direct.append((k, numbers_of[0]))
+            else:
+                self._through.append((k, axis))
+                followers |= own
+        self._followers = list(followers.items())
+        mechanism = assembly.mechanism
+        # Parts that check how their values go together are looked at run by run.
+        varied = {slot.part for slot in followers} | {axis.path.rpartition(".")[0] for _, axis in axes}
+        kinds = {type(part.component) for path, part in assembly.flat.parts.items() if path in varied}
+        checks = any(kind.check_values is not Component.check_values for kind in kinds)
+        closures = mechanism.bodies.closures
+        is_plain = not mechanism.decisions and not mechanism.constants and not closures and not checks
+        self._is_simple = is_plain and not self._builds()
+
+    def _builds(self) -> bool:
+        """Return whether some model makes its parts from its parameters."""
+        if not self._through:
+            return False
+        stack = [self._scene]
+        while stack:
+            one = stack.pop()
+            if getattr(one, "_builds", lambda: False)():
+                return True
+            stack.extend(one._children().values())  # type: ignore[arg-type]
+        return False
+
+    def read(self, runs: NDArray[np.intp]) -> tuple[FloatArray | None, NDArray[np.bool_]]:
+        """Return the parameters of runs, one row each, and which of them keep the structure; None if all are the same.
+
+        Parameters
+        ----------
+        runs
+            Numbers of the runs.
+        """
+        usable = np.ones(len(runs), dtype=bool)
+        if not self.varies:
+            return None, usable
+        rows = np.tile(self._order.assembly.parameter_values, (len(runs), 1))
+        if self._is_simple:
+            for k, number in self._direct:
+                rows[:, number] = self._order.cases.column(k)[runs]
+                usable &= rows[:, number] != 0.0
+            if self._through:
+                with self._lock:
+                    for place, run in enumerate(runs.tolist()):
+                        usable[place] &= self._follow(run, rows[place])
+            return rows, usable
+        for place, run in enumerate(runs.tolist()):
+            found = self._assembly(run)
+            usable[place] = found is not None
+            if found is not None:
+                rows[place] = found.parameter_values
+        return rows, usable
+
+    def _follow(self, run: int, row: FloatArray) -> bool:
+        """Write what follows from the parameters of models; return whether the structure stays."""
+        cases, scene = self._order.cases, self._scene
+        for k, axis in self._through:
+            try:
+                scene.set(axis.path, axis.given[cases.places[k][run]])
+            except AtwoodError:
+                return False
+        try:
+            return all(self._take(slot, number, row) for slot, number in self._followers) and self._settings(row)
+        except AtwoodError:
+            return False
+
+    def _take(self, slot: Slot, number: int | None, row: FloatArray) -> bool:
+        value = self._scene[slot.part]._value(slot.name)
+        value = value if slot.axis is None or value is None else value[slot.axis]
+        if number is None:
+            before = slot.read(self._order.assembly.flat)
+            return value is before or (type(value) is type(before) and bool(value == before))
+        if not isinstance(value, (int, float)) or value == 0.0:
+            return False
+        row[number] = value
+        return True
+
+    def _settings(self, row: FloatArray) -> bool:
+        """Take up the scene's own gravity; its other settings must stay."""
+        flat, scene = self._order.assembly.flat, self._scene
+        names = [symbol.name for symbol in self._order.assembly.parameters]
+        now = getattr(scene, "gravity", flat.gravity)
+        if "gravity" in names and now != 0.0:
+            row[names.index("gravity")] = now
+        elif now != flat.gravity:
+            return False
+        kept = ("space", "t_start")
+        return all(getattr(scene, name, getattr(flat, name)) == getattr(flat, name) for name in kept)
+
+    def _assembly(self, run: int) -> Assembly | None:
+        cases, assembly = self._order.cases, self._order.assembly
+        try:
+            flat = flatten(self._source.changed(*cases.of(run), {}), assembly.flat.name)
+            return assembly.follow(flat, self._source)[0]
+        except AtwoodError:
+            return None
+
+    def assembly(self, run: int) -> Assembly:
+        """Return the assembly of one run, whose structure is that of all."""
+        found = self._assembly(run)
+        return found if found is not None else self._order.assembly
+
+
+def _is_bound(scene: object, slot: Slot) -> bool:
+    """Return whether a number follows from parameters of a model around its part."""
+    part = scene[slot.part]  # type: ignore[index]
+    return isinstance(part._settings.get(slot.name, part._field(slot.name).default), Deferred)
+
+
+class StartRows:
+    """The start of each run in generalized coordinates.
+
+    Parameters
+    ----------
+    order
+        What is to be run.
+    """
+
+    def __init__(self, order: Order) -> None:
+        self._order = order
+        assembly = order.assembly
+        equations = assembly.reduced
+        columns = {axis.path: order.cases.column(k) for k, axis in enumerate(order.cases.axes) if axis.is_start}
+        self._columns = columns
+        positions, speeds = sort_targets(assembly, equations)
+        self._positions = self._said(positions, equations.coordinates)
+        self._speeds = self._said(speeds, equations.speeds)
+        fixed = [one.observable.value for one in positions.fixed]
+        is_simple = len(self._positions) == len(positions.fixed) + len(positions.guessed) and len(set(fixed)) == len(
+            fixed
+        )
+        # Guesses of other speeds than the coordinates' own, and orientations in space, are for one run at a time.
+        is_simple = is_simple and not speeds.guessed and not equations.charts and starting(assembly) is assembly
+        self.is_direct = is_simple and not self._start_is_bound()
+        self._wanted = [columns.get(one.path, one.value) for one in speeds.fixed]
+        self._conditions = start_conditions(assembly, equations, speeds.fixed, True, True) if self.is_direct else None
+        flat = assembly.flat
+        self._lengths = [
+            columns.get(path, value)
+            for path, value in flat.start.items()
+            if assembly.start_observables[path].unit == "m"
+        ]
+
+    def _said(self, level: Level, unknowns: Sequence[Expression]) -> list[tuple[int, FloatArray | float]]:
+        """Return what is said of unknowns themselves: their numbers and values."""
+        found: list[tuple[int, FloatArray | float]] = []
+        for is_fixed, targets in ((False, level.guessed), (True, level.fixed)):
+            for one in targets:
+                if one.observable.value in unknowns:
+                    value = self._columns.get(one.path, one.value) if is_fixed else one.value
+                    found.append((unknowns.index(one.observable.value), value))
+        return found
+
+    def _start_is_bound(self) -> bool:
+        """Return whether a start value follows from a parameter that is varied."""
+        source = self._order.assembly.source
+        assert source is not None
+        if all(axis.is_start for axis in self._order.cases.axes):
+            return False
+        stack: list[object] = [source.scene]
+        while stack:
+            one = stack.pop()
+            starts = one._start_values() if hasattr(one, "_start_values") else {}
+            if any(isinstance(value, Deferred) for values in starts.values() for value in values.values()):
+                return True
+            stack.extend(one._children().values())  # type: ignore[attr-defined]
+        return False
+
+    def read(
+        self, runs: NDArray[np.intp], parameters: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
+        """Return coordinates, speeds and extents of runs, one row each, and which of them could be found.
+
+        Parameters
+        ----------
+        runs
+            Numbers of the runs.
+        parameters
+            Their parameters, one row each, where they change.
+        """
+        assembly = self._order.assembly
+        q, u = (np.zeros((len(runs), len(s))) for s in (assembly.reduced.coordinates, assembly.reduced.speeds))
+        lengths = self._extents(runs, parameters)
+        if self._conditions is not None:
+            for rows, said in ((q, self._positions), (u, self._speeds)):
+                for place, given in said:
+                    rows[:, place] = _of(given, runs)
+            wanted = np.array([np.broadcast_to(_of(one, runs), len(runs)) for one in self._wanted])
+            values = assembly.parameter_values if parameters is None else parameters.T
+            _, sizes = size_rows(assembly.reduced, lengths)
+            found = meet_speeds(assembly, self._conditions, values, assembly.flat.t_start, q, u, sizes, wanted)
+            return q, u, lengths, found
+        found = np.ones(len(runs), dtype=bool)
+        for place, run in enumerate(runs.tolist()):
+            try:
+                start = find_start(self._assembly(run))
+            except AtwoodError:
+                found[place] = False
+                continue
+            q[place], u[place], lengths[place] = start.coordinates, start.speeds, start.length
+        return q, u, lengths, found
+
+    def _assembly(self, run: int) -> Assembly:
+        """Return the assembly of a run."""
+        order, assembly = self._order, self._order.assembly
+        if assembly.mechanism.constants or any(not axis.is_start for axis in order.cases.axes):
+            return assembly.with_values(order.cases.of(run)[0], start=order.cases.of(run)[1])
+        start = {path: float(column[run]) for path, column in self._columns.items()}
+        return replace(assembly, flat=replace(assembly.flat, start={**assembly.flat.start, **start}))
+
+    def _extents(self, runs: NDArray[np.intp], parameters: FloatArray | None) -> FloatArray:
+        """Return the extent of the scene for each run, as `scene_length` has it."""
+        assembly = self._order.assembly
+        lengths = np.full(len(runs), extent(assembly.mechanism))
+        if parameters is not None:
+            lengths = _moving_lengths(assembly, parameters)
+        for given in self._lengths:
+            lengths = np.maximum(lengths, np.abs(_of(given, runs)))
+        return np.where(lengths > 0.0, lengths, 1.0)
+
+
+def _of(given: FloatArray | float, runs: NDArray[np.intp]) -> FloatArray | float:
+    return given[runs] if isinstance(given, np.ndarray) else given
+
+
+def _moving_lengths(assembly: Assembly, parameters: FloatArray) -> FloatArray:
+    """Return the largest length among the parameters of what moves, for each row of parameters."""
+    mechanism, flat = assembly.mechanism, assembly.flat
+    numbers = {symbol.name: i for i, symbol in enumerate(assembly.parameters)}
+    found = np.zeros(len(parameters))
+    for name, slot in find_slots(flat):
+        local = mechanism.locals_.get(slot.part)
+        specs = local.part.component.parameter_specs() if local is not None else {}
+        if local is None or slot.name not in specs or specs[slot.name].unit.exponents != (0, 1, 0, 0):
+            continue
+        bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[slot.part, one]] for one in local.connectors}
+        value = slot.read(flat)
+        if bodies == {0} or value is None:
+            continue
+        column = parameters[:, numbers[name]] if name in numbers else np.full(len(parameters), float(value))
+        found = np.maximum(found, np.abs(column))
+    return found

@@ -1,0 +1,211 @@
+"""What a sweep gives: values, quantities, and how each run went."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arguments import check
+from atwood.arrays import FloatArray
+from atwood.errors import ResultError, near_matches, suggestion
+from atwood.model.declare.quantities import PATH
+
+__all__ = ["Sweep", "SweepStatistics"]
+
+
+@dataclass(frozen=True)
+class SweepStatistics:
+    """What a sweep has cost.
+
+    Attributes
+    ----------
+    runs, failed
+        How many runs there were, and how many of them have no end.
+    batched
+        How many were run in machine code, many at a time.
+    why_single
+        Why the others were run one by one, if that was so for all.
+    reassembled
+        For each run that needed equations of its own, why.
+    threads
+        How many threads shared the work; 0 for an executor.
+    solver_seconds
+        Time in the solver, summed over all runs.
+    wall_seconds
+        Time of the whole sweep.
+    """
+
+    runs: int
+    failed: int
+    batched: int
+    why_single: str
+    reassembled: Mapping[int, str]
+    threads: int
+    solver_seconds: float
+    wall_seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Many runs of one scene.
+
+    ``sweep["bob2.position.x"]`` is a quantity of all runs, of shape (runs, times); where a run failed, or ended before
+    a time, it is nan.
+
+    Attributes
+    ----------
+    scene, form, level, rtol
+        What was run.
+    time
+        Output times, s.
+    end_time
+        For each run, the time that it reached, s; nan where it could not start.
+    parameters, start
+        What was varied, in SI units: for each path one value a run.
+    shape
+        Of the grid: the number of values of each path that was varied, in order; one number for a list.
+    quantities
+        By path, shape (runs, times).
+    units, meanings
+        SI units, and one line of meaning, by path.
+    status
+        For each run ``"finished"``, ``"stopped"`` (by an event), ``"failed"``, ``"step_limit"``, ``"time_limit"`` or
+        ``"interrupted"``.
+    messages
+        Why a run did not finish, by its number.
+    steps
+        Steps of the solver, for each run.
+    statistics
+        What it has cost.
+    """
+
+    scene: str
+    form: str
+    level: str
+    rtol: float
+    time: FloatArray
+    end_time: FloatArray
+    parameters: Mapping[str, NDArray[Any]]
+    start: Mapping[str, NDArray[Any]]
+    shape: tuple[int, ...]
+    quantities: Mapping[str, FloatArray]
+    units: Mapping[str, str]
+    meanings: Mapping[str, str]
+    status: tuple[str, ...]
+    messages: Mapping[int, str]
+    steps: NDArray[np.int64]
+    statistics: SweepStatistics
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of the quantities."""
+        return tuple(self.quantities)
+
+    @property
+    def varied(self) -> dict[str, NDArray[Any]]:
+        """What was varied, one value a run, in the order of the grid."""
+        return {**self.parameters, **self.start}
+
+    @property
+    def failed(self) -> tuple[int, ...]:
+        """Numbers of the runs that have no end; `messages` says why."""
+        return tuple(k for k, one in enumerate(self.status) if one not in ("finished", "stopped"))
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    def __getitem__(self, path: str) -> FloatArray:
+        """Return a quantity of all runs, shape (runs, times).
+
+        Raises
+        ------
+        ResultError
+            If it was not kept.
+        """
+        path = str(check(PATH, path, "path", "Sweep"))
+        if path not in self.quantities:
+            kept = suggestion(path, near_matches(path, self.paths)) or f"It kept {', '.join(self.paths[:12])}."
+            advice = f"{kept} Whatever else a sweep keeps is said with its argument quantities."
+            raise ResultError("the sweep did not keep such a quantity", where=path, advice=advice)
+        return self.quantities[path]
+
+    def end(self, path: str) -> FloatArray:
+        """Return a quantity at the last output time of all runs, shape (runs,)."""
+        found: FloatArray = self[path][:, -1]
+        return found
+
+    def grid(self, path: str) -> FloatArray:
+        """Return a quantity at the last output time, in the shape of the grid."""
+        return self.end(path).reshape(self.shape)
+
+    def axis(self, path: str) -> NDArray[Any]:
+        """Return the values of one axis of the grid."""
+        varied = self.varied
+        path = str(check(PATH, path, "path", "Sweep.axis"))
+        if path not in varied:
+            raise ResultError("this was not varied", where=path, advice=suggestion(path, varied))
+        if len(self.shape) == 1:
+            return varied[path]
+        position = list(varied).index(path)
+        found: NDArray[Any] = np.moveaxis(varied[path].reshape(self.shape), position, 0).reshape(
+            self.shape[position], -1
+        )[:, 0]
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the sweep as plain data; what is nan becomes None."""
+        return {
+            "scene": self.scene,
+            "form": self.form,
+            "level": self.level,
+            "rtol": self.rtol,
+            "time": self.time.tolist(),
+            "shape": list(self.shape),
+            "parameters": {path: values.tolist() for path, values in self.parameters.items()},
+            "start": {path: values.tolist() for path, values in self.start.items()},
+            "quantities": {
+                path: [[one if np.isfinite(one) else None for one in row] for row in values.tolist()]
+                for path, values in self.quantities.items()
+            },
+            "units": dict(self.units),
+            "status": list(self.status),
+            "messages": {str(run): text for run, text in self.messages.items()},
+            "end_time": [one if np.isfinite(one) else None for one in self.end_time.tolist()],
+            "steps": self.steps.tolist(),
+            "statistics": {
+                **vars(self.statistics),
+                "reassembled": {str(run): text for run, text in self.statistics.reassembled.items()},
+            },
+        }
+
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Save the sweep as ``.csv``, ``.nc`` (NetCDF-3) or ``.json``.
+
+        Parameters
+        ----------
+        file
+            Where to; its suffix says how.
+        """
+        from atwood.study.sweeps.files import save_sweep
+
+        return save_sweep(self, file)
+
+    def plot(self, paths: Any = None, file: str | os.PathLike[str] | None = None) -> Any:
+        """Draw quantities at the end over what was varied, a map where two values were, and return the figure.
+
+        Parameters
+        ----------
+        paths
+            Which quantities; all when not given.
+        file
+            Where to save it; its suffix says how.
+        """
+        # Views stand above studies, and are looked up when one is wanted.
+        return import_module("atwood.plotting.plots.sweep").plot_sweep(self, paths, file)

@@ -1,0 +1,252 @@
+"""Sweeps: one scene with many parameters and starts, assembled and compiled once."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from atwood.arguments import BY_PATH, instance, one_of, optional, takes, whole
+from atwood.errors import AtwoodError, TopologyError, UsageError
+from atwood.forms.assembly import Assembly
+from atwood.model.compose.composite import Model
+from atwood.model.declare.quantities import PATHS
+from atwood.pipeline import SCENE, assemble
+from atwood.simulation.problem.arguments import (
+    FORM,
+    LEVEL,
+    LIMITS,
+    NAME,
+    OUTPUTS,
+    PROGRESS,
+    RTOL,
+    SOLVER,
+    T_END,
+    check_span,
+)
+from atwood.simulation.problem.options import RunOptions, sample_times
+from atwood.simulation.run.choice import check_solver
+from atwood.study.sweeps.batch import run_batches, why_not_batched
+from atwood.study.sweeps.cases import COMBINATIONS, Cases, make_cases
+from atwood.study.sweeps.result import Sweep, SweepStatistics
+from atwood.study.sweeps.runs import Order, Records, expand_paths, run_in_processes, run_one_by_one
+
+__all__ = ["Sweep", "SweepStatistics", "sweep"]
+
+
+_TRIALS = 20
+"""If none of so many runs can be assembled, none is tried."""
+
+
+@takes(
+    scene=SCENE,
+    vary=optional(BY_PATH),
+    start=optional(BY_PATH),
+    combine=one_of(COMBINATIONS),
+    quantities=PATHS,
+    t_end=T_END,
+    outputs=optional(OUTPUTS),
+    form=FORM,
+    level=LEVEL,
+    rtol=RTOL,
+    solver=SOLVER,
+    threads=optional(whole("a whole number of threads, 1 to 1024", 1, 1024)),
+    executor=optional(instance("an executor of concurrent.futures", Executor)),
+    progress=PROGRESS,
+    name=NAME,
+    **LIMITS,
+)
+def sweep(
+    scene: Model | Assembly,
+    vary: Mapping[str, Any] | None = None,
+    *,
+    start: Mapping[str, Any] | None = None,
+    combine: str = "grid",
+    quantities: Iterable[str] | None = None,
+    t_end: float | str | None = None,
+    outputs: Any = None,
+    form: str = "reduced",
+    level: str = "ggl",
+    rtol: float = 1e-8,
+    solver: str = "auto",
+    max_steps: int | None = None,
+    max_seconds: float | None = None,
+    threads: int | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    name: str | None = None,
+) -> Sweep:
+    """Run a scene with many values of its parameters and of its start.
+
+    Equations and machine code are made once for all runs that share a structure. Smooth scenes in the reduced form,
+    without closed loops and events, are run many at a time in machine code; all others one by one, with the same
+    answers. A run that fails stays in the sweep, with the reason.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it, which then says the form.
+    vary
+        Values of parameters by path: lists of numbers in SI units or of text with units, or arrays of one dimension
+        (``numpy.linspace``, the columns of a sample of `scipy.stats.qmc`).
+    start
+        The same for start values.
+    combine
+        ``"grid"``: every value with every other. ``"list"``: the first of each, the second of each, and so on.
+    quantities
+        What to keep of each run, by path; a path of a component stands for all below it. The coordinates when not
+        given.
+    t_end
+        Time of the end, s; the scene's own if not given.
+    outputs
+        Number of output times, evenly spread, or the times themselves, s. When not given only the end is kept: the
+        state at `t_end`, or where an event stopped the run.
+    form, level, rtol, solver, max_steps, max_seconds
+        As for `simulate`; limits are those of each run.
+    threads
+        How many threads share the work; as many as there are processors when not given.
+    executor
+        Where to run instead, any of `concurrent.futures`; the scene must then be picklable.
+    progress
+        Called with the number of runs done, and of how many.
+    name
+        What to call the scene.
+
+    Returns
+    -------
+    Sweep
+        Values, quantities, and how each run went.
+
+    Raises
+    ------
+    AtwoodError
+        If there is no such parameter, start value or quantity, or a value is not admissible.
+    """
+    began = time.perf_counter()
+    check_solver(solver)
+    assembly = scene if isinstance(scene, Assembly) else assemble(scene, form=form, level=level, name=name)
+    source = assembly.source.scene if assembly.source is not None else None
+    if source is None:
+        raise UsageError("it was assembled from leaves, so that its scene is not known", where=assembly.flat.name)
+    cases = make_cases(source, vary, start, combine)
+    first = _first(assembly, cases)
+    end = assembly.flat.t_end if t_end is None else float(t_end)
+    order = Order(
+        first,
+        cases,
+        expand_paths(first, quantities),
+        _times(first, end, outputs),
+        outputs is None,
+        RunOptions(end, rtol, max_steps=max_steps, max_seconds=max_seconds, solver=solver),
+    )
+    records = Records.empty(order)
+    watch = _Watch(progress, cases.count)
+    count = _threads(threads)
+    reason = ""
+    try:
+        if executor is not None:
+            reason = "they were given to an executor"
+            run_in_processes(order, records, executor, watch.count)
+        else:
+            reason = why_not_batched(order)
+            left = np.arange(cases.count) if reason else run_batches(order, records, count, watch.count)
+            run_one_by_one(order, records, left, count, watch.count)
+    except KeyboardInterrupt:
+        records.interrupt()
+    return _finished(order, records, reason, count if executor is None else 0, time.perf_counter() - began)
+
+
+def _first(assembly: Assembly, cases: Cases) -> Assembly:
+    """Return the assembly of the first run that can be assembled."""
+    problem: AtwoodError | None = None
+    for run in range(min(cases.count, _TRIALS)):
+        values, start = cases.of(run)
+        try:
+            return assembly.with_values(values, start=start)
+        except TopologyError as error:  # this run will be reported; the others may hold together
+            problem = problem or error
+    assert problem is not None
+    raise problem
+
+
+def _times(assembly: Assembly, end: float, outputs: Any) -> Any:
+    """Return the output times."""
+    begin = assembly.flat.t_start
+    check_span(begin, end)
+    if outputs is None:
+        return np.array([end])
+    found = sample_times(begin, RunOptions(end, outputs=outputs, samples=1))
+    return found.times[found.shown]
+
+
+def _threads(asked: int | None) -> int:
+    if asked is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return asked
+
+
+@dataclass
+class _Watch:
+    """Counts the runs that are done."""
+
+    progress: Callable[[int, int], object] | None
+    of: int
+    done: int = 0
+
+    def count(self, more: int) -> None:
+        """Take note of runs that are done."""
+        self.done += more
+        if self.progress is not None:
+            self.progress(self.done, self.of)
+
+
+def _finished(order: Order, records: Records, reason: str, threads: int, wall: float) -> Sweep:
+    first, cases = order.assembly, order.cases
+    observables = {one.path: one for one in first.find_observables(order.paths)}
+    columns = [(axis, cases.column(k)) for k, axis in enumerate(cases.axes)]
+    return Sweep(
+        scene=first.flat.name,
+        form=first.form,
+        level=first.level,
+        rtol=order.options.relative_tolerance,
+        time=order.times,
+        end_time=records.end_time,
+        parameters={axis.path: column for axis, column in columns if not axis.is_start},
+        start={axis.path: column for axis, column in columns if axis.is_start},
+        shape=cases.shape,
+        quantities={path: records.values[k] for k, path in enumerate(order.paths)},
+        units={
+            **{axis.path: _unit(first, axis.path, axis.is_start) for axis in cases.axes},
+            **{path: one.unit for path, one in observables.items()},
+        },
+        meanings={path: one.doc for path, one in observables.items()},
+        status=tuple(records.status),
+        messages=dict(sorted(records.messages.items())),
+        steps=records.steps,
+        statistics=SweepStatistics(
+            runs=cases.count,
+            failed=sum(one not in ("finished", "stopped") for one in records.status),
+            batched=records.batched,
+            why_single=reason,
+            reassembled=dict(records.reassembled),
+            threads=threads,
+            solver_seconds=records.seconds,
+            wall_seconds=wall,
+        ),
+    )
+
+
+def _unit(assembly: Assembly, path: str, is_start: bool) -> str:
+    """Return the SI unit of what is varied."""
+    if is_start:
+        return assembly.start_observables[path].unit
+    assert assembly.source is not None
+    assert assembly.source.scene is not None
+    owner, _, name = path.rpartition(".")
+    part = assembly.source.scene[owner] if owner else assembly.source.scene
+    return str(part._field(name).unit.text)

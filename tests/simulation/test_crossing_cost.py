@@ -1,0 +1,58 @@
+"""What a singular position costs, in evaluations: they are what its time is made of."""
+
+from __future__ import annotations
+
+import pytest
+
+from atwood import simulate
+from atwood.codegen.python.backend import BoundKernel
+from atwood.linalg import sparse
+from atwood.simulation.singular.monitor import Guard
+from atwood_library.scenes import FourBar, FourBarRow
+
+FORMS = ("reduced", "dae")
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many kernels were called while something looked out for singular positions."""
+    count, inside = [0], [False]
+    call, look = BoundKernel.__call__, Guard.look
+
+    def counted(self, *groups):
+        count[0] += inside[0]
+        return call(self, *groups)
+
+    def looking(self, *state):
+        inside[0] = True
+        try:
+            return look(self, *state)
+        finally:
+            inside[0] = False
+
+    monkeypatch.setattr(BoundKernel, "__call__", counted)
+    monkeypatch.setattr(Guard, "look", looking)
+    return count
+
+
+@pytest.mark.parametrize(("form", "most"), [("reduced", 28), ("dae", 40)])
+def test_a_crossing_takes_few_evaluations(form: str, most: int, calls: list[int]) -> None:
+    result = simulate(FourBarRow(windows=1), form=form)
+    assert len(result.passages) == 10
+    assert calls[0] <= 10 * most  # 55 and 111 before
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_reactions_of_redundant_constraints_are_found_for_all_samples_at_once(
+    form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = simulate(FourBar(space="space"), form=form, t_end=1.0)
+    plane = simulate(FourBar(), form=form, t_end=1.0)
+
+    def alone(*_: object) -> None:
+        raise AssertionError("a sample is solved by itself")
+
+    for name in ("csr_least_norm", "solve_bordered"):
+        monkeypatch.setattr(sparse, name, alone)
+    for path in ("left.force.x", "right.force.z"):
+        assert abs(result.array(path) - plane.array(path)).max() < 1e-5 * abs(plane.array(path)).max()

@@ -1,0 +1,147 @@
+"""Limits of time hold everywhere: whoever works for long looks at the clock."""
+
+from __future__ import annotations
+
+import threading
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from atwood import Result, Scene, assemble, simulate, sweep
+from atwood import clock as clock_module
+from atwood.clock import Clock, TimeIsUp, check_time, more_time, time_left, within_time
+from atwood.errors import ResultError, SolveError
+from atwood.integrators import explicit_session
+from atwood.integrators.ida import native as ida_native
+from atwood.simulation.initialization import massless as without_inertia
+from atwood_library.scenes import DoublePendulum, FourBar, FourBarRow, SimplePendulum
+
+FORMS = ("reduced", "dae")
+
+
+@pytest.fixture
+def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """A clock that goes on by a second whenever somebody looks at it."""
+    count = [0]
+
+    def perf_counter() -> float:
+        count[0] += 1
+        return float(count[0])
+
+    for module in (clock_module, ida_native, explicit_session):
+        monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=perf_counter))
+    return count
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_limit_of_time_is_looked_at_all_along(form: str, looks: list[int]) -> None:
+    scene = FourBarRow(windows=1)
+    simulate(scene, form=form, t_end=1.0)  # compiled code is in the cache from now on
+    before = looks[0]
+    whole = simulate(scene, form=form, t_end=1.0, max_seconds=1e9)
+    needed = looks[0] - before
+    assert whole.status == "finished", whole.message
+    assert len(whole.passages) == 1
+    for share in (1e-9, 0.1, 0.3, 0.6, 0.9):
+        before = looks[0]
+        found = simulate(scene, form=form, t_end=1.0, max_seconds=share * needed)
+        assert found.status == "time_limit"
+        assert f"the limit of {share * needed:g} s was used up" in found.message
+        assert looks[0] - before < share * needed + 0.05 * needed + 20
+        if found.run.segments:
+            count = np.searchsorted(found.time, whole.time[-1], side="right")
+            np.testing.assert_array_equal(found.time[: count - 1], whole.time[: count - 1])
+
+
+def test_a_crossing_is_left_when_the_time_is_used_up() -> None:
+    assembly = assemble(FourBarRow(windows=10))
+    simulate(assembly, t_end=0.01)
+    for limit in (0.1, 0.3):
+        began = time.process_time()
+        result = simulate(assembly, max_seconds=limit, t_end=100.0)
+        assert time.process_time() - began < limit + 0.3
+        assert result.status == "time_limit"
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_run_without_time_for_its_start_has_nothing_and_says_so(form: str) -> None:
+    began = time.process_time()
+    result: Result = simulate(FourBarRow(windows=60), form=form, max_seconds=1e-9)
+    assert time.process_time() - began < 0.8
+    assert result.status == "time_limit"
+    assert "before the start was found" in result.message
+    with pytest.raises(ResultError, match=r"there is nothing in it: the limit of 1e-09 s was used up.*more time"):
+        _ = result.time
+
+
+def test_what_has_inertia_everywhere_needs_no_singular_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    # those of rows of four-bars cannot be interrupted, and took longer than all else at their start
+    def refuse(*_: object) -> None:
+        raise AssertionError("what is free to move is looked for")
+
+    monkeypatch.setattr(without_inertia, "open_directions", refuse)
+    assert simulate(FourBarRow(windows=3), t_end=0.01).status == "finished"
+
+
+def test_a_sweep_without_time_says_so_for_each_run() -> None:
+    found = sweep(FourBarRow(windows=60), {"gravity": [9.0, 9.81]}, quantities=["crank[0].angle"], max_seconds=1e-9)
+    assert found.status == ("time_limit", "time_limit")
+    assert all("before the start was found" in one for one in found.messages.values())
+
+
+def test_steps_are_counted_over_changes_of_the_solver_and_the_limit_is_said_as_asked_for() -> None:
+    result = simulate(DoublePendulum(), max_steps=60, t_end=50.0)
+    assert result.message.startswith("the limit of 60 steps was used up (at t = ")
+    assert result.statistics.steps == 60
+
+
+def test_what_cannot_look_at_the_clock_is_left_to_itself() -> None:
+    release = threading.Event()
+    with pytest.raises(TimeIsUp), Clock(0.02).kept():
+        within_time(lambda: release.wait(10.0))
+    release.set()
+    with Clock(10.0).kept():
+        assert within_time(lambda: 3) == 3
+        with pytest.raises(ZeroDivisionError):
+            within_time(lambda: 1 // 0)
+
+
+def test_a_clock_is_kept_inside_its_block_alone() -> None:
+    with Clock(-1.0).kept():
+        with pytest.raises(TimeIsUp):
+            check_time()
+        with more_time():
+            check_time()
+            assert 0.0 < time_left() < 1.0
+    check_time()
+    with Clock(None).kept(), more_time():
+        assert time_left() == float("inf")
+
+
+@pytest.mark.parametrize(
+    ("scene", "form", "rtol"),
+    [(FourBarRow(windows=3), "reduced", 1e-13), (FourBar(), "dae", 1e-15)],
+)
+def test_a_tolerance_below_rounding_ends_with_one_that_would_do(scene: Scene, form: str, rtol: float) -> None:
+    with pytest.raises(SolveError, match=r"below what rounding allows here.*With rtol=1e-1\d it goes on") as caught:
+        simulate(scene, form=form, rtol=rtol, max_steps=50_000, t_end=1.0)
+    better = float(str(caught.value).split("With rtol=")[1].split(" ")[0])
+    assert simulate(scene, form=form, rtol=better, t_end=0.2).status == "finished"
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_tolerance_below_the_error_of_one_operation_is_raised_and_said(form: str) -> None:
+    with pytest.warns(UserWarning, match="rtol = 1e-16 is below what rounding allows: 1e-15 is taken instead"):
+        result = simulate(SimplePendulum(), form=form, rtol=1e-16, t_end=1.0, max_steps=50_000)
+    assert result.status == "finished"
+    assert result.run.options.relative_tolerance == 1e-15
+
+
+def test_rounding_behind_a_singular_position_keeps_no_solver_from_going_on() -> None:
+    # Newton's iteration failed right behind the first place: rounding is larger there than the tolerance allows
+    result = simulate(FourBarRow(windows=2, space="space"), form="dae", rtol=1e-12, t_end=0.8, outputs=11, samples=1)
+    assert result.status == "finished"
+    assert [one.ways for one in result.passages] == [2]
+    assert result.energy.max_drift < 1e-9
