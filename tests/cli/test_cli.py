@@ -430,3 +430,11 @@ def test_standard_output_that_is_full_is_said_without_a_traceback(command: list[
     assert done.stderr.startswith("Error: standard output: it cannot be written (No space left on device).")
     assert "Traceback" not in done.stderr
     assert "Exception ignored" not in done.stderr
+
+
+def test_warnings_are_lines_of_their_own() -> None:
+    done = python("-m", "atwood", "run", "simple-pendulum", "--rtol", "1e-20", "--t-end", "0.1")
+    assert done.returncode == 0
+    first = done.stderr.splitlines()[0]
+    assert first.startswith("Warning: rtol = 1e-20 is below what rounding allows")
+    assert ".py" not in done.stderr

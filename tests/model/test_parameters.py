@@ -373,3 +373,9 @@ def test_reading_outside_a_law_says_so():
     for attempt in (lambda: bar.time, lambda: bar.a.position, lambda: bar.angle(), lambda: bar.reaction("tension")):
         with pytest.raises(aw.UsageError, match="only inside a law"):
             attempt()
+
+
+@pytest.mark.parametrize(("make", "name"), [(lambda: Bob(1), "Bob"), (lambda: Pendulum(3.0), "Pendulum")])
+def test_parameters_are_given_by_name(make, name):
+    with pytest.raises(aw.errors.ParameterError, match=rf"{name}: its parameters are given by name\. Write {name}\("):
+        make()

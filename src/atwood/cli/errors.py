@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Callable
 from typing import Any, ParamSpec
 
@@ -34,7 +35,9 @@ def reporting_errors(function: Callable[P, Any]) -> Callable[P, None]:
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
         context = click.get_current_context()
         try:
-            function(*args, **kwargs)
+            with warnings.catch_warnings():
+                warnings.showwarning = _show_warning
+                function(*args, **kwargs)
         except AtwoodError as error:
             if kwargs.get("as_json"):
                 from atwood.cli.output import print_json
@@ -48,6 +51,11 @@ def reporting_errors(function: Callable[P, Any]) -> Callable[P, None]:
             context.exit(INTERRUPTED)
 
     return wrapped
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Show a warning as a line of its own, without the place in the source that gave it."""
+    click.echo(f"Warning: {_one_line(str(message))}", err=True)
 
 
 def _one_line(text: str) -> str:

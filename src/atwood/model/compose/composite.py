@@ -107,9 +107,9 @@ class Model(_State, Component):
             if name.partition("[")[0] in vars(cls):
                 check_pairs(joined, f"{name}.", part)
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, *unnamed: Any, **values: Any) -> None:
         given = {name: value for name, value in values.items() if name in self._prototypes}
-        super().__init__(**{name: value for name, value in values.items() if name not in given})
+        super().__init__(*unnamed, **{name: value for name, value in values.items() if name not in given})
         for name, part in given.items():
             check_same_connectors(self._prototypes[name], part, f"{type(self).__name__}.{name}")
         object.__setattr__(self, "_given", {name: copy_parts(part) for name, part in given.items()})

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
-from atwood.arguments import NAME, check
+from atwood.arguments import NAME, check, show
 from atwood.errors import DeclarationError, MissingNameError, ParameterError, UsageError, near_matches, suggestion
 from atwood.expr import Scalar
 from atwood.model.declare.binding import Binding
@@ -85,8 +85,15 @@ class Component:
                 cls._signals[name] = replaced
                 setattr(cls, name, replaced)
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, *unnamed: Any, **values: Any) -> None:
         self._start_as({}, None, "")
+        if unnamed:
+            first = next(iter(self._parameters), "")
+            raise ParameterError(
+                "its parameters are given by name",
+                where=type(self).__name__,
+                advice=f"Write {type(self).__name__}({f'{first}={show(unnamed[0])}' if first else ''}).",
+            )
         for name in values:
             if name not in self._parameters and name not in self._signals:
                 raise self._unknown(name)
