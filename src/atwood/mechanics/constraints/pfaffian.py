@@ -131,6 +131,10 @@ class Places:
                 found.append(numbers)
         return np.array(found).reshape(len(found), len(expressions))
 
+    def some(self, mechanism: Mechanism) -> dict[Expression, float]:
+        """Return one of the places."""
+        return next(self._places(mechanism))
+
     def _places(self, mechanism: Mechanism) -> Iterator[dict[Expression, float]]:
         state, length = self.state, extent(mechanism) or 1.0
         for attempt in range(1, _ASKED + 1):

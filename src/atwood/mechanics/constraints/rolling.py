@@ -162,17 +162,14 @@ def _held_still(
             continue
         value = substitute([given], solution)[0] if solution else given
         state = state or motion.finish(solution)
-        alone = (
-            None
-            if switches([value])
-            else decide(mechanism, partial(_depends_on_one, Places(state, mechanism.time), value))
-        )
+        places = Places(state, mechanism.time)
+        alone = None if switches([value]) else decide(mechanism, partial(_depends_on_one, places, value))
         if alone is None:
             continue
         symbol = state.coordinates[alone]
         (slope,) = jvp([value], {symbol: 1.0})
         is_length = state.names[alone].unit == "m"
-        if not decide(mechanism, partial(_stands_by_itself, symbol, slope, is_length)):
+        if not decide(mechanism, partial(_stands_by_itself, places, symbol, slope, is_length)):
             continue
         constant = mechanism.table.graph.zero  # it shapes the equations, as other zeros do
         if not decide(mechanism, partial(_is_at_zero, symbol, is_length)):
@@ -185,10 +182,15 @@ def _held_still(
     return made
 
 
-def _stands_by_itself(symbol: Expression, slope: Expression, is_length: bool, mechanism: Mechanism) -> bool:
-    """Return whether a coordinate starts at a root that stands by itself, of a value with the given slope."""
+def _stands_by_itself(
+    places: Places, symbol: Expression, slope: Expression, is_length: bool, mechanism: Mechanism
+) -> bool:
+    """Return whether a coordinate starts at a root that stands by itself, of a value with the given slope.
+
+    The slope depends on no other coordinate, so any place will do for those that the start gives in another chart.
+    """
     assert mechanism.places is not None
-    start = {**mechanism.table.values, **mechanism.places["reduced"]}
+    start = {**places.some(mechanism), **mechanism.table.values, **mechanism.places["reduced"]}
     step = 0.5 * _unit(mechanism, is_length)
     near, away = (evaluate([slope], {**start, symbol: start[symbol] + far})[0] for far in (0.0, step))
     return abs(near) > 1e-3 * abs(away)
