@@ -8,6 +8,7 @@ from click.testing import CliRunner, Result
 import atwood_library
 from atwood import Component
 from atwood.cli import main
+from atwood.cli.parts import parts_called
 
 PARTS = [name for name in atwood_library.__all__ if issubclass(getattr(atwood_library, name), Component)]
 
@@ -88,3 +89,27 @@ def test_what_is_no_part_is_refused(arguments: tuple[str, ...], said: str) -> No
     result = run("info", *arguments)
     assert result.exit_code != 0
     assert said in result.output
+
+
+@pytest.mark.parametrize("word", ["Revolute", "revolute", "hinge", "pin joint"])
+def test_a_part_is_found_by_what_others_call_it(word: str) -> None:
+    assert json.loads(run("info", word, "--json").output)["part"] == "Pivot"
+    assert "Also called: Revolute" in run("info", word).output
+
+
+def test_parts_that_share_a_synonym_are_all_shown() -> None:
+    found = json.loads(run("info", "RollingWheel", "--json").output)["parts"]
+    assert [one["part"] for one in found] == ["RollingDisc", "Wheel"]
+
+
+def test_a_synonym_is_not_inherited() -> None:
+    class Loose(atwood_library.Pivot):
+        """A hinge of one's own."""
+
+    assert "synonyms" not in vars(Loose)
+    assert list(parts_called("Revolute")) == ["Pivot"]
+
+
+def test_no_part_has_its_own_name_as_a_synonym() -> None:
+    for name in PARTS:
+        assert name not in vars(getattr(atwood_library, name)).get("synonyms", ())

@@ -38,6 +38,8 @@ class Bushing(Component):
     displacements and one rotation are left, about y, which counts turns; on a line one displacement.
     """
 
+    synonyms = ("Rubber mount",)
+
     stiffness: tuple[float, float, float] = parameter(
         (1.0, 1.0, 1.0), unit="N/m", size=3, minimum=0.0, doc="Stiffness along the axes of frame a."
     )

@@ -32,6 +32,8 @@ class CentralGravity(Component):
     ``attracts="point"`` all of the mass is taken to be at `point`.
     """
 
+    synonyms = ("PointGravity", "Kepler force")
+
     gravitational_parameter: float = parameter(
         3.986004418e14, unit="m^3/s^2", minimum=0.0, doc="G M of the source; by default that of the Earth."
     )

@@ -29,6 +29,8 @@ class Drag(Component):
     to Fluid Dynamics, chapter 5). It has one derivative where the point is at rest, which is all that solvers need.
     """
 
+    synonyms = ("Air resistance", "Viscous drag")
+
     linear: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for one metre a second, where it is slow.")
     quadratic: float | None = parameter(
         None,

@@ -28,6 +28,8 @@ class Force(Component):
     fixed in the frame `other`, on which it does not act.
     """
 
+    synonyms = ("WorldForce", "Applied force", "Thruster")
+
     direction: tuple[float, float, float] = parameter(
         (1.0, 0.0, 0.0), direction=True, doc="Direction, in the axes that it is resolved in."
     )

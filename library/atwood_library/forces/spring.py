@@ -12,6 +12,8 @@ class Spring(Component):
     distance is signed in the order in which the ends start, as in a textbook's row of masses.
     """
 
+    synonyms = ("LineForce",)
+
     stiffness: float = parameter(1.0, unit="N/m", minimum=0.0, doc="Force for an extension by one metre.")
     natural_length: float = parameter(0.0, unit="m", minimum=0.0, doc="Length without force.")
     acts: str = parameter(

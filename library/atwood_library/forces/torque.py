@@ -15,6 +15,7 @@ class Torque(Component):
     `other`: a motor between two frames.
     """
 
+    synonyms = ("WorldTorque", "Applied torque", "Couple")
     spaces = ("plane", "space")
 
     axis: tuple[float, float, float] = parameter(

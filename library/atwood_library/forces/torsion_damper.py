@@ -13,6 +13,8 @@ class TorsionDamper(Twisted):
     in a `TorsionSpring`; where both frames share the axis it is the relative angular velocity along it.
     """
 
+    synonyms = ("Rotational damper",)
+
     damping: float = parameter(1.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a rate of one radian a second.")
 
     @dissipation

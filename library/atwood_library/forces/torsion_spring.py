@@ -22,6 +22,8 @@ class TorsionSpring(Twisted):
     it within half a turn either way, where the run stops; the spring of a `Pivot` counts turns.
     """
 
+    synonyms = ("Rotational spring", "Torsional spring")
+
     stiffness: float = parameter(1.0, unit="N*m/rad", minimum=0.0, doc="Torque for a twist by one radian.")
     natural_angle: float = parameter(0.0, unit="rad", doc="Angle without torque.")
 

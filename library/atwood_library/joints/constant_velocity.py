@@ -14,6 +14,7 @@ class ConstantVelocity(LoadedBall):
     motors against the bend, and a cone as a stop. A part of space.
     """
 
+    synonyms = ("Constant velocity joint", "Homokinetic joint", "Rzeppa joint")
     spaces = ("space",)
 
     a: Frame = connector(Frame, "The frame that carries the joint.")

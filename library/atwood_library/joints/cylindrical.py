@@ -29,6 +29,7 @@ class Cylindrical(LoadedSlide, LoadedTwist):
     Along the axis and about it, it can carry springs, dampers, an actuator, a motor and stops.
     """
 
+    synonyms = ("Cylindrical joint",)
     spaces = ("space",)
 
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis, in both frames.")

@@ -25,6 +25,8 @@ class Drive(Component):
     It does whatever work is needed; its `force` and `torque` are what it exerts on frame b.
     """
 
+    synonyms = ("Rheonomic constraint", "Prismatic with prescribed motion", "Actuator")
+
     axis: tuple[float, float, float] = parameter(
         (1.0, 0.0, 0.0), direction=True, doc="Direction of the motion in frame a."
     )

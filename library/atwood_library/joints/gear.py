@@ -13,6 +13,8 @@ class Gear(Component):
     It passes torques on to both frames of both joints, without loss.
     """
 
+    synonyms = ("IdealGear", "Gear pair", "Transmission", "GearConstraint")
+
     ratio: float = parameter(-1.0, doc="Turns of joint a for one turn of joint b; negative for outer wheels.")
     offset: float = parameter(0.0, unit="rad", doc="Angle of joint a where that of joint b is zero.")
     a: Shaft = connector(Shaft, "The angle of one joint.")

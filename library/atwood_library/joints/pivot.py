@@ -28,6 +28,8 @@ class Pivot(LoadedHinge):
     a damper, a motor and stops.
     """
 
+    synonyms = ("Revolute", "Hinge", "Pin joint", "Revolute joint", "RevolutePlanarLoopConstraint")
+
     axis: tuple[float, float, float] = parameter(
         (0.0, -1.0, 0.0),
         turning=True,

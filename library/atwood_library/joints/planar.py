@@ -29,6 +29,7 @@ class Planar(LoadedPlate, LoadedTwist):
     spring to the origin, dampers, actuators, a rim, and whatever acts on the angle.
     """
 
+    synonyms = ("Planar joint",)
     spaces = ("space",)
 
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Normal, in both frames.")

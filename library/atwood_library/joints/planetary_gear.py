@@ -13,6 +13,8 @@ class PlanetaryGear(Component):
     trains). Planets that have inertia are bodies of their own: hinges on the carrier, with a `Gear` for each mesh.
     """
 
+    synonyms = ("IdealPlanetary", "Epicyclic gear")
+
     ratio: float = parameter(2.0, above=0.0, doc="Teeth of the ring over teeth of the sun.")
     offset: float = parameter(0.0, unit="rad", doc="Angle of the sun where carrier and ring are at zero.")
     sun: Shaft = connector(Shaft, "The angle of the sun's joint.")

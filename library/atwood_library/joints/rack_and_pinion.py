@@ -11,6 +11,8 @@ class RackAndPinion(Component):
     ``displacement = radius * angle + offset``; a negative radius puts the rack on the pinion's other side.
     """
 
+    synonyms = ("IdealGearR2T", "Rack and pinion")
+
     radius: float = parameter(1.0, unit="m", doc="Displacement of the rack for one radian of the pinion.")
     offset: float = parameter(0.0, unit="m", doc="Displacement of the rack where the pinion's angle is zero.")
     rack: Slide = connector(Slide, "The displacement of the rack's joint.")

@@ -30,6 +30,7 @@ class RotaryDrive(Component):
     Its `force` and, in a plane, `torque` are what it exerts on frame b; in space `motor_torque` is about the axis.
     """
 
+    synonyms = ("Revolute with prescribed motion", "Servo")
     spaces = ("plane", "space")
 
     axis: tuple[float, float, float] = parameter(

@@ -32,6 +32,7 @@ class Screw(LoadedHinge):
     It can carry a spring, a damper, a motor and stops of the angle.
     """
 
+    synonyms = ("Helical joint", "Screw joint")
     spaces = ("space",)
 
     axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis, in both frames.")

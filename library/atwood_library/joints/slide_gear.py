@@ -11,6 +11,8 @@ class SlideGear(Component):
     ``displacement_a = ratio * displacement_b + offset``.
     """
 
+    synonyms = ("Hydraulic transmission",)
+
     ratio: float = parameter(-1.0, doc="Displacement of joint a for one metre of joint b.")
     offset: float = parameter(0.0, unit="m", doc="Displacement of joint a where that of joint b is zero.")
     a: Slide = connector(Slide, "The displacement of one joint.")

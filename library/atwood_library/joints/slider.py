@@ -29,6 +29,8 @@ class Slider(LoadedSlide):
     damper, an actuator and stops.
     """
 
+    synonyms = ("Prismatic", "Prismatic joint", "Guide")
+
     axis: tuple[float, float, float] = parameter(
         (1.0, 0.0, 0.0),
         direction=True,

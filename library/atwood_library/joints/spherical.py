@@ -13,6 +13,8 @@ class Spherical(LoadedBall):
     motors and a cone as a stop.
     """
 
+    synonyms = ("Ball joint", "Ball and socket", "Spherical joint")
+
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")
 

@@ -33,6 +33,7 @@ class Universal(LoadedCross):
     of space.
     """
 
+    synonyms = ("Hooke's joint", "Cardan joint", "U-joint", "Universal joint")
     spaces = ("space",)
 
     axis_a: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="First axis, in frame a.")

@@ -11,6 +11,8 @@ class Weld(Component):
     Its `force` and `torque` are what it exerts on frame b and everything that hangs on it.
     """
 
+    synonyms = ("FixedTranslation", "FixedRotation", "Rigid connection", "Fixed joint")
+
     displacement: tuple[float, float, float] = parameter(
         (0.0, 0.0, 0.0), unit="m", size=3, doc="Position of frame b in the axes of frame a."
     )

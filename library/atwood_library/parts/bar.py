@@ -18,6 +18,8 @@ class Bar(StraightShape):
     balls, and refused where something does. A `Cylinder` has some.
     """
 
+    synonyms = ("Slender rod",)
+
     area: float = parameter(1e-4, unit="m^2", above=0.0, doc="Area of its section, which counts with a density only.")
 
     def volume(self) -> Scalar:

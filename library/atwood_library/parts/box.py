@@ -14,6 +14,8 @@ class Box(Shape):
     +x. In a plane `length_y` is its thickness, which counts for its mass where the density is given.
     """
 
+    synonyms = ("BodyBox", "Cuboid")
+
     length_x: float = parameter(1.0, unit="m", above=0.0, doc="Length along x, from a to b.")
     length_y: float = parameter(1.0, unit="m", above=0.0, doc="Length along y.")
     length_z: float = parameter(1.0, unit="m", above=0.0, doc="Length along z.")

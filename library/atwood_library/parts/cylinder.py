@@ -13,6 +13,8 @@ from atwood_library.interfaces.straight_shape import StraightShape
 class Cylinder(StraightShape):
     """A solid circular cylinder: ``m r^2/2`` about its axis, ``m (3 r^2 + l^2)/12`` across."""
 
+    synonyms = ("BodyCylinder",)
+
     radius: float = parameter(0.1, unit="m", above=0.0, doc="Radius.")
 
     def volume(self) -> Scalar:

@@ -17,6 +17,8 @@ class Disc(Shape):
     thickness have a mass but no density.
     """
 
+    synonyms = ("Disk",)
+
     radius: float = parameter(0.5, unit="m", above=0.0, doc="Outer radius, R.")
     inner_radius: float = parameter(0.0, unit="m", minimum=0.0, doc="Radius of the hole, r; at most the outer one.")
     thickness: float = parameter(0.0, unit="m", minimum=0.0, doc="Thickness along the axis, h.")

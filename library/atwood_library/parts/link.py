@@ -28,6 +28,8 @@ class Link(Component):
     rod, with moment of inertia ``m l^2 / 12`` about its centre (Goldstein, section 5.3).
     """
 
+    synonyms = ("BodyShape",)
+
     length: float = parameter(1.0, unit="m", above=0.0, doc="Distance from a to b.")
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     center: float | None = parameter(

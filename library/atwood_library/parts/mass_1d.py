@@ -29,6 +29,8 @@ class Mass1D(Component):
     one-dimensional and planar parts can meet.
     """
 
+    synonyms = ("Mass on a line",)
+
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     origin: tuple[float, float, float] = parameter(
         (0.0, 0.0, 0.0), unit="m", size=3, doc="Point of the line where the displacement is zero."

@@ -13,6 +13,8 @@ class PointMass(Component):
     Kinetic energy ``1/2 m v^2`` (Goldstein, Classical Mechanics, section 1.1); the weight is added by the scene.
     """
 
+    synonyms = ("Particle", "Material point")
+
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     point: Point = connector(Point, "Where the mass is.")
 

@@ -16,6 +16,8 @@ class RigidBody(Solid):
     plane's normal, y, counts. `RigidBody.of` takes what `atwood.solids` works out of shapes and meshes.
     """
 
+    synonyms = ("Body",)
+
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     center: tuple[float, float, float] = parameter(
         (0.0, 0.0, 0.0), unit="m", size=3, doc="Centre of mass in the axes of the frame."

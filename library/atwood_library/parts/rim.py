@@ -9,6 +9,8 @@ from atwood_library.parts.rigid_body import RigidBody
 class Rim(RigidBody):
     """A rigid body that looks like a wheel: its inertia is what it is given, its radius is for pictures only."""
 
+    synonyms = ("Rotor",)
+
     radius: float = parameter(0.3, unit="m", above=0.0, doc="Radius.")
     axis: tuple[float, float, float] = parameter((0.0, 1.0, 0.0), turning=True, doc="Axis in the frame.")
 

@@ -34,6 +34,8 @@ class Rod(Component):
     is that of the rod as seen along y.
     """
 
+    synonyms = ("SphericalSpherical", "Massless rod")
+
     length: float = parameter(1.0, unit="m", above=0.0, doc="Length.")
     mass: float = parameter(0.0, unit="kg", minimum=0.0, doc="Mass, spread uniformly.")
     a: Point = connector(Point, "One end.")

@@ -15,6 +15,8 @@ class Sphere(Shape):
     With equal radii it is a thin shell, which has a mass but no density. Its frame is at its centre.
     """
 
+    synonyms = ("Ball",)
+
     radius: float = parameter(0.1, unit="m", above=0.0, doc="Outer radius, R.")
     inner_radius: float = parameter(0.0, unit="m", minimum=0.0, doc="Radius of the cavity, r; at most the outer one.")
 

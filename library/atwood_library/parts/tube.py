@@ -16,6 +16,8 @@ class Tube(StraightShape):
     With equal radii it is a thin-walled tube, which has a mass but no density.
     """
 
+    synonyms = ("Hollow cylinder",)
+
     outer_radius: float = parameter(0.1, unit="m", above=0.0, doc="Outer radius, R.")
     inner_radius: float = parameter(0.08, unit="m", minimum=0.0, doc="Inner radius, r; at most the outer one.")
 

@@ -16,6 +16,8 @@ class Wheel(Model):
     the plane does.
     """
 
+    synonyms = ("RollingWheel",)
+
     radius: float = parameter(0.3, unit="m", above=0.0, doc="Radius.")
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     axial: float | None = parameter(

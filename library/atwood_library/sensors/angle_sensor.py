@@ -13,6 +13,8 @@ class AngleSensor(Twisted):
     between them.
     """
 
+    synonyms = ("RelativeAngles",)
+
     @observable(
         unit="rad",
         doc="Angle of frame b from frame a about the axis.",

@@ -11,6 +11,8 @@ class ForceSensor(Component):
     Its `force` and `torque` are what is exerted on frame b and everything that hangs on it.
     """
 
+    synonyms = ("CutForceAndTorque", "CutForce", "CutTorque")
+
     a: Frame = connector(Frame, "One side.")
     b: Frame = connector(Frame, "The other side.")
 

@@ -8,6 +8,7 @@ from atwood import Component, Frame, Point, Vector, connector, cross, observable
 class FrameSensor(Component):
     """Measures position and velocity of a point as seen from a frame that may move and turn. A part of space."""
 
+    synonyms = ("RelativeSensor",)
     spaces = ("space",)
 
     frame: Frame = connector(Frame, "The frame of the observer.")

@@ -25,6 +25,7 @@ class OrientationSensor(Component):
     A part of space.
     """
 
+    synonyms = ("AbsoluteAngles", "RelativeAngles")
     spaces = ("space",)
 
     convention: str = parameter("zyz", choices=CONVENTIONS, doc="Axes of the three turns, in order.")

@@ -8,6 +8,8 @@ from atwood import Component, Point, Vector, connector, observable
 class PositionSensor(Component):
     """Measures the position and the velocity of a point, in world axes; it does not act on it."""
 
+    synonyms = ("AbsolutePosition", "AbsoluteSensor")
+
     point: Point = connector(Point, "The point that is measured.")
 
     @observable(unit="m", doc="Position in world axes.")

@@ -8,6 +8,8 @@ from atwood import Component, Point, Scalar, Vector, connector, observable
 class RelativePositionSensor(Component):
     """Measures where point b is, seen from point a, in world axes; it does not act on them."""
 
+    synonyms = ("RelativePosition",)
+
     a: Point = connector(Point, "The point that is measured from.")
     b: Point = connector(Point, "The point that is measured.")
 

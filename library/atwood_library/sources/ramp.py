@@ -11,6 +11,8 @@ class Ramp(Component):
     Its `value` is connected to an input and takes the input's unit.
     """
 
+    synonyms = ("ContinuousClock", "Linear function of time")
+
     slope: float = parameter(1.0, unit="any", doc="Rise in a second, in the unit of the input.")
     offset: float = parameter(0.0, unit="any", doc="Value at time zero, in the unit of the input.")
 

@@ -11,6 +11,8 @@ class Sine(Component):
     Its `value` is connected to an input and takes the input's unit.
     """
 
+    synonyms = ("Sinusoid",)
+
     amplitude: float = parameter(1.0, unit="any", doc="Amplitude, in the unit of the input.")
     angular_frequency: float = parameter(1.0, unit="rad/s", doc="Angular frequency.")
     phase: float = parameter(0.0, unit="rad", doc="Phase at time zero.")

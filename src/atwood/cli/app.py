@@ -118,12 +118,13 @@ def info_command(
 ) -> None:
     """Say what SCENE is made of: bodies, joints, freedom, constraints, and what its equations cost.
 
-    With the name of a part, such as Pivot: its connectors, parameters, inputs and quantities.
+    With the name of a part, such as Pivot, or what textbooks or Modelica call it, such as Revolute: its connectors,
+    parameters, inputs and quantities.
     """
     from atwood.cli.info import show_info
-    from atwood.cli.parts import looks_like_a_part, show_part
+    from atwood.cli.parts import is_a_part, show_part
 
-    if looks_like_a_part(scene):
+    if is_a_part(scene):
         show_part(scene, as_json, changed=bool(settings or starts or moved))
         return
 

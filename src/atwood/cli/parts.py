@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from atwood.cli.libraries import all_libraries
@@ -13,7 +14,7 @@ from atwood.errors import UsageError, near_matches, suggestion
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
 
-__all__ = ["library_parts", "list_parts", "looks_like_a_part", "show_part"]
+__all__ = ["is_a_part", "library_parts", "list_parts", "looks_like_a_part", "parts_called", "show_part"]
 
 _EVERYWHERE = ("line", "plane", "space")
 
@@ -40,6 +41,40 @@ def library_parts() -> dict[str, type[Component]]:
     return found
 
 
+def is_a_part(text: str) -> bool:
+    """Return whether a word means a part: by how it is written, or as a synonym that no scene has for its name."""
+    from atwood.cli.scenes import bundled_scenes
+
+    if looks_like_a_part(text):
+        return True
+    return not text.endswith(".py") and ":" not in text and text not in bundled_scenes() and bool(parts_called(text))
+
+
+def parts_called(name: str) -> dict[str, type[Component]]:
+    """Return the parts of a name: the one part that has it, or those that textbooks or Modelica call so.
+
+    Parameters
+    ----------
+    name
+        The name of a class, or a synonym, which may be written in small letters and in several words.
+    """
+    kinds = library_parts()
+    if name in kinds:
+        return {name: kinds[name]}
+    wanted = _plain(name)
+    return {own: kind for own, kind in kinds.items() if wanted in map(_plain, _synonyms(kind))}
+
+
+def _synonyms(kind: type[Component]) -> tuple[str, ...]:
+    """Return what else a part is called; what the class that it is derived from is called is another thing."""
+    found: tuple[str, ...] = vars(kind).get("synonyms", ())
+    return found
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[\W_]", "", name).casefold()
+
+
 def list_parts(as_json: bool) -> None:
     """Show the parts of the installed libraries, with one line each.
 
@@ -50,7 +85,8 @@ def list_parts(as_json: bool) -> None:
     """
     parts = library_parts()
     if as_json:
-        print_json({"parts": [{"name": name, "summary": _said(kind)[0]} for name, kind in parts.items()]})
+        rows = ((name, _said(kind)[0], list(_synonyms(kind))) for name, kind in parts.items())
+        print_json({"parts": [dict(zip(("name", "summary", "synonyms"), row, strict=True)) for row in rows]})
         return
     from rich.table import Table
     from rich.text import Text
@@ -73,7 +109,7 @@ def show_part(name: str, as_json: bool, changed: bool = False) -> None:
     Parameters
     ----------
     name
-        The name of its class.
+        The name of its class, or what textbooks or Modelica call it.
     as_json
         Whether to write JSON.
     changed
@@ -84,24 +120,40 @@ def show_part(name: str, as_json: bool, changed: bool = False) -> None:
     UsageError
         If no library has such a part, or something of it is to be changed.
     """
-    kinds = library_parts()
-    if name not in kinds:
-        raise _no_such_part(name, kinds)
+    found = parts_called(name)
+    if not found:
+        raise _no_such_part(name)
     if changed:
         raise UsageError(
             "--set, --start and --moved are for scenes, and this is a part", where=name, advice="Leave them out."
         )
-    kind = kinds[name]
-    tables = {heading: rows for heading, rows in _tables(kind) if rows}
     if as_json:
-        print_json({"part": name, "spaces": kind.spaces, "text": " ".join(_said(kind)), **tables})
+        shown = [
+            {
+                "part": own,
+                "synonyms": list(_synonyms(kind)),
+                "spaces": kind.spaces,
+                "text": " ".join(_said(kind)),
+                **{heading: rows for heading, rows in _tables(kind) if rows},
+            }
+            for own, kind in found.items()
+        ]
+        print_json(shown[0] if len(shown) == 1 else {"parts": shown})
         return
+    for own, kind in found.items():
+        _print_part(own, kind)
+
+
+def _print_part(name: str, kind: type[Component]) -> None:
+    tables = {heading: rows for heading, rows in _tables(kind) if rows}
     from rich.table import Table
     from rich.text import Text
 
     out = console()
     out.print(Text.assemble((name, "bold"), _only_in(kind.spaces)))
     out.print(Text("\n".join(_said(kind))))
+    if _synonyms(kind):
+        out.print(Text(f"Also called: {', '.join(_synonyms(kind))}."))
     for heading, rows in tables.items():
         table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
         for column in rows[0]:
@@ -112,12 +164,14 @@ def show_part(name: str, as_json: bool, changed: bool = False) -> None:
         out.print(table)
 
 
-def _no_such_part(name: str, kinds: Iterable[str]) -> UsageError:
+def _no_such_part(name: str) -> UsageError:
     """Return the error for a name that is no part; it may be the class of a scene."""
     from atwood.cli.scenes import bundled_scenes
 
     scene = next((scene for scene, kind in bundled_scenes().items() if kind.__name__ == name), "")
-    advice = suggestion(name, kinds) if near_matches(name, kinds) else "See `atwood list --parts`."
+    kinds = library_parts()
+    known = [*kinds, *(word for kind in kinds.values() for word in _synonyms(kind))]
+    advice = suggestion(name, known) if near_matches(name, known) else "See `atwood list --parts`."
     return UsageError("there is no such part", where=name, advice=f"The scene is {scene!r}." if scene else advice)
 
 

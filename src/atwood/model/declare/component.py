@@ -48,6 +48,8 @@ class Component:
 
     spaces: ClassVar[tuple[str, ...]] = ("line", "plane", "space")
     """Where it means something; in a scene that lives elsewhere it is refused."""
+    synonyms: ClassVar[tuple[str, ...]] = ()
+    """What textbooks and Modelica call it; a class derived from it has none of them."""
 
     _parameters: ClassVar[dict[str, ParameterSpec]] = {}
     _signals: ClassVar[dict[str, SignalSpec]] = {}
