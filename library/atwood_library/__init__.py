@@ -1,119 +1,143 @@
-"""The component library of Atwood."""
+"""The component library of Atwood. A part is loaded when it is first used.
 
-from atwood_library.forces.bushing import Bushing
-from atwood_library.forces.central_gravity import CentralGravity
-from atwood_library.forces.damper import Damper
-from atwood_library.forces.drag import Drag
-from atwood_library.forces.force import Force
-from atwood_library.forces.spring import Spring
-from atwood_library.forces.torque import Torque
-from atwood_library.forces.torsion_damper import TorsionDamper
-from atwood_library.forces.torsion_spring import TorsionSpring
-from atwood_library.joints.constant_velocity import ConstantVelocity
-from atwood_library.joints.cylindrical import Cylindrical
-from atwood_library.joints.drive import Drive
-from atwood_library.joints.free_joint import FreeJoint
-from atwood_library.joints.gear import Gear
-from atwood_library.joints.pivot import Pivot
-from atwood_library.joints.planar import Planar
-from atwood_library.joints.planetary_gear import PlanetaryGear
-from atwood_library.joints.point_on_circle import PointOnCircle
-from atwood_library.joints.point_on_line import PointOnLine
-from atwood_library.joints.point_on_plane import PointOnPlane
-from atwood_library.joints.rack_and_pinion import RackAndPinion
-from atwood_library.joints.rolling_disc import RollingDisc
-from atwood_library.joints.rolling_sphere import RollingSphere
-from atwood_library.joints.rotary_drive import RotaryDrive
-from atwood_library.joints.screw import Screw
-from atwood_library.joints.slide_gear import SlideGear
-from atwood_library.joints.slider import Slider
-from atwood_library.joints.spherical import Spherical
-from atwood_library.joints.universal import Universal
-from atwood_library.joints.weld import Weld
-from atwood_library.parts.bar import Bar
-from atwood_library.parts.box import Box
-from atwood_library.parts.cone import Cone
-from atwood_library.parts.cylinder import Cylinder
-from atwood_library.parts.disc import Disc
-from atwood_library.parts.ground import Ground
-from atwood_library.parts.link import Link
-from atwood_library.parts.mass_1d import Mass1D
-from atwood_library.parts.mesh_body import MeshBody
-from atwood_library.parts.point_mass import PointMass
-from atwood_library.parts.rigid_body import RigidBody
-from atwood_library.parts.rim import Rim
-from atwood_library.parts.rod import Rod
-from atwood_library.parts.sphere import Sphere
-from atwood_library.parts.tube import Tube
-from atwood_library.parts.wheel import Wheel
-from atwood_library.ropes.pulley import Pulley
-from atwood_library.ropes.rope import Rope
-from atwood_library.sensors.angle_sensor import AngleSensor
-from atwood_library.sensors.energy_sensor import EnergySensor
-from atwood_library.sensors.force_sensor import ForceSensor
-from atwood_library.sensors.frame_sensor import FrameSensor
-from atwood_library.sensors.orientation_sensor import OrientationSensor
-from atwood_library.sensors.position_sensor import PositionSensor
-from atwood_library.sensors.relative_position_sensor import RelativePositionSensor
-from atwood_library.sources.ramp import Ramp
-from atwood_library.sources.sine import Sine
+A new part stands here twice: as an import, for type checkers and editors, and in `_MODULES`.
+"""
 
-__all__ = [
-    "AngleSensor",
-    "Bar",
-    "Box",
-    "Bushing",
-    "CentralGravity",
-    "Cone",
-    "ConstantVelocity",
-    "Cylinder",
-    "Cylindrical",
-    "Damper",
-    "Disc",
-    "Drag",
-    "Drive",
-    "EnergySensor",
-    "Force",
-    "ForceSensor",
-    "FrameSensor",
-    "FreeJoint",
-    "Gear",
-    "Ground",
-    "Link",
-    "Mass1D",
-    "MeshBody",
-    "OrientationSensor",
-    "Pivot",
-    "Planar",
-    "PlanetaryGear",
-    "PointMass",
-    "PointOnCircle",
-    "PointOnLine",
-    "PointOnPlane",
-    "PositionSensor",
-    "Pulley",
-    "RackAndPinion",
-    "Ramp",
-    "RelativePositionSensor",
-    "RigidBody",
-    "Rim",
-    "Rod",
-    "RollingDisc",
-    "RollingSphere",
-    "Rope",
-    "RotaryDrive",
-    "Screw",
-    "Sine",
-    "SlideGear",
-    "Slider",
-    "Sphere",
-    "Spherical",
-    "Spring",
-    "Torque",
-    "TorsionDamper",
-    "TorsionSpring",
-    "Tube",
-    "Universal",
-    "Weld",
-    "Wheel",
-]
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from atwood_library.forces.bushing import Bushing as Bushing
+    from atwood_library.forces.central_gravity import CentralGravity as CentralGravity
+    from atwood_library.forces.damper import Damper as Damper
+    from atwood_library.forces.drag import Drag as Drag
+    from atwood_library.forces.force import Force as Force
+    from atwood_library.forces.spring import Spring as Spring
+    from atwood_library.forces.torque import Torque as Torque
+    from atwood_library.forces.torsion_damper import TorsionDamper as TorsionDamper
+    from atwood_library.forces.torsion_spring import TorsionSpring as TorsionSpring
+    from atwood_library.joints.constant_velocity import ConstantVelocity as ConstantVelocity
+    from atwood_library.joints.cylindrical import Cylindrical as Cylindrical
+    from atwood_library.joints.drive import Drive as Drive
+    from atwood_library.joints.free_joint import FreeJoint as FreeJoint
+    from atwood_library.joints.gear import Gear as Gear
+    from atwood_library.joints.pivot import Pivot as Pivot
+    from atwood_library.joints.planar import Planar as Planar
+    from atwood_library.joints.planetary_gear import PlanetaryGear as PlanetaryGear
+    from atwood_library.joints.point_on_circle import PointOnCircle as PointOnCircle
+    from atwood_library.joints.point_on_line import PointOnLine as PointOnLine
+    from atwood_library.joints.point_on_plane import PointOnPlane as PointOnPlane
+    from atwood_library.joints.rack_and_pinion import RackAndPinion as RackAndPinion
+    from atwood_library.joints.rolling_disc import RollingDisc as RollingDisc
+    from atwood_library.joints.rolling_sphere import RollingSphere as RollingSphere
+    from atwood_library.joints.rotary_drive import RotaryDrive as RotaryDrive
+    from atwood_library.joints.screw import Screw as Screw
+    from atwood_library.joints.slide_gear import SlideGear as SlideGear
+    from atwood_library.joints.slider import Slider as Slider
+    from atwood_library.joints.spherical import Spherical as Spherical
+    from atwood_library.joints.universal import Universal as Universal
+    from atwood_library.joints.weld import Weld as Weld
+    from atwood_library.parts.bar import Bar as Bar
+    from atwood_library.parts.box import Box as Box
+    from atwood_library.parts.cone import Cone as Cone
+    from atwood_library.parts.cylinder import Cylinder as Cylinder
+    from atwood_library.parts.disc import Disc as Disc
+    from atwood_library.parts.ground import Ground as Ground
+    from atwood_library.parts.link import Link as Link
+    from atwood_library.parts.mass_1d import Mass1D as Mass1D
+    from atwood_library.parts.mesh_body import MeshBody as MeshBody
+    from atwood_library.parts.point_mass import PointMass as PointMass
+    from atwood_library.parts.rigid_body import RigidBody as RigidBody
+    from atwood_library.parts.rim import Rim as Rim
+    from atwood_library.parts.rod import Rod as Rod
+    from atwood_library.parts.sphere import Sphere as Sphere
+    from atwood_library.parts.tube import Tube as Tube
+    from atwood_library.parts.wheel import Wheel as Wheel
+    from atwood_library.ropes.pulley import Pulley as Pulley
+    from atwood_library.ropes.rope import Rope as Rope
+    from atwood_library.sensors.angle_sensor import AngleSensor as AngleSensor
+    from atwood_library.sensors.energy_sensor import EnergySensor as EnergySensor
+    from atwood_library.sensors.force_sensor import ForceSensor as ForceSensor
+    from atwood_library.sensors.frame_sensor import FrameSensor as FrameSensor
+    from atwood_library.sensors.orientation_sensor import OrientationSensor as OrientationSensor
+    from atwood_library.sensors.position_sensor import PositionSensor as PositionSensor
+    from atwood_library.sensors.relative_position_sensor import RelativePositionSensor as RelativePositionSensor
+    from atwood_library.sources.ramp import Ramp as Ramp
+    from atwood_library.sources.sine import Sine as Sine
+
+_MODULES = {
+    "AngleSensor": "sensors.angle_sensor",
+    "Bar": "parts.bar",
+    "Box": "parts.box",
+    "Bushing": "forces.bushing",
+    "CentralGravity": "forces.central_gravity",
+    "Cone": "parts.cone",
+    "ConstantVelocity": "joints.constant_velocity",
+    "Cylinder": "parts.cylinder",
+    "Cylindrical": "joints.cylindrical",
+    "Damper": "forces.damper",
+    "Disc": "parts.disc",
+    "Drag": "forces.drag",
+    "Drive": "joints.drive",
+    "EnergySensor": "sensors.energy_sensor",
+    "Force": "forces.force",
+    "ForceSensor": "sensors.force_sensor",
+    "FrameSensor": "sensors.frame_sensor",
+    "FreeJoint": "joints.free_joint",
+    "Gear": "joints.gear",
+    "Ground": "parts.ground",
+    "Link": "parts.link",
+    "Mass1D": "parts.mass_1d",
+    "MeshBody": "parts.mesh_body",
+    "OrientationSensor": "sensors.orientation_sensor",
+    "Pivot": "joints.pivot",
+    "Planar": "joints.planar",
+    "PlanetaryGear": "joints.planetary_gear",
+    "PointMass": "parts.point_mass",
+    "PointOnCircle": "joints.point_on_circle",
+    "PointOnLine": "joints.point_on_line",
+    "PointOnPlane": "joints.point_on_plane",
+    "PositionSensor": "sensors.position_sensor",
+    "Pulley": "ropes.pulley",
+    "RackAndPinion": "joints.rack_and_pinion",
+    "Ramp": "sources.ramp",
+    "RelativePositionSensor": "sensors.relative_position_sensor",
+    "RigidBody": "parts.rigid_body",
+    "Rim": "parts.rim",
+    "Rod": "parts.rod",
+    "RollingDisc": "joints.rolling_disc",
+    "RollingSphere": "joints.rolling_sphere",
+    "Rope": "ropes.rope",
+    "RotaryDrive": "joints.rotary_drive",
+    "Screw": "joints.screw",
+    "Sine": "sources.sine",
+    "SlideGear": "joints.slide_gear",
+    "Slider": "joints.slider",
+    "Sphere": "parts.sphere",
+    "Spherical": "joints.spherical",
+    "Spring": "forces.spring",
+    "Torque": "forces.torque",
+    "TorsionDamper": "forces.torsion_damper",
+    "TorsionSpring": "forces.torsion_spring",
+    "Tube": "parts.tube",
+    "Universal": "joints.universal",
+    "Weld": "joints.weld",
+    "Wheel": "parts.wheel",
+}
+"""The module of each part, below this package."""
+
+__all__ = [*_MODULES]
+
+if not TYPE_CHECKING:  # so that type checkers know which names there are
+
+    def __getattr__(name):
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        found = getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)
+        globals()[name] = found
+        return found
+
+    def __dir__():
+        return sorted({*globals(), *__all__})

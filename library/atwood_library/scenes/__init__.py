@@ -1,89 +1,109 @@
-"""Scenes of the library: each is known to the command line by its name, and can be a part of another scene."""
+"""Scenes of the library: each is known to the command line by its name, and can be a part of another scene.
+
+A scene is loaded when it is first used. A new one stands here twice: as an import, for type checkers and editors, and
+in `_CLASSES`; its file is named after it, with underscores.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from atwood import Scene
-from atwood_library.scenes.atwood import Atwood
-from atwood_library.scenes.bricard import Bricard
-from atwood_library.scenes.chain import Chain
-from atwood_library.scenes.double_atwood import DoubleAtwood
-from atwood_library.scenes.double_pendulum import DoublePendulum
-from atwood_library.scenes.double_pendulum_3d import DoublePendulum3D
-from atwood_library.scenes.driven_pendulum import DrivenPendulum
-from atwood_library.scenes.flyball_governor import FlyballGovernor
-from atwood_library.scenes.foucault_pendulum import FoucaultPendulum
-from atwood_library.scenes.four_bar import FourBar
-from atwood_library.scenes.four_bar_row import FourBarRow
-from atwood_library.scenes.free_body import FreeBody
-from atwood_library.scenes.gyroscope import Gyroscope
-from atwood_library.scenes.heavy_top import HeavyTop
-from atwood_library.scenes.intermediate_axis import IntermediateAxis
-from atwood_library.scenes.lagrange_top import LagrangeTop
-from atwood_library.scenes.mass_spring_chain import MassSpringChain
-from atwood_library.scenes.pendulum_on_cart import PendulumOnCart
-from atwood_library.scenes.rolling_ball import RollingBall
-from atwood_library.scenes.rolling_disc import RollingDisc
-from atwood_library.scenes.simple_pendulum import SimplePendulum
-from atwood_library.scenes.slider_crank import SliderCrank
-from atwood_library.scenes.spatial_slider_crank import SpatialSliderCrank
-from atwood_library.scenes.spherical_pendulum import SphericalPendulum
-from atwood_library.scenes.stewart_platform import StewartPlatform
-from atwood_library.scenes.universal_shaft import UniversalShaft
 
-__all__ = [
-    "SCENES",
-    "Atwood",
-    "Bricard",
-    "Chain",
-    "DoubleAtwood",
-    "DoublePendulum",
-    "DoublePendulum3D",
-    "DrivenPendulum",
-    "FlyballGovernor",
-    "FoucaultPendulum",
-    "FourBar",
-    "FourBarRow",
-    "FreeBody",
-    "Gyroscope",
-    "HeavyTop",
-    "IntermediateAxis",
-    "LagrangeTop",
-    "MassSpringChain",
-    "PendulumOnCart",
-    "RollingBall",
-    "RollingDisc",
-    "SimplePendulum",
-    "SliderCrank",
-    "SpatialSliderCrank",
-    "SphericalPendulum",
-    "StewartPlatform",
-    "UniversalShaft",
-]
+if TYPE_CHECKING:
+    from atwood_library.scenes.atwood import Atwood as Atwood
+    from atwood_library.scenes.bricard import Bricard as Bricard
+    from atwood_library.scenes.chain import Chain as Chain
+    from atwood_library.scenes.double_atwood import DoubleAtwood as DoubleAtwood
+    from atwood_library.scenes.double_pendulum import DoublePendulum as DoublePendulum
+    from atwood_library.scenes.double_pendulum_3d import DoublePendulum3D as DoublePendulum3D
+    from atwood_library.scenes.driven_pendulum import DrivenPendulum as DrivenPendulum
+    from atwood_library.scenes.flyball_governor import FlyballGovernor as FlyballGovernor
+    from atwood_library.scenes.foucault_pendulum import FoucaultPendulum as FoucaultPendulum
+    from atwood_library.scenes.four_bar import FourBar as FourBar
+    from atwood_library.scenes.four_bar_row import FourBarRow as FourBarRow
+    from atwood_library.scenes.free_body import FreeBody as FreeBody
+    from atwood_library.scenes.gyroscope import Gyroscope as Gyroscope
+    from atwood_library.scenes.heavy_top import HeavyTop as HeavyTop
+    from atwood_library.scenes.intermediate_axis import IntermediateAxis as IntermediateAxis
+    from atwood_library.scenes.lagrange_top import LagrangeTop as LagrangeTop
+    from atwood_library.scenes.mass_spring_chain import MassSpringChain as MassSpringChain
+    from atwood_library.scenes.pendulum_on_cart import PendulumOnCart as PendulumOnCart
+    from atwood_library.scenes.rolling_ball import RollingBall as RollingBall
+    from atwood_library.scenes.rolling_disc import RollingDisc as RollingDisc
+    from atwood_library.scenes.simple_pendulum import SimplePendulum as SimplePendulum
+    from atwood_library.scenes.slider_crank import SliderCrank as SliderCrank
+    from atwood_library.scenes.spatial_slider_crank import SpatialSliderCrank as SpatialSliderCrank
+    from atwood_library.scenes.spherical_pendulum import SphericalPendulum as SphericalPendulum
+    from atwood_library.scenes.stewart_platform import StewartPlatform as StewartPlatform
+    from atwood_library.scenes.universal_shaft import UniversalShaft as UniversalShaft
 
-SCENES: dict[str, type[Scene]] = {
-    "simple-pendulum": SimplePendulum,
-    "double-pendulum": DoublePendulum,
-    "pendulum-on-cart": PendulumOnCart,
-    "mass-spring-chain": MassSpringChain,
-    "atwood": Atwood,
-    "double-atwood": DoubleAtwood,
-    "four-bar": FourBar,
-    "slider-crank": SliderCrank,
-    "chain": Chain,
-    "driven-pendulum": DrivenPendulum,
-    "bricard": Bricard,
-    "double-pendulum-3d": DoublePendulum3D,
-    "flyball-governor": FlyballGovernor,
-    "foucault-pendulum": FoucaultPendulum,
-    "four-bar-row": FourBarRow,
-    "free-body": FreeBody,
-    "gyroscope": Gyroscope,
-    "heavy-top": HeavyTop,
-    "intermediate-axis": IntermediateAxis,
-    "lagrange-top": LagrangeTop,
-    "rolling-ball": RollingBall,
-    "rolling-disc": RollingDisc,
-    "spatial-slider-crank": SpatialSliderCrank,
-    "spherical-pendulum": SphericalPendulum,
-    "stewart-platform": StewartPlatform,
-    "universal-shaft": UniversalShaft,
+_CLASSES = {
+    "simple-pendulum": "SimplePendulum",
+    "double-pendulum": "DoublePendulum",
+    "pendulum-on-cart": "PendulumOnCart",
+    "mass-spring-chain": "MassSpringChain",
+    "atwood": "Atwood",
+    "double-atwood": "DoubleAtwood",
+    "four-bar": "FourBar",
+    "slider-crank": "SliderCrank",
+    "chain": "Chain",
+    "driven-pendulum": "DrivenPendulum",
+    "bricard": "Bricard",
+    "double-pendulum-3d": "DoublePendulum3D",
+    "flyball-governor": "FlyballGovernor",
+    "foucault-pendulum": "FoucaultPendulum",
+    "four-bar-row": "FourBarRow",
+    "free-body": "FreeBody",
+    "gyroscope": "Gyroscope",
+    "heavy-top": "HeavyTop",
+    "intermediate-axis": "IntermediateAxis",
+    "lagrange-top": "LagrangeTop",
+    "rolling-ball": "RollingBall",
+    "rolling-disc": "RollingDisc",
+    "spatial-slider-crank": "SpatialSliderCrank",
+    "spherical-pendulum": "SphericalPendulum",
+    "stewart-platform": "StewartPlatform",
+    "universal-shaft": "UniversalShaft",
 }
+"""The class of each scene by the name that the command line knows it by."""
+
+_NAMES = {kind: name for name, kind in _CLASSES.items()}
+
+
+class _Scenes(Mapping[str, type[Scene]]):
+    """Scenes by name; each is loaded when it is asked for."""
+
+    def __getitem__(self, name: str) -> type[Scene]:
+        kind = _CLASSES[name]
+        found: type[Scene] = getattr(importlib.import_module(f"{__name__}.{name.replace('-', '_')}"), kind)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_CLASSES)
+
+    def __len__(self) -> int:
+        return len(_CLASSES)
+
+    def __contains__(self, name: object) -> bool:
+        return name in _CLASSES
+
+
+SCENES: Mapping[str, type[Scene]] = _Scenes()
 """All scenes by the name that the command line knows them by."""
+
+__all__ = ["SCENES", *_NAMES]
+
+if not TYPE_CHECKING:  # so that type checkers know which names there are
+
+    def __getattr__(name):
+        if name not in _NAMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        found = SCENES[_NAMES[name]]
+        globals()[name] = found
+        return found
+
+    def __dir__():
+        return sorted({*globals(), *__all__})

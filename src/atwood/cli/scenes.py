@@ -32,11 +32,15 @@ def bundled_scenes() -> dict[str, type[Model]]:
     UsageError
         If a library cannot be loaded.
     """
-    return _scenes_of(all_libraries())
-
-
-def _scenes_of(libraries: Iterable[str]) -> dict[str, type[Model]]:
     found: dict[str, type[Model]] = {}
+    for scenes in _scenes_of(all_libraries()):
+        for name in scenes:
+            found.setdefault(name, scenes[name])
+    return found
+
+
+def _scenes_of(libraries: Iterable[str]) -> Iterator[Mapping[str, type[Model]]]:
+    """Yield the scenes of one library after another; a library may load each when it is asked for."""
     for library in libraries:
         name = f"{library}.scenes"
         try:
@@ -47,9 +51,7 @@ def _scenes_of(libraries: Iterable[str]) -> dict[str, type[Model]]:
             raise UsageError(f"the library cannot be loaded ({error})", where=library) from error
         except ImportError as error:
             raise UsageError(f"the library cannot be loaded ({error})", where=library) from error
-        for scene, kind in getattr(module, "SCENES", {}).items():
-            found.setdefault(scene, kind)
-    return found
+        yield getattr(module, "SCENES", {})
 
 
 def find_scene(text: str) -> tuple[Model, str]:
@@ -70,16 +72,16 @@ def find_scene(text: str) -> tuple[Model, str]:
         return _scene_in_file(Path(file), name), name
     if text.endswith(".py"):
         return _only_scene(Path(text))
-    scenes = _scenes_of(declared_libraries())
-    if text not in scenes:
-        scenes = bundled_scenes()
-    if text in scenes:
-        return scenes[text](), text
-    if not scenes:
+    for libraries in (declared_libraries, all_libraries):
+        for scenes in _scenes_of(libraries()):
+            if text in scenes:
+                return scenes[text](), text
+    known = bundled_scenes()
+    if not known:
         raise UsageError(
             "no component library is installed", where=text, advice="Install one, or give a scene as FILE.py:NAME."
         )
-    close = suggestion(text, scenes) if near_matches(text, scenes) else "see `atwood list`, or give FILE.py:NAME"
+    close = suggestion(text, known) if near_matches(text, known) else "see `atwood list`, or give FILE.py:NAME"
     raise UsageError("there is no such scene", where=text, advice=f"{close[0].upper()}{close[1:]}")
 
 
