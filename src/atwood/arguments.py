@@ -13,11 +13,11 @@ import operator
 import os
 import reprlib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
+from atwood.late import dataclass
 
 __all__ = [
     "ANYTHING",

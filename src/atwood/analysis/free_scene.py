@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen import compile_program
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.linalg.matrices import from_entries, to_array
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.orientation import spin_in_world

@@ -9,7 +9,6 @@ has equal values: two stops on both sides of a mass that is in the middle belong
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from atwood.arrays import BoolArray, FloatArray
 from atwood.expr import Expression, Graph, InputGroup, OutputGroup, Program
 from atwood.expr.core import algebra
 from atwood.expr.core.relations import TimeRelations
+from atwood.late import dataclass
 
 __all__ = ["Loosened", "loosen"]
 

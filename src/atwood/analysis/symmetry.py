@@ -10,7 +10,6 @@ everywhere. The symmetry may be an unstable one: then the least push in space le
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -19,6 +18,7 @@ from atwood.analysis.free_scene import Bodies, LooseScene
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.simulation.initialization.start import Start, find_start
 
 __all__ = ["Symmetry", "find_symmetries"]

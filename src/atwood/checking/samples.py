@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from atwood.errors import AtwoodError, UsageError
+from atwood.late import dataclass
 from atwood.model.declare.component import Component
 from atwood.model.declare.fields import MISSING, ParameterSpec
 from atwood.model.local.flatten import Part

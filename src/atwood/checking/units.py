@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from atwood.checking.report import Finding
 from atwood.consistency.trials import Body, Trial
+from atwood.late import dataclass
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
 from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia

@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from atwood.cli.output import console, print_json
 from atwood.cli.scenes import prepare
+from atwood.late import dataclass
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, warn
 from atwood.cli.scenes import prepare
 from atwood.errors import AtwoodError, UsageError
+from atwood.late import dataclass
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly

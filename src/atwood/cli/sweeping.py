@@ -6,7 +6,6 @@ import contextlib
 import re
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import console, print_json, warn
 from atwood.cli.scenes import pairs, prepare, warn_of_radians
 from atwood.errors import UsageError
+from atwood.late import dataclass
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -13,8 +13,9 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
+
+from atwood.late import dataclass
 
 __all__ = ["Cache", "cache_directory", "default_cache", "make_key"]
 

@@ -14,7 +14,6 @@ coordinates, in terms of which everything is written.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from atwood.errors import AtwoodError
@@ -31,6 +30,7 @@ from atwood.expr import (
 from atwood.expr.simplify.collect import cost
 from atwood.forms.places import to_maximal
 from atwood.forms.program import rates_are_speeds, state_groups
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.augmented import (
     Step,
     SymmetricSystem,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, partial
 from typing import Any, Literal
 
@@ -30,6 +30,7 @@ from atwood.forms.reduced import reduced_form
 from atwood.forms.shared import Shared
 from atwood.forms.source import Source, no_start_quantity
 from atwood.forms.starting import moved_to
+from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism, build_equations
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable, Reaction, energies, list_reactions

@@ -8,12 +8,12 @@ column after the other.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, jvp, live, sweeps_exceed
+from atwood.late import dataclass
 
 __all__ = ["Derivative", "derive", "directions", "is_too_long"]
 

@@ -8,13 +8,13 @@ from these and from the derivatives at given multipliers, residual and Jacobian 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from atwood.arrays import IndexArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian
 from atwood.forms.program import either_sign, rate_symbols, rows_along_speeds
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 
 __all__ = ["LoopProgram", "loop_program"]

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from atwood.expr import Expression
+from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism, check_closures
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.local.flatten import FlatScene, Part

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from atwood.errors import StartError, UsageError, suggestion, suggestion_in_parts
 from atwood.expr import Expression
+from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene
 from atwood.model.local.flatten import FlatScene

@@ -8,7 +8,6 @@ both points with these slopes (Hermite), and both parts are judged in the same w
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from atwood.arrays import BoolArray
 from atwood.codegen.tangents import FULL, STEEP
 from atwood.integrators.protocol import FloatArray
+from atwood.late import dataclass
 
 __all__ = ["Point", "find_dip", "may_dip"]
 

@@ -17,7 +17,6 @@ The rules, which decide the cases on the edge:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from atwood.codegen.tangents import SECANT
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.dips import Point, find_dip, may_dip
 from atwood.integrators.protocol import FloatArray, ImplicitProblem, IndexArray
+from atwood.late import dataclass
 
 __all__ = ["EventWatch", "Root", "State"]
 

@@ -7,7 +7,6 @@ output times, events and limits, is the session's, which is the same for all ste
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import IntEnum
 from math import sqrt
 from typing import Protocol, runtime_checkable
@@ -17,6 +16,7 @@ import numpy as np
 from atwood.errors import UsageError
 from atwood.integrators.event_location import State
 from atwood.integrators.protocol import FloatArray, SolverOptions, Values
+from atwood.late import dataclass
 
 __all__ = [
     "CALM",

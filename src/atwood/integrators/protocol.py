@@ -11,7 +11,7 @@ for a reason that its status names; in every case it hands back a state that is 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from enum import Enum
 from typing import Any, Literal, Protocol, TypeAlias
 
@@ -19,6 +19,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import UsageError
+from atwood.late import dataclass
 
 __all__ = [
     "Advance",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike
 from atwood.arguments import show
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
+from atwood.late import dataclass
 
 __all__ = ["DEFAULT_VIEW", "Camera", "View", "as_camera", "check_view"]
 

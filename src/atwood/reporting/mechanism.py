@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from atwood.arguments import takes
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.constraints.frobenius import integrable_together
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
+from atwood.late import dataclass
 
 __all__ = ["EnergyLedger", "Piece", "exchange", "make_ledger"]
 

@@ -17,7 +17,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -27,6 +27,7 @@ from atwood.arguments import FILE, check, instance, takes
 from atwood.arrays import FloatArray
 from atwood.errors import ResultError, UsageError, suggestion_in_parts
 from atwood.files import check_directory, check_readable, write_atomically
+from atwood.late import dataclass
 from atwood.model.declare.quantities import PATH, PATHS
 from atwood.result.about import describe_run
 from atwood.result.result import Result, output_number

@@ -6,14 +6,13 @@ run counter-clockwise as seen from outside. A mesh may have several shells: bodi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from atwood.arguments import show
 from atwood.arrays import FloatArray, IntArray
 from atwood.errors import ParameterError
+from atwood.late import dataclass
 from atwood.solids.shells import check_overlap, check_shells, signed_volume, split_shells
 from atwood.solids.welding import weld
 

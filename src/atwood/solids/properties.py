@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike
 from atwood.arguments import check, instance, number, takes
 from atwood.arrays import FloatArray
 from atwood.errors import ParameterError
+from atwood.late import dataclass
 from atwood.solids.checks import checked_array, checked_number, checked_rotation, symmetric_part, verify_moments
 
 __all__ = ["MassProperties", "combine", "point_mass", "subtract"]

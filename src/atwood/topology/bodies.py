@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from atwood.expr import Expression, Scalar, depends_on, is_zero
+from atwood.late import dataclass
 from atwood.model.declare.laws import Kind
 from atwood.model.local.laws import LocalConstraint, LocalPart
 from atwood.topology.graph import WORLD, Joint, MechanismGraph

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 from math import pi
 
 from atwood.errors import UsageError, suggestion
+from atwood.late import dataclass
 
 __all__ = ["ORIENTATIONS", "Chart", "Orientation", "check_orientation"]
 

@@ -8,10 +8,11 @@ bodies are attached greedily, the cheapest way first, and a body waits while a c
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 from atwood.expr import Expression
+from atwood.late import dataclass
 from atwood.model.local.laws import LocalPart
 from atwood.model.values.space import Space
 from atwood.topology.bodies import Bodies, reads_position

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from atwood.errors import ConnectError, DeclarationError, suggestion
 from atwood.expr import Expression, depends_on
+from atwood.late import dataclass
 from atwood.model.declare.connectors import Frame, JointCoordinate
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.laws import LocalJoint, LocalPart

@@ -6,7 +6,6 @@ import ctypes
 import json
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -25,6 +24,7 @@ from atwood.codegen.llvm.engine import (
 from atwood.codegen.llvm.module import CodeOptions, ModuleText, Part, write_module
 from atwood.errors import UnsupportedError
 from atwood.expr.core.operations import ExternalFunction
+from atwood.late import dataclass
 
 __all__ = ["GENERATORS", "Built", "Failures", "build_code", "default_options", "hash_of_generators"]
 

@@ -8,10 +8,10 @@ the scratch array, in slots that are used again once nobody needs their value an
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
+from atwood.late import dataclass
 
 __all__ = [
     "LARGEST_UNROLLED",

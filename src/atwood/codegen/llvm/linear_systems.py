@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from atwood.codegen.llvm.layout import LARGEST_UNROLLED, MatrixKey, matrix_key
 from atwood.codegen.llvm.text import Writer, literal
 from atwood.expr.core.graph import Expression
+from atwood.late import dataclass
 
 __all__ = ["ROUTINES", "Solver"]
 

@@ -17,7 +17,6 @@ each with arrays of its own.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from atwood.codegen.llvm.layout import Body, Layout, lay_out, main_body, prologue_body
 from atwood.codegen.llvm.linear_systems import ROUTINES, Solver
@@ -27,6 +26,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
+from atwood.late import dataclass
 
 __all__ = ["CodeOptions", "ModuleText", "Part", "write_module"]
 

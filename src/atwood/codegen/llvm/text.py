@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
+from atwood.late import dataclass
 
 __all__ = ["LIBRARY_FUNCTIONS", "Needs", "Writer", "has_code", "literal"]
 

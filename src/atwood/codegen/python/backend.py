@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -18,6 +17,7 @@ from atwood.expr.core.analysis import evaluate, live
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import BINARY, UNARY, ExternalFunction, solve_floats, solve_or_nan
 from atwood.expr.core.program import Program
+from atwood.late import dataclass
 
 _LARGEST_PLAIN_SOLVE = 3
 

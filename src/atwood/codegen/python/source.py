@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import UNARY
+from atwood.late import dataclass
 
 Flavour = Literal["fast", "careful", "vectorized"]
 """``fast`` raises outside a function's domain; ``careful`` gives nan there; ``vectorized`` works on arrays."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import Array, c_double, c_int, c_void_p
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +20,7 @@ from atwood.codegen.sundials.text import array_of, sundials_layout
 from atwood.codegen.tangents import SECANT, STEEP
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
+from atwood.late import dataclass
 
 __all__ = ["EVENTS_PLACE", "EventCode", "EventData", "compile_events"]
 

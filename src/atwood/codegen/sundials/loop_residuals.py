@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +14,7 @@ from atwood.codegen.sundials.null_space import ATTENTION, FIELDS, LIMIT, RATE, L
 from atwood.codegen.sundials.text import SundialsLayout, sundials_layout
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.expr.core.program import Program
+from atwood.late import dataclass
 
 __all__ = ["LoopCallbacks", "LoopData", "compile_loop_callbacks"]
 

@@ -13,13 +13,13 @@ speed are solved separately, block by block.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 from atwood.codegen.llvm.linear_systems import ROUTINES
 from atwood.codegen.llvm.routine import Routine
 from atwood.codegen.llvm.text import literal
 from atwood.codegen.sundials.text import SundialsLayout
+from atwood.late import dataclass
 
 __all__ = ["ATTENTION", "FIELDS", "LIMIT", "RATE", "LoopShape", "loop_text"]
 

@@ -10,7 +10,6 @@ import ctypes
 import importlib.util
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import UnsupportedError
+from atwood.late import dataclass
 
 __all__ = [
     "SundialsLayout",

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 from atwood.arguments import CALLBACK, NAME, check_fields, each, instance, optional, takes_names
+from atwood.late import dataclass
 
 INF = math.inf
 NAN = math.nan

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ from atwood.errors import AtwoodError
 from atwood.expr.core.analysis import count_operations, live, varying
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.operations import COMMUTATIVE
+from atwood.late import dataclass
 
 
 class InputGroup(NamedTuple):

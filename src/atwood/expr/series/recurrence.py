@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from atwood.errors import UnsupportedError
 from atwood.expr.core import algebra
 from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.series.rules import RULES, Series
+from atwood.late import dataclass
 
 __all__ = ["Convolution", "Recurrence"]
 

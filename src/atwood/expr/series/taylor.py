@@ -22,12 +22,12 @@ Mathematics 14 (2005) 99-117, section 2.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from atwood.errors import UsageError
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.program import InputGroup, OutputGroup, Program
 from atwood.expr.series.recurrence import Convolution, Recurrence
+from atwood.late import dataclass
 
 __all__ = ["NUMBERS", "TaylorPrograms", "taylor_programs"]
 

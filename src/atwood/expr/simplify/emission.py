@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from heapq import heappop, heappush
 from typing import TypeAlias
 
 from atwood.expr.core import algebra
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.simplify.polynomial import Atom, Coefficient, Expansion, Polynomial, Wave
+from atwood.late import dataclass
 
 Factor: TypeAlias = tuple[int, int]
 """The rank of a factor (coefficients, waves, values, products, inverses) and its number."""

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple, TypeAlias
 
 from atwood.expr.core.analysis import live, varying
 from atwood.expr.core.graph import Expression
+from atwood.late import dataclass
 
 Monomial: TypeAlias = tuple[tuple[int, int], ...]
 """Pairs of an atom and its exponent, sorted by atom."""

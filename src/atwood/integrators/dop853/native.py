@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from itertools import accumulate
 from math import inf
 
@@ -35,6 +35,7 @@ from atwood.integrators.explicit_problem import (
     absolute_tolerances,
 )
 from atwood.integrators.protocol import FloatArray, SolverOptions
+from atwood.late import dataclass
 
 __all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates"]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import time
 from ctypes import c_int, c_void_p
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.once import once
 from atwood.integrators.ensemble.code import FIELDS, batch_code
 from atwood.integrators.protocol import FloatArray
+from atwood.late import dataclass
 
 __all__ = ["ENDS", "Batch", "BatchParameters", "BatchPlaces"]
 

@@ -11,7 +11,6 @@ import signal
 import threading
 from collections.abc import Callable, Iterable
 from ctypes import c_double, c_int32, c_int64, c_void_p
-from dataclasses import dataclass
 from math import inf
 from typing import Any
 
@@ -23,6 +22,7 @@ from atwood.integrators.event_location import State
 from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.ida.signatures import JACOBIAN, RESIDUAL, WEIGHTS
 from atwood.integrators.protocol import FloatArray, ImplicitProblem, LinearSolver
+from atwood.late import dataclass
 
 __all__ = [
     "InterruptLater",

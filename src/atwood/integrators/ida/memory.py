@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import weakref
 from ctypes import c_double, c_int, c_long, c_void_p
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.ida.signatures import JACOBIAN
 from atwood.integrators.ida.sparse import SparseSolver
 from atwood.integrators.protocol import FloatArray, LinearSolver
+from atwood.late import dataclass
 
 __all__ = ["ONE_STEP", "ROOT_RETURN", "STOPPED_BY_WEIGHTS", "TOO_MUCH_WORK", "TO_TIME", "Counts", "IdaMemory"]
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import inf
 
 from atwood.integrators.event_location import ROUNDING
 from atwood.integrators.ida.sundae import STALLED_STEPS
+from atwood.late import dataclass
 
 __all__ = ["FIRST_CHUNK", "Pace", "first_chunk"]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from atwood.errors import UsageError
@@ -12,6 +10,7 @@ from atwood.integrators.ida.callbacks import Record, address, jacobian_function,
 from atwood.integrators.ida.library import library
 from atwood.integrators.ida.memory import IdaMemory
 from atwood.integrators.protocol import FloatArray, ImplicitProblem, LinearSolver, NativeCallbacks, SolverOptions
+from atwood.late import dataclass
 
 __all__ = ["LOOSE_NEWTON", "TIGHT_NEWTON", "IdaTuning", "prepare"]
 

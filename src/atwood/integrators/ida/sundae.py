@@ -19,7 +19,6 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any
 
@@ -39,6 +38,7 @@ from atwood.integrators.protocol import (
     Status,
     choose_linear_solver,
 )
+from atwood.late import dataclass
 
 __all__ = ["SundaeSession", "open_session"]
 

@@ -14,12 +14,12 @@ section 3.  Three things differ:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import ceil, exp, frexp, inf, ldexp, log
 from typing import TYPE_CHECKING
 
 from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.protocol import FloatArray, SolverOptions
+from atwood.late import dataclass
 
 if TYPE_CHECKING:
     from atwood.integrators.taylor.native import CompiledRecurrences

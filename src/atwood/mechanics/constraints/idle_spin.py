@@ -8,13 +8,14 @@ velocity along the axis is zero. This constraint needs no force, so that all the
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, Scalar, depends_on, evaluate, is_zero
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.inertia import RigidMass, add_masses
 from atwood.mechanics.kinematics.mechanism import Mechanism, decide
 from atwood.mechanics.kinematics.motion import Movement

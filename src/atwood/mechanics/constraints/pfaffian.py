@@ -10,7 +10,6 @@ nothing singles out.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -19,6 +18,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, evaluate, jacobian, live, substitute
 from atwood.expr.core.operations import PIECEWISE_CONSTANT
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism, decide, extent
 from atwood.mechanics.kinematics.motion import Movement

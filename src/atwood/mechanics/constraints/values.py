@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, depends_on, jvp, live, substitute
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Constraint, Integral, constraint_levels, put_in_place
 from atwood.mechanics.dynamics.forces import (
     Site,

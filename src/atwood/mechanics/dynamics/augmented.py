@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 from atwood.expr import Expression, Graph, live
 from atwood.expr.core import algebra
+from atwood.late import dataclass
 
 __all__ = [
     "Step",

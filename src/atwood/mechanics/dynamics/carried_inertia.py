@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 from atwood.errors import TopologyError
 from atwood.expr import Scalar, is_zero
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.inertia import shifted_tensor, sum_vectors, tensor_of, turned_tensor
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, rotate
 from atwood.model.declare.contributions import BodyInertia

@@ -7,9 +7,10 @@ The generalized force on speed u_k is the sum over all nodes and bodies of ``(m 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.forces import Forces, Site, constraint_forces, local_map, part_forces
 from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
 from atwood.mechanics.kinematics.body_points import arm_of

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from atwood.errors import DeclarationError, ParameterError
 from atwood.expr import Expression, Scalar, evaluate, is_zero
+from atwood.late import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, rotate
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.laws import LocalPart

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from atwood.expr import Scalar
+from atwood.late import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, rotate
 from atwood.mechanics.kinematics.positions import Components, Kinematics
 from atwood.model.values.rotation import from_axes

@@ -6,11 +6,12 @@ One recursion gives positions and orientations; velocities and accelerations are
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, affine_coefficients, jvp, live, substitute
+from atwood.late import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, rotate
 from atwood.model.local.laws import LocalPart
 from atwood.model.values.rotation import Axes

@@ -8,10 +8,10 @@ differentiated in the body's own axes, where it is constant, and turned into the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute
+from atwood.late import dataclass
 from atwood.mechanics.kinematics.joint_shift import Turned, displaced, reads_axes
 from atwood.mechanics.kinematics.orientation import (
     Quaternion,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from atwood.expr import Expression, Graph
+from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Reaction

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from atwood.expr import Expression, Scalar
+from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor

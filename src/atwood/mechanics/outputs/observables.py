@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from atwood.expr import Expression, Scalar, live, substitute, vjp
+from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.dynamics.carried_inertia import CarriedInertia
 from atwood.mechanics.dynamics.equations import Equations

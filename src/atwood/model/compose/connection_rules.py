@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from atwood.arguments import show
 from atwood.errors import ConnectError, DeclarationError, UsageError, suggestion
+from atwood.late import dataclass
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, OutputRef
 from atwood.model.declare.declaring import check_reserved

@@ -8,10 +8,11 @@ work; `find_edits` compares with it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import ConnectError, UsageError
+from atwood.late import dataclass
 from atwood.model.compose.connection_rules import Parts, find_end, named_parts
 from atwood.model.declare.component import Component
 

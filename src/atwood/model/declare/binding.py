@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from atwood.expr import Scalar
+from atwood.late import dataclass
 from atwood.model.declare.connectors import Motion
 from atwood.model.values.vector import Vector
 

@@ -7,12 +7,12 @@ to zero.  Through quantities are positive *into* the component.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
 from atwood.arguments import ANYTHING, BY_PATH, DOC, NAME, TEXT, Kind, Refused, optional, takes
 from atwood.errors import DeclarationError, UsageError
 from atwood.expr import Scalar
+from atwood.late import dataclass
 from atwood.model.values.vector import Vector, dot
 
 if TYPE_CHECKING:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from atwood.arguments import Kind, Refused, check_fields, each, either, instance, one_of, optional, show, takes_names
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.expr.core.functions import SCALAR
+from atwood.late import dataclass
 from atwood.model.declare.connectors import Frame, JointCoordinate, Point
 from atwood.model.values.rotation import FreeRotation, Rotation
 from atwood.model.values.vector import ZERO, Vector, as_vector

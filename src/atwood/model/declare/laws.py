@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, TypeVar, overload
 
 from atwood.arguments import CALLBACK, DOC, FLAG, NAME, TEXT, check, each, number, one_of, takes, whole
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
+from atwood.late import dataclass
 from atwood.model.declare.quantities import ObservableLaw
 from atwood.model.values.units import parse_si_unit
 from atwood.model.values.vector import Vector

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, StartError, UsageError
+from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.compose.connection_rules import find_end
 from atwood.model.compose.scene import Scene

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError
 from atwood.expr import Expression, Graph, tan
+from atwood.late import dataclass
 from atwood.model.declare.component import bind
 from atwood.model.declare.laws import ConstraintOptions, Law
 from atwood.model.local.flatten import Part

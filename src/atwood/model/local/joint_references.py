@@ -7,9 +7,9 @@ joint's frames; where the coordinate is one of the mechanism's own, it takes its
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from atwood.errors import ConnectError, DeclarationError, UnsupportedError, suggestion
+from atwood.late import dataclass
 from atwood.model.declare.connectors import JointCoordinate
 from atwood.model.local.flatten import FlatScene
 

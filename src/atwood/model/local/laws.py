@@ -7,12 +7,13 @@ says by itself which connectors it depends on, and whose derivatives are the for
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, depends_on, live
+from atwood.late import dataclass
 from atwood.model.declare.carried_inertia import Asked, Carried
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from atwood.expr import Expression, Graph
+from atwood.late import dataclass
 from atwood.model.declare.binding import Binding
 from atwood.model.declare.carried_inertia import Asked
 from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from atwood.arguments import FLAG, Kind, Refused, check, number, one_of, real, show, takes_names
 from atwood.errors import DeclarationError, UsageError
+from atwood.late import dataclass
 
 __all__ = ["Outline"]
 

@@ -7,13 +7,13 @@ turn, with nothing to simplify afterwards.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from atwood.arguments import check, check_fields, each, instance, show
 from atwood.errors import DeclarationError, UsageError
 from atwood.expr import Expression, Scalar, cos, sin
 from atwood.expr.core.functions import SCALAR
+from atwood.late import dataclass
 from atwood.model.values.vector import Vector, as_vector, cross
 
 __all__ = ["FREE", "IDENTITY", "Axes", "Rotation", "Turn", "as_rotation", "compose", "from_axes", "to_axes", "turn"]

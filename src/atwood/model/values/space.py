@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from atwood.expr import Scalar, cos, sin
+from atwood.late import dataclass
 from atwood.model.values.vector import Vector, dot
 
 __all__ = ["Space", "make_space"]

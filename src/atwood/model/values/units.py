@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from functools import lru_cache
 
 from atwood.errors import DeclarationError, ParameterError, suggestion
+from atwood.late import dataclass
 
 __all__ = ["Exponents", "Unit", "parse_quantity", "parse_si_unit", "parse_unit", "split_quantity", "unit_of"]
 

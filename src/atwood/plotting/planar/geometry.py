@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Literal
 
@@ -13,6 +13,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
 from atwood.model.declare.connectors import Groove

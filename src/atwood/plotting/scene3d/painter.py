@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atwood.arrays import FloatArray
+from atwood.late import dataclass
 from atwood.plotting.camera import Camera
 from atwood.plotting.canvas import INK
 from atwood.plotting.shapes.meshes import Mesh

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.late import dataclass
 from atwood.plotting.camera import Camera
 from atwood.plotting.canvas import COLOURS
 from atwood.plotting.scene3d.model import SpaceModel, build_model

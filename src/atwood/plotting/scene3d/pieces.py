@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.late import dataclass
 from atwood.plotting.scene3d.body_shapes import BodyShape
 from atwood.plotting.scene3d.reading import Joining, Reading
 from atwood.plotting.shapes.meshes import Mesh, cylinder, frame_along

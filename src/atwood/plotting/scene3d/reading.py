@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.late import dataclass
 from atwood.model.values.outline import Outline
 
 __all__ = ["Joining", "Lump", "Pose", "Reading", "Tie"]

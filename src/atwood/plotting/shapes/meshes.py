@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atwood.arrays import FloatArray, IndexArray
+from atwood.late import dataclass
 
 __all__ = ["Mesh", "box", "cylinder", "frame_along", "revolved", "ring"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -14,6 +13,7 @@ from atwood.codegen import BoundKernel
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.program import BalanceProgram
+from atwood.late import dataclass
 from atwood.linalg.matrices import (
     Matrix,
     from_entries,

@@ -8,13 +8,13 @@ of their own. The speeds are the angular velocity in the axes of the body before
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.orientation_coordinates import (
     FARTHEST_COSINE,

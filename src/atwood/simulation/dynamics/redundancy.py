@@ -6,13 +6,14 @@ which must not be taken for additional freedom.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
+from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
 from atwood.simulation.dynamics.balance import Balance
 from atwood.simulation.dynamics.rank import CLEAR, SINGULAR, independent_rows, open_directions, review_rows, row_sizes

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import InputGroup, OutputGroup, Program
 from atwood.forms.assembly import Assembly, FormName
+from atwood.late import dataclass
 from atwood.mechanics.build import extent
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.values.units import parse_unit

@@ -7,7 +7,6 @@ at the last good state and a little ahead of it, and the first that has no value
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
@@ -16,6 +15,7 @@ from atwood.expr import Expression, OutputGroup, Program, evaluate, live, substi
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
 from atwood.integrators.protocol import FloatArray
+from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.model.declare.component import bind

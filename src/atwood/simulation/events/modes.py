@@ -6,7 +6,6 @@ An event maps (mode, q, u) to (mode, q, u). States pass between modes through ma
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, 
 from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import event_program
 from atwood.forms.places import to_maximal
+from atwood.late import dataclass
 from atwood.linalg.matrices import is_full, scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.mechanics.outputs.event_functions import Watch, list_watches

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp, live
 from atwood.expr.core.intervals import Bounds, bounds
 from atwood.expr.core.relations import relation_value
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 
 __all__ = ["Schedule", "find_schedule"]
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, depends_on, evaluate, live
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import local_map

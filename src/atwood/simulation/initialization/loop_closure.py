@@ -7,13 +7,13 @@ squares of what is missed as small as it gets, from the rough place and from oth
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.linalg.matrices import LARGEST_FULL, scaled, to_array
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.initialization.system import System

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from atwood.errors import TopologyError
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.linalg.matrices import LARGEST_FULL, scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.dynamics.balance import balance_of

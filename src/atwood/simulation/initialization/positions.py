@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, StartError
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.linalg.matrices import Matrix
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.kinematic_map import Turning, resting_place, roughly_turned, turning_of

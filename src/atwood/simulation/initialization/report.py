@@ -9,7 +9,7 @@ said of a body tells its position, its orientation, both or neither: only what i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, OutputGroup, Program, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
+from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.kinematic_map import turning_of

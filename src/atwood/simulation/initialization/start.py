@@ -7,7 +7,7 @@ balance of forces.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from atwood.expr import evaluate, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.forms.starting import starting
+from atwood.late import dataclass
 from atwood.simulation.dynamics.kinematic_map import resting_place, turning_of
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble, enter_charts, from_regular, own_names
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, scene_length

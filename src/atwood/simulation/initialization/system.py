@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, OutputGroup, Program, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
+from atwood.late import dataclass
 from atwood.linalg.matrices import (
     Matrix,
     from_entries,

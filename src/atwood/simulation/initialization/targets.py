@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 from atwood.arrays import FloatArray
@@ -11,6 +10,7 @@ from atwood.errors import StartError
 from atwood.expr import Expression, depends_on, jvp, live
 from atwood.forms.assembly import Assembly
 from atwood.forms.source import no_start_quantity
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from atwood.codegen.sundials.loop_residuals import LoopCallbacks, LoopData, compile_loop_callbacks
 from atwood.forms.loops import LoopProgram
 from atwood.integrators.protocol import FloatArray, LinearSolver, NativeCallbacks
+from atwood.late import dataclass
 from atwood.simulation.dynamics.partitioning import POOR
 from atwood.simulation.problem.partition_arrays import choice_lists, loop_shape
 

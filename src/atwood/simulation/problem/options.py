@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
+from atwood.late import dataclass
 
 __all__ = ["SOLVERS", "RunOptions", "Samples", "sample_times"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.dae import keep_constraints
 from atwood.forms.program import FormProgram
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks
+from atwood.late import dataclass
 from atwood.linalg.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of, solve_balance
 from atwood.simulation.dynamics.columns import columns_of

@@ -8,13 +8,13 @@ safe where constraints nearly depend on each other.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.integrators.protocol import FloatArray
+from atwood.late import dataclass
 from atwood.linalg.matrices import is_best_full
 from atwood.simulation.dynamics.rank import trusted_sizes
 from atwood.simulation.problem.problem import Plan

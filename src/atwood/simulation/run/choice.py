@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.integrators.protocol import FloatArray
+from atwood.late import dataclass
 from atwood.simulation.problem.explicit_scene import explicit_problem
 from atwood.simulation.problem.options import SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -13,6 +12,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import TimeIsUp, more_time
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of, project_safely, project_states
 from atwood.simulation.singular.crossing import Passage

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from atwood.errors import AtwoodError, SolveError, StartError, TopologyError, Un
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
+from atwood.late import dataclass
 from atwood.simulation.dynamics.orientation_coordinates import CHART, Reassemble, Restated, enter_charts, to_regular
 from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.dynamics.undefined_values import missing_at

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import SolveError
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.protocol import Advance, Budget, FloatArray, Session, Statistics, Status
+from atwood.late import dataclass
 from atwood.simulation.dynamics.orientation_coordinates import CHART, Restated, longest_step, restated
 from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.dynamics.undefined_values import find_missing, states_ahead

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from atwood.errors import UsageError
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents
@@ -17,6 +17,7 @@ from atwood.integrators.protocol import (
     Session,
     SolverOptions,
 )
+from atwood.late import dataclass
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.options import SOLVERS, RunOptions

@@ -12,7 +12,6 @@ fast costs IDA more, since only its order two stays stable beside the imaginary 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from atwood.errors import KernelEvaluationError
 from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.integrators.protocol import FloatArray, Values
+from atwood.late import dataclass
 
 __all__ = ["Stiffness", "can_be_stiff", "find_stiffness"]
 

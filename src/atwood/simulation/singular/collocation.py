@@ -9,7 +9,6 @@ repeated integration, with each state projected onto the constraints before forc
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from typing import TypeAlias
 
@@ -18,6 +17,7 @@ from numpy.polynomial import legendre
 
 from atwood.errors import AtwoodError
 from atwood.integrators.protocol import FloatArray
+from atwood.late import dataclass
 from atwood.simulation.dynamics.reactions import accelerations_at
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import Held, nearly_projected, project_safely, project_states

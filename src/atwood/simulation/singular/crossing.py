@@ -6,7 +6,6 @@ mechanism goes on is not determined by where it is. Its motion until then goes o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from atwood.errors import SolveError
 from atwood.integrators.event_location import EventWatch, Root, State
 from atwood.integrators.protocol import FloatArray
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.problem import Plan

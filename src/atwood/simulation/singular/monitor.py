@@ -9,12 +9,12 @@ another way the run goes on from their end.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
 from atwood.errors import AtwoodError, SolveError
 from atwood.integrators.protocol import Advance, FloatArray, Status
+from atwood.late import dataclass
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely, project_states
 from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow

@@ -8,12 +8,11 @@ rate as the position is approached, and rises again behind it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.polynomial import legendre
 
 from atwood.integrators.protocol import FloatArray
+from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import ConstraintsAt, constraints_at

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from atwood.arguments import each, instance, takes, whole
 from atwood.errors import AtwoodError
 from atwood.forms.dae import LEVELS
+from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import flatten
 from atwood.pipeline import assemble_flat

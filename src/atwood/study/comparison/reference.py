@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene
 from atwood.pipeline import simulate

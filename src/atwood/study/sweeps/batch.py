@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from atwood.expr import depends_on
 from atwood.forms.accelerations import acceleration_program
 from atwood.integrators.explicit_problem import LOOSEST
 from atwood.integrators.protocol import SolverOptions
+from atwood.late import dataclass
 from atwood.simulation.dynamics.columns import masses_at
 from atwood.simulation.dynamics.kinematic_map import turning_of
 from atwood.simulation.dynamics.reactions import ReactionSolver

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from atwood.arguments import show
 from atwood.errors import UsageError
 from atwood.forms.source import change_scene
+from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene
 from atwood.model.local.flatten import flatten

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from atwood.arguments import check
 from atwood.arrays import FloatArray
 from atwood.errors import ResultError, near_matches, suggestion
+from atwood.late import dataclass
 from atwood.model.declare.quantities import PATH
 
 __all__ = ["Sweep", "SweepStatistics"]

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, ResultError, UsageError, suggestion_in_parts
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.model.local.flatten import flatten
 from atwood.pipeline import simulate
 from atwood.result.result import Result

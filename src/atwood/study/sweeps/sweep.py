@@ -6,7 +6,6 @@ import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from atwood.arguments import BY_PATH, instance, one_of, optional, takes, whole
 from atwood.errors import AtwoodError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.declare.quantities import PATHS
 from atwood.pipeline import SCENE, assemble
