@@ -22,7 +22,7 @@ from atwood.model.values.rotation import IDENTITY, Axes, Rotation, Turn, compose
 from atwood.model.values.vector import Vector, cross, dot
 from atwood.topology.charts import Chart
 
-__all__ = ["BASES", "chart_axes", "chart_margin", "chart_quaternion", "chart_rates"]
+__all__ = ["BASES", "chart_axes", "chart_margin", "chart_quaternion", "chart_rates", "euler_spin"]
 
 BASES: tuple[Axes, Axes] = (IDENTITY, (IDENTITY[1], IDENTITY[2], IDENTITY[0]))
 """Axes that Euler angles are measured from, in the world's."""
@@ -170,3 +170,19 @@ def _euler_rates(chart: Chart, values: Sequence[Expression], spin: Vector) -> li
     across = 3 - second - third
     phi_rate = before[across] / axis[across]
     return [phi_rate, before[second], before[third] - axis[third] * phi_rate]
+
+
+def euler_spin(chart: Chart, angles: Sequence[Expression], rates: Sequence[Expression]) -> list[Scalar]:
+    """Return the angular velocity in the axes of the body from the derivatives of Euler angles.
+
+    Parameters
+    ----------
+    chart
+        The chart, of Euler angles.
+    angles, rates
+        The angles and their derivatives (Goldstein, section 4.9).
+    """
+    first, second, third = chart.turns
+    turns = _turns(chart, angles).turns
+    phi, theta, psi = (IDENTITY[axis] * rate for axis, rate in zip((first, second, third), rates, strict=True))
+    return list(to_axes(turns[2].axes(), to_axes(turns[1].axes(), phi) + theta) + psi)
