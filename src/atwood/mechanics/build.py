@@ -13,7 +13,7 @@ from atwood.mechanics.constraints.read_multipliers import known_multipliers, wit
 from atwood.mechanics.constraints.rolling import Taken, integrated, take_up, without_idle_spins
 from atwood.mechanics.constraints.values import constraint_values, find_constraints, levels, velocity_levels
 from atwood.mechanics.dynamics.equations import Equations, force_rows, motion_rows, put_in_place
-from atwood.mechanics.dynamics.forces import Site, local_map
+from atwood.mechanics.dynamics.forces import Site, in_joint_coordinates, local_map
 from atwood.mechanics.dynamics.inertia import add_masses, check_masses
 from atwood.mechanics.kinematics.mechanism import Mechanism, check_closures, extent, make_gravity
 from atwood.mechanics.kinematics.motion import motion_in_plane, motion_in_space
@@ -166,7 +166,8 @@ def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[
                     advice=f"Connect {observable}.x or {observable}.z.",
                 )
             value = getattr(value, axis)
-        placed = put_in_place(site.graph.convert(value), local_map(site, local, kinematics))
+        (value,), _ = in_joint_coordinates(local, kinematics, [site.graph.convert(value)])
+        placed = put_in_place(value, local_map(site, local, kinematics))
         raw[mechanism.locals_[path].signal_symbols[name]] = placed
     for _ in range(len(raw)):
         pending = [s for s, e in raw.items() if depends_on(e, list(raw))]

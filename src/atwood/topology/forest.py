@@ -369,7 +369,7 @@ class _Grower:
         return locked
 
     def count_turns(self, solved: set[tuple[str, str, int]]) -> dict[Expression, tuple[int, int]]:
-        """Give coordinates to joints whose turns gears count and that nothing hangs on; add what needs none to solved.
+        """Give coordinates to joints whose turns count and that nothing hangs on; add what needs none to solved.
 
         Parameters
         ----------
@@ -383,6 +383,7 @@ class _Grower:
             if local.borrowed and not local.is_idle(solved)
             for symbol in local.formulas
         }
+        wanted.update(symbol for local in self.locals.values() for symbol in local.turns)
         for path, local in self.locals.items():
             for one in local.constraints:
                 if one.counts is None:

@@ -171,14 +171,14 @@ def part_forces(
         _add_lagrangians(site, local, kinematics, mapping, forces)
     path = local.part.path
     for load in local.loads:
-        force = substitute([site.graph.convert(c) for c in site.space.components(load.force)], mapping)
+        components = [site.graph.convert(c) for c in (*site.space.components(load.force), *load.torque)]
+        *force, x, y, z = substitute(in_joint_coordinates(local, kinematics, components)[0], mapping)
         forces.push(site.node(path, load.at.name), force)
         if any(not is_zero(c) for c in load.torque):
             body = site.body(path, load.at.name)
             if site.space.has_rotation and body not in site.bodies.oriented and body != 0:
                 raise TopologyError("it puts a torque on something that cannot turn", where=path)
-            torque_W = Vector(*substitute([site.graph.convert(c) for c in load.torque], mapping))
-            torque = torque_components(torque_W, kinematics.placements.axes.get(body), site.space)
+            torque = torque_components(Vector(x, y, z), kinematics.placements.axes.get(body), site.space)
             forces.twist(body, torque, site.node(path, load.at.name))
 
 

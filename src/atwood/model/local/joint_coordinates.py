@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError
-from atwood.expr import Expression, Graph, tan
+from atwood.expr import Expression, Graph, live, tan
 from atwood.late import dataclass
 from atwood.model.declare.component import bind
 from atwood.model.declare.laws import ConstraintOptions, Law
@@ -14,7 +14,7 @@ from atwood.model.local.flatten import Part
 from atwood.model.local.joint_references import Held
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
 
-__all__ = ["Grip", "counting_constraints", "find_grips", "formulas_of"]
+__all__ = ["Grip", "counting_constraints", "find_grips", "formulas_of", "turns_read"]
 
 Formulas = Mapping[Expression, tuple[Expression, Expression | None]]
 """For symbols of joint coordinates: the coordinate and its rate as functions of the joint's frames."""
@@ -111,6 +111,27 @@ def formulas_of(part: Part, bound: Any, symbols: Sequence[Expression], graph: Gr
     return found
 
 
+def turns_read(part: Part, formulas: Formulas, functions: Sequence[Expression]) -> tuple[Expression, ...]:
+    """Return those of a joint's coordinates whose turns count for what the joint does or passes on.
+
+    Parameters
+    ----------
+    part
+        The joint.
+    formulas
+        Its coordinates as functions of its frames.
+    functions
+        What its laws of force gave, and what inputs elsewhere are linked to. The functions of events are not known yet:
+        a joint that has any counts its turns.
+    """
+    periodic = {f"{part.path}.{law.name}" for law in part.component.laws("observable") if law.options.periodic}
+    turning = {symbol: formula for symbol, (formula, _) in formulas.items() if symbol.name in periodic}
+    if not turning or part.component.laws("event"):
+        return tuple(turning)
+    read = {node.index for node in live(functions)}
+    return tuple(symbol for symbol, formula in turning.items() if formula.index in read)
+
+
 def counting_constraints(
     part: Part, counted: Collection[str], formulas: Formulas, graph: Graph
 ) -> list[LocalConstraint]:
@@ -124,7 +145,7 @@ def counting_constraints(
     part
         The joint.
     counted
-        Names of the coordinates that other parts take hold of.
+        Names of the coordinates whose turns the joint's own laws read, or that other parts take hold of.
     formulas
         The coordinates as functions of the joint's frames.
     graph

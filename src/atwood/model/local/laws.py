@@ -7,6 +7,7 @@ says by itself which connectors it depends on, and whose derivatives are the for
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import field, replace
 from functools import partial
 from typing import Any
@@ -21,7 +22,7 @@ from atwood.model.declare.contributions import BodyInertia, Load, Placement, Poi
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import FlatScene, Part
-from atwood.model.local.joint_coordinates import Grip, counting_constraints, find_grips, formulas_of
+from atwood.model.local.joint_coordinates import Grip, counting_constraints, find_grips, formulas_of, turns_read
 from atwood.model.local.joint_references import Held, find_held
 from atwood.model.local.moving_mass import check_lagrangians, find_varying
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart, multiplier_symbol
@@ -213,6 +214,10 @@ def _localize_part(
     acting = bind(component, binding)
     dissipations, loads = laws.scalars(acting, "dissipation"), laws.listed(acting, "force")
     forces: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components)]
+    acted = [*potentials, *lagrangians, *(graph.convert(one) for one in forces)]
+    acted += _linked_outputs(part, flat, acting, graph) if formulas else []
+    turns = turns_read(part, formulas, acted)
+    counted = {*counted, *(symbol.name.rpartition(".")[2] for symbol in turns)}
     _check_reads(part, connectors, potentials, dissipations)
     return LocalPart(
         part=part,
@@ -229,10 +234,22 @@ def _localize_part(
         formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in symbols.grips}},
         borrowed={full: end for one in symbols.grips for full, end in one.borrowed.items()},
         switched=switched,
+        turns=turns,
         lagrangians=lagrangians,
         varying=find_varying(part.path, inertias, own, linked, graph),
         reads=_multipliers_read(part, constraints, forces, graph),
     )
+
+
+def _linked_outputs(part: Part, flat: FlatScene, acting: Any, graph: Graph) -> list[Expression]:
+    """Return the observables of a part that inputs elsewhere are linked to, so far as they can be read by now."""
+    wanted = {name.partition(".")[0] for path, name in flat.links.values() if path == part.path}
+    found: list[Expression] = []
+    for law in part.component.laws("observable"):
+        if law.name in wanted:
+            with suppress(AtwoodError):  # of reactions that are not readable, which is said where it is read
+                found += [graph.convert(c) for c in scalars(getattr(acting, law.name)())]
+    return found
 
 
 def _readable_reactions(

@@ -105,6 +105,8 @@ class LocalPart:
         of the part's own, and everywhere of those that it takes hold of.
     borrowed
         Connectors of joints that it takes hold of, which are among its own under their full paths.
+    turns
+        Those of a joint's own coordinates whose turns count for its laws of force, its events and links to it.
     reads
         The multipliers that its laws of force read.
     lagrangians
@@ -129,6 +131,7 @@ class LocalPart:
     formulas: Mapping[Expression, tuple[Expression, Expression | None]] = field(default_factory=dict)
     borrowed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     switched: tuple[Expression, ...] = ()
+    turns: tuple[Expression, ...] = ()
     reads: tuple[Expression, ...] = ()
     lagrangians: tuple[Expression, ...] = ()
     varying: tuple[PointInertia | BodyInertia, ...] = ()

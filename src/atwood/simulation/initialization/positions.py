@@ -17,6 +17,7 @@ from atwood.simulation.initialization.errors import Failed, explain_positions, f
 from atwood.simulation.initialization.loop_closure import closest, places_around, units_of_rows
 from atwood.simulation.initialization.system import MET, System, counted, newton
 from atwood.simulation.initialization.targets import Level, said
+from atwood.simulation.initialization.whole_turns import unwound
 
 __all__ = ["Positions", "solve_positions"]
 
@@ -71,7 +72,7 @@ def solve_positions(
     every = [*level.guessed, *level.fixed]
     turning = turning_of(assembly, "regular")
     q, is_direct = said(equations.coordinates, every, resting_place(equations))
-    q = _turned(equations, turning, q)
+    q = near_to = _turned(equations, turning, q)
     if not is_direct:
         system = System(assembly, equations, every, False)
         near = _brought_near(system, equations, scales, t, q)
@@ -80,12 +81,13 @@ def solve_positions(
             other = _brought_near(system, equations, scales, t, q)
             near = other if _far_off(system, t, other) < 1e-3 else near
         q = near
-    rough = q
+    q = rough = unwound(assembly, equations, every, scales, length, t, near_to, q)
     system = System(assembly, equations, level.fixed, True)
     q, missing, matrix = newton(system, scales, t, q)
     if not _is_met(missing) or wrongly_turned(assembly, equations, t, q):
         failed = Failed(assembly, equations, level, scales, length, t, rough, q, missing)
         q, matrix = _elsewhere(failed, system)
+    q = unwound(assembly, equations, every, scales, length, t, near_to, q)
     errors = system.errors.of_slopes(t, q, scales)
     tangent = None if turning.is_plain else turning.tangent(t, q)
     for chart in equations.charts:  # what turns at all has no orientation, whichever coordinate shows it here
