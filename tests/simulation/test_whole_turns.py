@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from atwood import Load, Scalar, Scene, assemble, event, force, signal, simulate
+from atwood import Load, Scalar, Scene, Vector, assemble, event, force, signal, simulate
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.initialization.whole_turns import unwound
 from atwood_library import Gear, Ground, Pivot, RigidBody
 
 FORMS = ("reduced", "dae")
+
+STILL = Vector(0.0, 0.0, 0.0)
 
 
 class Wound(Pivot):
@@ -21,7 +23,7 @@ class Wound(Pivot):
     def twisting(self) -> list[Load]:
         """Return the torque on both frames."""
         torque = self.axis_in_world() * -self.angle()
-        return [Load(self.b, torque=torque), Load(self.a, torque=-torque)]
+        return [Load(self.b, STILL, torque), Load(self.a, STILL, -torque)]
 
 
 class Follower(Pivot):
@@ -32,7 +34,7 @@ class Follower(Pivot):
     @force
     def pushing(self) -> list[Load]:
         """Return the torque on frame b."""
-        return [Load(self.b, torque=self.axis_in_world() * self.angle_read)]
+        return [Load(self.b, STILL, self.axis_in_world() * self.angle_read)]
 
 
 class Counter(Pivot):
