@@ -11,7 +11,8 @@ from typing import ClassVar, Generic, TypeVar
 
 import pytest
 
-from atwood import late
+from atwood import UsageError, late
+from atwood.arguments import takes_names
 
 T = TypeVar("T")
 
@@ -79,7 +80,8 @@ def behaviour(dataclass):
     yield [(one.name, one.type, one.default, one.init, one.repr, one.compare) for one in dataclasses.fields(heavy)]
     one, two = point(1.0), point(1.0, names=["a"])
     yield repr(one).rpartition(".")[2], one == two, one == heavy(1.0), hash(one) == hash(two), one != point(2.0)
-    yield hash(one) == hash((1.0, 2.0)), hash(same(1)) == hash(same(1)), same(1) == same(1), one.total
+    three, four = same(1), same(1)  # both are kept, so that they have places of their own
+    yield hash(one) == hash((1.0, 2.0)), hash(three) == hash(four), three == four, one.total
     yield one.names is point(1.0).names, dataclasses.replace(heavy(1.0), mass=2.0).mass, dataclasses.asdict(heavy(1.0))
     yield repr(tally((1, 2))).rpartition(".")[2], tally() == tally(), tally.__hash__, tally(("x",)) == tally(("y",))
     yield square(2.0).area(), repr(square(2.0)), square(2.0) == square(2.0), dataclasses.is_dataclass(square)
@@ -131,3 +133,19 @@ def test_many_threads_may_make_the_first_instance():
         for thread in threads:
             thread.join()
         assert found == [kind(3)] * 8
+
+
+def test_names_of_arguments_are_checked_from_the_first_instance_on():
+    @takes_names
+    @late.dataclass(frozen=True)
+    class Pull:
+        """A class whose arguments are checked by name before it is completed."""
+
+        at: int
+        force: float = 0.0
+
+    for _ in range(2):
+        with pytest.raises(UsageError, match=r"^Pull: it takes no 'forse'\. Did you mean 'force'\?"):
+            Pull(1, forse=2.0)
+        assert Pull(at=1, force=2.0) == Pull(1, 2.0)
+        assert repr(Pull(at=1, force=2.0)) == "Pull(at=1, force=2.0)"

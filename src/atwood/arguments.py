@@ -118,14 +118,32 @@ def takes(error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> Callable[[
 
 
 def takes_names(target: _T) -> _T:
-    """Check the names of the arguments of a function, or of a class, that looks at their values itself."""
-    function: Any = target.__init__ if isinstance(target, type) else target  # type: ignore[misc]
+    """Check the names of the arguments of a function, or of a dataclass, that looks at their values itself."""
+    if isinstance(target, type):
+        return _takes_fields(target)  # type: ignore[no-any-return]
+    function: Any = target
     names = [name for name in inspect.signature(function).parameters if name not in ("self", "cls")]
-    checked = takes(UsageError, **dict.fromkeys(names, ANYTHING))(function)
-    if not isinstance(target, type):
-        return checked  # type: ignore[no-any-return]
-    target.__init__ = checked  # type: ignore[misc]
-    return target
+    return takes(UsageError, **dict.fromkeys(names, ANYTHING))(function)  # type: ignore[no-any-return]
+
+
+def _takes_fields(cls: Any) -> Any:
+    """Check the names of the fields that a dataclass is made with, which need no completed class."""
+    names = list(
+        dict.fromkeys(name for base in reversed(cls.__mro__) for name in vars(base).get("__annotations__", ()))
+    )
+    construct = cls.__init__
+
+    @functools.wraps(construct)
+    def checked(self: Any, *args: Any, **given: Any) -> None:
+        for name in given:
+            if name not in names:
+                close = suggestion(name, near_matches(name, names))
+                advice = close or f"Its arguments are {', '.join(names)}."
+                raise UsageError(f"it takes no {name!r}", where=cls.__name__, advice=advice)
+        construct(self, *args, **given)
+
+    cls.__init__ = checked
+    return cls
 
 
 def check(kind: Kind, value: Any, name: str, where: str = "", error: type[AtwoodError] = UsageError) -> Any:

@@ -92,6 +92,14 @@ class ResultError(AtwoodError):
     """A result was asked for something that it does not hold."""
 
 
+class MissingQuantityError(ResultError, KeyError):
+    """A result holds no quantity at this path; to be met as a `KeyError` by what reads mappings."""
+
+
+class MissingGroupError(ResultError, AttributeError):
+    """A result is asked for a group of quantities that there is not."""
+
+
 class UsageError(AtwoodError):
     """A function or command was called in a way it does not understand."""
 

@@ -13,6 +13,8 @@ from reprlib import recursive_repr
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
+from atwood.showing import brief
+
 __all__ = ["dataclass"]
 
 if TYPE_CHECKING:
@@ -49,6 +51,8 @@ class _Completion:
     def __init__(self, cls: Any, frozen: bool) -> None:
         own = vars(cls)
         self.cls, self.frozen, self.done = cls, frozen, False
+        self.first: Any = None
+        self.construct: Any = None
         self.given = {name: own[name] for name in own.get("__annotations__", ()) if name in own}
         for name, value in self.given.items():  # as instances and readers of the class see the defaults
             if isinstance(value, dataclasses.Field):
@@ -70,8 +74,11 @@ class _Completion:
             dataclasses.dataclass(frozen=self.frozen, eq=False, repr=False)(twin)
             self.values = _reader([one.name for one in dataclasses.fields(twin) if one.compare])
             self.shown = [one.name for one in dataclasses.fields(twin) if one.repr]
-            for name in ("__init__", *_TAKEN) if "__init__" in self.made else _TAKEN:
+            for name in _TAKEN:
                 setattr(cls, name, twin.__dict__[name])
+            self.construct = twin.__init__
+            if vars(cls).get("__init__") is self.first:  # and not what checks its arguments before
+                cls.__init__ = self.construct
             if "__signature__" in vars(cls):
                 del cls.__signature__
             self.done = True
@@ -97,13 +104,14 @@ def _declare(cls: Any, frozen: bool, eq: bool) -> Any:
 
     def construct(self: Any, *args: Any, **keywords: Any) -> None:
         completion.complete()
-        cls.__init__(self, *args, **keywords)
+        completion.construct(self, *args, **keywords)
+
+    completion.first = construct
 
     @recursive_repr()
     def shown(self: Any) -> str:
         completion.complete()
-        values = ", ".join(f"{name}={getattr(self, name)!r}" for name in completion.shown)
-        return f"{type(self).__qualname__}({values})"
+        return brief(self, completion.shown)
 
     def equal(self: Any, other: Any) -> Any:
         if other.__class__ is not self.__class__:

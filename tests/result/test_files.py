@@ -39,7 +39,7 @@ def test_round_trip_is_exact(result: Result, tmp_path: Path, suffix: str) -> Non
         assert np.array_equal(saved[path], result[path]), path
         assert saved.unit(path) == result.unit(path)
     assert saved.at(-1) == result.at(-1)
-    assert saved["rod[1]"].keys() == result["rod[1]"].keys()
+    assert saved.group("rod[1]").keys() == result.group("rod[1]").keys()
     assert [one.name for one in tmp_path.iterdir()] == [file.name]
 
 

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any, Literal
 
 from atwood.late import dataclass
+from atwood.showing import fitted
 
 __all__ = ["CheckReport", "Finding"]
 
@@ -92,4 +93,4 @@ class CheckReport:
         return "\n".join([head, *(f"  {one}" for one in self.findings)])
 
     def __repr__(self) -> str:
-        return str(self)
+        return fitted(str(self))

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from atwood.cli.output import console
 from atwood.cli.running import RunRequest, degrees_of_freedom, multiplier_labels
-from atwood.reporting.text import count_of
 from atwood.result.about import solver_name
+from atwood.showing import count_of
 
 if TYPE_CHECKING:
     from rich.table import Table

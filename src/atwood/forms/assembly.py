@@ -36,6 +36,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable, Reaction, energies, list_reactions
 from atwood.mechanics.outputs.reading import observe
 from atwood.model.local.flatten import FlatScene, flatten
+from atwood.showing import count_of, fitted
 from atwood.topology.charts import Orientation
 from atwood.topology.forest import grow_forest
 
@@ -88,6 +89,13 @@ class Assembly:
     orientation: Orientation = field(default_factory=Orientation)
     given_relations: tuple[float, ...] | None = None
     _kernels: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        flat, mechanism = self.flat, self.mechanism
+        form = f"{self.form} form" + (f" ({self.level})" if self.level else "")
+        where = {"line": "on a line", "plane": "in the plane", "space": "in space"}[flat.space]
+        counts = f"{count_of(len(flat.parts), 'part')}, {count_of(len(mechanism.graph.joints), 'joint')}"
+        return fitted(f"<Assembly of {flat.name}, {form}: a mechanism {where} of {counts}>")
 
     # -- equations ------------------------------------------------------------------------------------------------
 

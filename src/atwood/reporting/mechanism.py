@@ -29,6 +29,7 @@ from atwood.reporting.parts import (
     list_parameters,
     list_ties,
 )
+from atwood.showing import fitted, html_table
 from atwood.simulation.dynamics.rank import FREE, row_scales
 from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
@@ -146,6 +147,16 @@ class MechanismReport:
         from atwood.reporting.text import as_text
 
         return as_text(self)
+
+    def __repr__(self) -> str:
+        from atwood.reporting.text import overview
+
+        return fitted(f"<MechanismReport of {overview(self)}; print it to read all>")
+
+    def _repr_html_(self) -> str:
+        from atwood.reporting.text import facts, title
+
+        return html_table(title(self), (), facts(self))
 
     @property
     def loop_joints(self) -> tuple[str, ...]:

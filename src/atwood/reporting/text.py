@@ -8,10 +8,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from atwood.showing import count_of
+
 if TYPE_CHECKING:
     from atwood.reporting.mechanism import MechanismReport
 
-__all__ = ["as_text", "count_of", "facts", "shorten", "title"]
+__all__ = ["as_text", "facts", "overview", "shorten", "title"]
 
 _SHOWN = 12
 """Of a long list, so many are named."""
@@ -48,9 +50,16 @@ def title(report: MechanismReport) -> str:
     return f"{report.scene}: a mechanism {where}, {gravity}"
 
 
-def count_of(number: int, one: str, many: str = "") -> str:
-    """Return a number with its noun, as in "1 loop" and "2 loops"."""
-    return f"{number} {one if number == 1 else many or one + 's'}"
+def overview(report: MechanismReport) -> str:
+    """Return what a mechanism is in one line."""
+    counts = (
+        count_of(report.degrees_of_freedom, "degree") + " of freedom",
+        count_of(len(report.bodies), "body", "bodies"),
+        count_of(len(report.joints), "joint"),
+        count_of(report.loops, "loop"),
+        count_of(len(report.redundant), "redundant constraint"),
+    )
+    return f"{title(report)}; {', '.join(counts)}"
 
 
 def shorten(names: Iterable[str], shown: int = _SHOWN, least: int = _ARRAY) -> str:

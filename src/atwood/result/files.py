@@ -16,28 +16,30 @@ import io
 import json
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from atwood.arguments import FILE, check, instance, takes
+from atwood.arguments import FILE, instance, takes
 from atwood.arrays import FloatArray
-from atwood.errors import ResultError, UsageError, suggestion_in_parts
+from atwood.errors import UsageError
 from atwood.files import check_directory, check_readable, write_atomically
 from atwood.late import dataclass
-from atwood.model.declare.quantities import PATH, PATHS
+from atwood.model.declare.quantities import PATHS, Quantity
 from atwood.result.about import describe_run
-from atwood.result.result import Result, output_number
+from atwood.result.result import Result
+from atwood.result.trajectories import Trajectories
+from atwood.showing import count_of, listed
 
 __all__ = ["SavedResult", "load_result", "save_result"]
 
 
 @dataclass(frozen=True, eq=False)
-class SavedResult:
-    """Trajectories that were read from a file; they are read like a `Result`.
+class SavedResult(Trajectories):
+    """Trajectories that were read from a file; a mapping from paths to arrays, as a `Result` is.
 
     Attributes
     ----------
@@ -56,6 +58,8 @@ class SavedResult:
     units: Mapping[str, str]
     meanings: Mapping[str, str] = field(default_factory=dict)
     metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    __repr__ = Trajectories.__repr__
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -76,24 +80,7 @@ class SavedResult:
         return self.meanings.get(self._known(path), "")
 
     def __contains__(self, path: object) -> bool:
-        return isinstance(path, str) and path in self.quantities
-
-    def __getitem__(self, path: str) -> FloatArray | dict[str, FloatArray]:
-        """Return a quantity, or all quantities below a path.
-
-        Raises
-        ------
-        ResultError
-            If there is nothing at this path.
-        """
-        path = str(check(PATH, path, "path", "SavedResult"))
-        if path in self.quantities:
-            return self.quantities[path]
-        cut = len(path) + 1
-        below = {one[cut:]: values for one, values in self.quantities.items() if one.startswith(f"{path}.")}
-        if not below:
-            self._known(path)
-        return below
+        return isinstance(path, (str, Quantity)) and str(path) in self.quantities
 
     def array(self, path: str) -> FloatArray:
         """Return a quantity at the output times, shape (times,)."""
@@ -102,18 +89,18 @@ class SavedResult:
     @takes(paths=PATHS)
     def table(self, paths: Iterable[str] | None = None) -> dict[str, FloatArray]:
         """Return quantities by path; all when no paths are given."""
-        return {path: self.array(path) for path in (self.paths if paths is None else paths)}
+        return super().table(paths)
 
-    def at(self, index: int) -> dict[str, float]:
-        """Return all quantities at one output time, by its number; -1 for the end."""
-        place = output_number(index, len(self.time))
-        return {path: float(values[place]) for path, values in self.quantities.items()}
-
-    def _known(self, given: object) -> str:
-        path: str = check(PATH, given, "path", "SavedResult")
-        if path not in self.quantities:
-            raise ResultError("there is no such quantity", where=path, advice=suggestion_in_parts(path, self.paths))
-        return path
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        form, level = str(self.metadata.get("form", "")), str(self.metadata.get("level", ""))
+        kind = f", {form} form" + (f" ({level})" if level else "") if form else ""
+        yield "SavedResult", f"{self.metadata.get('scene', 'a run')}{kind}"
+        if self.status:
+            yield "status", self.status.replace("_", " ")
+        if len(self.time):
+            span = f"{self.time[0]:g} to {self.time[-1]:g} s, "
+            yield "time", span + count_of(len(self.time), "output time")
+        yield count_of(len(self.quantities), "quantity", "quantities"), listed(self.quantities)
 
 
 @takes(result=instance("a Result, as simulate returns it", Result), file=FILE, paths=PATHS)

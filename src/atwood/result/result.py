@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import ItemsView, Iterable, Iterator, Mapping, ValuesView
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arguments import FILE, check, instance, takes, whole
+from atwood.arguments import FILE, instance, takes
 from atwood.arrays import FloatArray
-from atwood.errors import ResultError, suggestion_in_parts
+from atwood.errors import ResultError
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.integrators.protocol import Statistics
-from atwood.model.declare.quantities import PATH, PATHS, Quantity
+from atwood.model.declare.quantities import PATHS, Quantity
 from atwood.result.accounts import account
 from atwood.result.angles import unwrap
 from atwood.result.energy import EnergyLedger
+from atwood.result.trajectories import Trajectories
 from atwood.result.work import find_ledger
+from atwood.showing import count_of, listed
 from atwood.simulation.dynamics.orientation_coordinates import Restated
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.events.modes import Happening
@@ -35,24 +35,18 @@ from atwood.simulation.run.record import Segment
 from atwood.simulation.run.run import Run
 from atwood.simulation.singular.crossing import Passage
 
-__all__ = ["Result", "output_number"]
+__all__ = ["Result"]
 
 
 _LONGER = "Give it more time; or assemble the scene first, and hand the assembly to several runs."
 
 
-def output_number(index: int, count: int) -> int:
-    """Return the number of an output time, or refuse one that there is not."""
-    last = count - 1
-    kind = whole(f"the number of an output time, 0 to {last}, or -1 to {-count} from the end", -count, last)
-    return int(check(kind, index, "index", "at", ResultError))
-
-
-class Result:
+class Result(Trajectories):
     """The motion of a scene, and every quantity of every component along it.
 
-    ``result["bob2.position.x"]`` is the quantity at the output times; ``result["bob2"]`` gives all quantities of a
-    component. Forces are worked out after the run, and only if asked for.
+    A mapping from paths to arrays: ``result["bob2.position.x"]`` is the quantity at the output times. All quantities of
+    a component are `group` ``("bob2")``, or ``result.parts.bob2``. Forces are worked out after the run, and only if
+    asked for.
 
     Parameters
     ----------
@@ -187,23 +181,6 @@ class Result:
     def __contains__(self, path: object) -> bool:
         return isinstance(path, (str, Quantity)) and str(path) in self.assembly.observables
 
-    @takes(path=PATH)
-    def __getitem__(self, path: str | Quantity) -> FloatArray | dict[str, FloatArray]:
-        """Return a quantity at the output times, or all quantities below a path.
-
-        Raises
-        ------
-        ResultError
-            If there is nothing at this path.
-        """
-        path = str(path)
-        if path in self:
-            return self.samples(path)[self._shown]
-        below = [one for one in self.paths if one.startswith(f"{path}.")]
-        self._known(below[0] if below else path)
-        cut = len(path) + 1
-        return {one[cut:]: self.samples(one)[self._shown] for one in below}
-
     def array(self, path: str) -> FloatArray:
         """Return a quantity at the output times, shape (times,).
 
@@ -221,10 +198,15 @@ class Result:
         self._fill(wanted)
         return {path: self._cache[path][self._shown] for path in wanted}
 
-    def at(self, index: int) -> dict[str, float]:
-        """Return all quantities at one output time, by its number; -1 for the end."""
-        place = output_number(index, len(self.time))
-        return {path: float(values[place]) for path, values in self.table().items()}
+    def items(self) -> ItemsView[str, FloatArray]:
+        """Return a view of all paths and arrays, worked out in one pass."""
+        self._fill(self.paths)
+        return super().items()
+
+    def values(self) -> ValuesView[FloatArray]:
+        """Return a view of all arrays, worked out in one pass."""
+        self._fill(self.paths)
+        return super().values()
 
     def samples(self, path: str) -> FloatArray:
         """Return a quantity at all samples of the run, outputs and others."""
@@ -232,12 +214,6 @@ class Result:
         if path not in self._cache:
             self._fill((path,))
         return self._cache[path]
-
-    def _known(self, given: object) -> str:
-        path: str = check(PATH, given, "path", "Result")
-        if path not in self:
-            raise ResultError("there is no such quantity", where=path, advice=suggestion_in_parts(path, self.paths))
-        return path
 
     def _fill(self, paths: tuple[str, ...]) -> None:
         """Compute quantities that are not there yet, all in one pass."""
@@ -386,15 +362,19 @@ class Result:
 
         return save_result(self, file, paths)
 
-    def plot(self, paths: Iterable[str] | None = None, file: str | os.PathLike[str] | None = None) -> Any:
-        """Plot quantities over time, and return the figure; see `atwood.plot`.
-
-        Parameters
-        ----------
-        paths
-            Which quantities; the coordinates and the energy when not given.
-        file
-            Where to save the picture; its suffix says how.
-        """
-        # Views stand above results and are never imported from here, only looked up when a picture is wanted.
-        return import_module("atwood.plotting.plots.quantities").plot(self, paths, file)
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        form = f"{self.form} form" + (f" ({self.level})" if self.level else "")
+        yield "Result", f"{self.assembly.flat.name}, {form}"
+        yield "status", self.status.replace("_", " ") + (f": {self.message}" if self.message else "")
+        if not self.run.segments:
+            return
+        times = self.time
+        yield "time", f"{times[0]:g} to {times[-1]:g} s, {count_of(len(times), 'output time')}"
+        yield "solver", f"{self.solver} ({count_of(self.statistics.steps, 'step')})"
+        names = [one.name for one in self.assembly.equations.names]
+        yield "coordinates", listed(names)
+        told = [f"{one.message or one.part} at {one.time:.6g} s" for one in self.happenings]
+        if told:
+            yield "events", listed(told, 4)
+        if self.passages:
+            yield "singular positions", listed((f"{one.time:.6g} s" for one in self.passages), 4)

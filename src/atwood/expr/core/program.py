@@ -12,6 +12,7 @@ from atwood.expr.core.analysis import count_operations, live, varying
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.operations import COMMUTATIVE
 from atwood.late import dataclass
+from atwood.showing import brief
 
 
 class InputGroup(NamedTuple):
@@ -28,6 +29,9 @@ class InputGroup(NamedTuple):
     name: str
     symbols: tuple[Expression, ...]
 
+    def __repr__(self) -> str:
+        return brief(self, self._fields)
+
 
 class OutputGroup(NamedTuple):
     """Expressions that are returned together, as one array.
@@ -42,6 +46,9 @@ class OutputGroup(NamedTuple):
 
     name: str
     expressions: tuple[Expression, ...]
+
+    def __repr__(self) -> str:
+        return brief(self, self._fields)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from atwood.expr.core.analysis import evaluate, live
 from atwood.expr.core.functions import Scalar, graph_of
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.formulas.sympy_bridge import from_sympy
+from atwood.showing import fitted
 
 __all__ = ["Formula", "formula"]
 
@@ -40,6 +41,9 @@ class Formula:
                 f"the formula {expression} holds {', '.join(stray)}, which is none of its arguments",
                 advice="List every symbol of the formula as an argument.",
             )
+
+    def __repr__(self) -> str:
+        return fitted(f"<Formula of {', '.join(map(str, self.arguments))}: {self.expression}>")
 
     def __call__(self, *values: Scalar) -> Scalar:
         """Return the value of the formula.

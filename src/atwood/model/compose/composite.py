@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from itertools import islice
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, overload
 
@@ -32,6 +33,7 @@ from atwood.model.compose.differences import (
 )
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import Deferred
+from atwood.showing import count_of, field_text, fitted, html_table, listed
 
 PATH = Kind("a dotted path, such as 'left.rod'", NAME.read)
 
@@ -340,6 +342,27 @@ class Model(_State, Component):
             advice=suggestion(name, known) or "A part is added with add.",
         )
 
+    # -- showing -------------------------------------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        return fitted("\n".join([super().__repr__(), *(f"    {name}: {text}" for name, text in self._facts())]))
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        """Yield what there is to say of it in a few lines."""
+        counts = {name: len(one) if isinstance(one, list) else 0 for name, one in self._attached.items()}
+        arrays = (f"{name}[0..{count - 1}]" if count else name for name, count in counts.items())
+        yield count_of(len(self._parts), "part"), listed(arrays, 12)
+        yield count_of(len(self._connections), "connection"), listed(map(" - ".join, self._connections), 4)
+
+    def _repr_html_(self) -> str:
+        rows = ((name, type(part).__name__, _settings(part)) for name, part in islice(self._parts.items(), _SHOWN))
+        rest = f"and {len(self._parts) - _SHOWN} more parts; " if len(self._parts) > _SHOWN else ""
+        note = rest + "; ".join(f"{name}: {text}" for name, text in [*self._facts()][1:])
+        return html_table(Component.__repr__(self), ("part", "component", "set to"), rows, note)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self._parts)
+
     # -- keeping up with changes ---------------------------------------------------------------------------------
 
     def _children(self) -> Mapping[str, Component]:
@@ -390,6 +413,14 @@ class Model(_State, Component):
         object.__setattr__(twin, "_given", dict(self._given))
         twin._hold({name: copy_parts(part) for name, part in self._attached.items()})
         return twin
+
+
+_SHOWN = 30
+"""So many parts are listed in a notebook."""
+
+
+def _settings(part: Component) -> str:
+    return ", ".join(f"{name} = {field_text(value)}" for name, value in part._settings.items())
 
 
 def _any_built_from_around(model: Component) -> bool:

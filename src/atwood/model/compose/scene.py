@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from typing import Any, ClassVar, Self
 
 from atwood.errors import StartError
 from atwood.model.compose.composite import Model
 from atwood.model.compose.start_values import StartValues
 from atwood.model.declare.fields import parameter
+from atwood.showing import listed
 
 __all__ = ["Scene"]
 
@@ -65,6 +66,12 @@ class Scene(Model):
 
     def _start_values(self) -> Mapping[str, MutableMapping[str, Any]]:
         return {name: getattr(self, name) for name in ("start", "guess")}
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield from super()._facts()
+        for name, values in self._start_values().items():
+            if values:
+                yield name, listed((f"{path} = {value}" for path, value in values.items()), 4)
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name in ("start", "guess"):

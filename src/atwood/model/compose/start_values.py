@@ -10,6 +10,7 @@ from atwood.errors import AtwoodError, StartError
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.declare.parameter_expressions import Deferred
 from atwood.model.values.units import parse_unit, split_quantity
+from atwood.showing import fitted
 
 __all__ = ["StartValues"]
 
@@ -58,7 +59,7 @@ class StartValues(MutableMapping[str, Any]):
         return len(self._values)
 
     def __repr__(self) -> str:
-        return repr(self._values)
+        return fitted(repr(self._values))
 
 
 def _checked(path: Any, value: Any, where: str) -> Any:

@@ -17,6 +17,7 @@ from atwood.model.declare.laws import Kind, Law
 from atwood.model.declare.quantities import Quantity
 from atwood.model.values.outline import Outline
 from atwood.model.values.vector import Vector, dot, norm
+from atwood.showing import field_text, fitted, html_table
 
 __all__ = ["Binding", "Component", "bind"]
 
@@ -153,8 +154,14 @@ class Component:
         raise UsageError(f"{name!r} cannot be taken away", where=self.path or type(self).__name__)
 
     def __repr__(self) -> str:
-        settings = ", ".join(f"{name}={value!r}" for name, value in self._settings.items())
-        return f"{type(self).__name__}({settings})"
+        settings = ", ".join(f"{name}={field_text(value)}" for name, value in self._settings.items())
+        return fitted(f"{type(self).__name__}({settings})")
+
+    def _repr_html_(self) -> str:
+        fields = {**self._parameters, **self._signals}
+        rows = ((name, field_text(self._value(name)), one.unit.text, one.doc) for name, one in fields.items())
+        title = f"{type(self).__name__} {self.path}".strip()
+        return html_table(title, ("parameter", "value", "unit", "meaning"), rows)
 
     # -- what a law reads ---------------------------------------------------------------------------------------
 

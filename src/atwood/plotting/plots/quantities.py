@@ -121,8 +121,7 @@ def _expand(result: Result | SavedResult, paths: Iterable[str]) -> list[str]:
     """Return paths with those of components replaced by all below them."""
     found: list[str] = []
     for path in paths:
-        value = result[path]
-        found += [f"{path}.{name}" for name in value] if isinstance(value, dict) else [path]
+        found += [path] if path in result else [f"{path}.{name}" for name in result.group(path)]
     return list(dict.fromkeys(found))
 
 

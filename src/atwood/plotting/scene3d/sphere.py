@@ -63,7 +63,7 @@ def plot_on_sphere(
         If there is no run, the quantity is no direction, there is no such view, or the picture cannot be saved.
     """
     camera = as_camera(view)
-    named = results if isinstance(results, Mapping) else {"": results}
+    named = {"": results} if isinstance(results, Result) else results
     if not named:
         raise UsageError("there is no run to draw", where=path, advice="Give at least one result.")
     trails = [_trail(result, path, COLOURS[i % len(COLOURS)]) for i, result in enumerate(named.values())]

@@ -15,6 +15,7 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import flatten
 from atwood.pipeline import assemble_flat
+from atwood.showing import count_of, fitted, html_table
 from atwood.simulation.problem.arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRESS, RTOL, T_END, check_span
 from atwood.simulation.problem.options import SOLVERS
 from atwood.simulation.run.choice import implicit_solver
@@ -128,6 +129,24 @@ class Comparison:
                 f"{row.label:<24}{row.rtol:>8.0e}{error:>9.1e}{mark}{wall:>10.3g}{steps:>8.0f}{energy:>10.1e}{drift:>12.1e}"
             )
         return "\n".join([*lines, RELATIVE, "", self.verdict])
+
+    def __repr__(self) -> str:
+        runs = f"{count_of(len(self.rows), 'run')} to t = {self.t_end:g} s, against {self.reference.description}"
+        failed = sum(bool(row.reason) for row in self.rows)
+        lines = [f"<Comparison of {self.scene}: {runs}>", self.verdict, *([f"{failed} without numbers"] * bool(failed))]
+        return fitted("\n    ".join(line for line in lines if line))
+
+    def _repr_html_(self) -> str:
+        heads = ("form", "rtol", "error", "ms", "steps", "energy drift", "constraint drift", "")
+        cells = []
+        for row in self.rows:
+            wall = None if row.wall_s is None else 1e3 * row.wall_s
+            numbers = (row.error, wall, row.steps, row.energy_drift, row.constraint_drift)
+            shown = ("" if one is None else one if isinstance(one, int) else f"{one:.3g}" for one in numbers)
+            note = row.reason or ("as accurate as the reference" if row.within_reference else "")
+            cells.append((row.label, f"{row.rtol:.0e}", *shown, note))
+        title = f"{self.scene} to t = {self.t_end:g} s, against {self.reference.description}"
+        return html_table(title, heads, cells, f"{RELATIVE} {self.verdict}")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the comparison as plain data."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import ResultError, near_matches, suggestion
 from atwood.late import dataclass
 from atwood.model.declare.quantities import PATH
+from atwood.showing import count_of, fitted, html_table, listed
 
 __all__ = ["Sweep", "SweepStatistics"]
 
@@ -102,6 +103,31 @@ class Sweep:
     messages: Mapping[int, str]
     steps: NDArray[np.int64]
     statistics: SweepStatistics
+
+    def __repr__(self) -> str:
+        (_, title), *facts = self._facts()
+        return fitted("\n".join([f"<Sweep of {title}>", *(f"    {name}: {text}" for name, text in facts)]))
+
+    def _repr_html_(self) -> str:
+        (_, title), *facts = self._facts()
+        return html_table(f"Sweep of {title}", (), facts)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self.paths)
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        """Yield what there is to say of it in a few lines; the first is its title."""
+        form = f"{self.form} form" + (f" ({self.level})" if self.level else "")
+        grid = f", a grid of {' x '.join(map(str, self.shape))}" if len(self.shape) > 1 else ""
+        yield "scene", f"{self.scene}, {form}: {count_of(len(self), 'run')}{grid}"
+        ranges = (f"{path} {_range(values)} {self.units.get(path, '')}" for path, values in self.varied.items())
+        yield "varied", listed((text.strip() for text in ranges), 4)
+        many = count_of(len(self.time), "time")
+        yield "quantities", f"{listed(self.quantities)} at {many}, t = {self.time[-1]:g} s the last"
+        counts = {one: self.status.count(one) for one in dict.fromkeys(self.status)}
+        yield "status", ", ".join(f"{number} {one.replace('_', ' ')}" for one, number in counts.items())
+        if self.messages:
+            yield "messages", listed((f"run {run}: {text}" for run, text in self.messages.items()), 2)
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -209,3 +235,9 @@ class Sweep:
         """
         # Views stand above studies, and are looked up when one is wanted.
         return import_module("atwood.plotting.plots.sweep").plot_sweep(self, paths, file)
+
+
+def _range(values: NDArray[Any]) -> str:
+    if values.dtype.kind != "f":
+        return listed(dict.fromkeys(values.tolist()), 4)
+    return f"{np.min(values):g} to {np.max(values):g}"
