@@ -17,7 +17,7 @@ from mechanisms import FloatArray, Mechanism
 from atwood import simulate
 from atwood.integrators.explicit_session import open_explicit
 from atwood.integrators.ida import native as ida_native
-from atwood.integrators.protocol import Advance, SolverOptions, Statistics, Status
+from atwood.integrators.protocol import SolverOptions, Statistics, Status, StepResult
 from atwood.simulation.problem.explicit_scene import explicit_problem
 from atwood.simulation.problem.problem import Plan, pack_state
 
@@ -68,7 +68,7 @@ def prepare(mechanism: Mechanism, form: str) -> Prepared:
 
 
 class _Session(Protocol):
-    def advance(self, t_out: float) -> Advance: ...
+    def advance(self, t_out: float) -> StepResult: ...
 
 
 def _run(prepared: Prepared, open_session: Callable[[], _Session], close: bool = False) -> Run:

@@ -12,6 +12,6 @@ scene.connect(string.b, bob.point)
 scene.start.update({"bob.position.x": 0.0, "bob.position.z": -1.0, "bob.velocity.x": 6.0})
 
 result = simulate(scene, t_end=2.0)
-for happening in result.happenings:
+for happening in result.events:
     print(happening.describe())
 print(f"work of the jerks {result.energy.work[-1]:.6f} J of {result.energy.total[0]:.6f} J")

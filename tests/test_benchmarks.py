@@ -13,7 +13,18 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize(
-    "name", ["kernels", "ida", "loops", "work_precision", "startup", "sweep", "taylor", "charts", "space"]
+    "name",
+    [
+        "kernels",
+        "ida",
+        "null_space",
+        "work_precision",
+        "startup",
+        "sweep",
+        "taylor",
+        "orientation_coordinates",
+        "space",
+    ],
 )
 def test_smallest_case(name: str, tmp_path: Path) -> None:
     paths = [str(ROOT / "src"), str(ROOT / "library"), os.environ.get("PYTHONPATH", "")]

@@ -33,7 +33,7 @@ from atwood.model.local.flatten import FlatScene, flatten
 from atwood.model.local.laws import LocalPart, ParameterTable, localize
 from atwood.model.values.space import make_space
 from atwood.result.result import Result
-from atwood.simulation.dynamics.line_signs import actual_sides, sides_differ
+from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
 from atwood.simulation.initialization.start import Start, find_start
 from atwood.simulation.problem.arguments import (
     FORM,
@@ -52,9 +52,9 @@ from atwood.simulation.problem.arguments import (
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.run import run, run_out_of_time
 from atwood.topology.bodies import find_bodies
-from atwood.topology.charts import Orientation, check_orientation
 from atwood.topology.graph import build_graph
-from atwood.topology.sides import find_sides
+from atwood.topology.line_signs import find_line_signs
+from atwood.topology.orientation_coordinates import Orientation, check_orientation
 
 __all__ = ["Assembly", "assemble", "assemble_flat", "simulate"]
 
@@ -110,7 +110,7 @@ def assemble_flat(
     level: str = "ggl",
     orientation: str = "quaternion",
     modes: Mapping[str, str] | None = None,
-    sides: Mapping[tuple[str, str, str], float] | None = None,
+    line_signs: Mapping[tuple[str, str, str], float] | None = None,
 ) -> Assembly:
     """Assemble a scene that has been taken apart into leaves.
 
@@ -122,7 +122,7 @@ def assemble_flat(
         See `assemble`.
     modes
         Mode of each part that has modes; the usual one where it is not given.
-    sides
+    line_signs
         On a line, the sign of lengths; as far as start values tell if not given.
     """
     check_orientation(orientation, form)
@@ -132,11 +132,11 @@ def assemble_flat(
         if part.component.modes
     }
     all_modes.update(modes or {})
-    mechanism = read_mechanism(flat, all_modes, sides)
+    mechanism = read_mechanism(flat, all_modes, line_signs)
     chosen: Any = form
     level = level if form == "dae" else ""
-    source, charts = Source(_assemble_like, _find_places), Orientation(orientation)
-    made = Assembly(flat, mechanism, chosen, level, all_modes, source, orientation=charts)
+    source, orientation_coordinates = Source(_assemble_like, _find_places), Orientation(orientation)
+    made = Assembly(flat, mechanism, chosen, level, all_modes, source, orientation=orientation_coordinates)
     # Where parts have modes, another mode could begin with other constants, and everything stays as it is.
     return made if all_modes or not holds_velocities(mechanism) else with_places(made, _find_places(made))
 
@@ -157,14 +157,14 @@ def _assemble_like(
     flat: FlatScene,
     like: Assembly,
     modes: Mapping[str, str] | None = None,
-    sides: Mapping[tuple[str, str, str], float] | None = None,
+    line_signs: Mapping[tuple[str, str, str], float] | None = None,
 ) -> Assembly:
     kind, level = like.orientation.kind, like.level or "ggl"
-    return assemble_flat(flat, form=like.form, level=level, orientation=kind, modes=modes, sides=sides)
+    return assemble_flat(flat, form=like.form, level=level, orientation=kind, modes=modes, line_signs=line_signs)
 
 
 def read_mechanism(
-    flat: FlatScene, modes: Mapping[str, str], known_sides: Mapping[tuple[str, str, str], float] | None = None
+    flat: FlatScene, modes: Mapping[str, str], known_line_signs: Mapping[tuple[str, str, str], float] | None = None
 ) -> Mechanism:
     """Read the laws of all parts and find nodes, joints and bodies.
 
@@ -174,7 +174,7 @@ def read_mechanism(
         The scene.
     modes
         Mode of each part that has modes.
-    known_sides
+    known_line_signs
         On a line, the sign of lengths, where it is known already.
 
     Raises
@@ -193,20 +193,20 @@ def read_mechanism(
     check_laws(flat.parts, space)
     network = build_graph(flat, locals_)
     bodies = find_bodies(network, locals_)
-    sides: Mapping[tuple[str, str, str], float] | None = None
+    line_signs: Mapping[tuple[str, str, str], float] | None = None
     if space.name == "line":
         offsets = {body.index: body_offsets(body, space)[0] for body in bodies.bodies}
-        sides = known_sides or find_sides(flat, network, bodies, locals_, offsets, table.values, space)
+        line_signs = known_line_signs or find_line_signs(flat, network, bodies, locals_, offsets, table.values, space)
         with graph.relations.reading():
-            locals_ = localize(flat, space, time, table, modes, sides)
+            locals_ = localize(flat, space, time, table, modes, line_signs)
         network = build_graph(flat, locals_)
         bodies = find_bodies(network, locals_)
     gravity = make_gravity(table, flat.gravity)
-    told = None if known_sides else sides
+    told = None if known_line_signs else line_signs
     if any(local.asks for local in locals_.values()):
         carried = inertia_asked_for(network, bodies, locals_, space)
         with graph.relations.reading():
-            locals_ = localize(flat, space, time, table, modes, sides, carried)
+            locals_ = localize(flat, space, time, table, modes, line_signs, carried)
         network = build_graph(flat, locals_)
         bodies = find_bodies(network, locals_)
     mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links, told, t_start=flat.t_start)
@@ -315,18 +315,18 @@ def simulate(
 
     try:
         with clock.kept(GRACE):
-            assembly, start = _with_sides(assembly)
+            assembly, start = _with_line_signs(assembly)
     except TimeIsUp:
         return Result(run_out_of_time(assembly, None, options))
     return Result(run(assembly, start, options, assembly.other_mode, clock))
 
 
-def _with_sides(assembly: Assembly) -> tuple[Assembly, Start]:
+def _with_line_signs(assembly: Assembly) -> tuple[Assembly, Start]:
     """Return an assembly whose lengths on a line are signed by where things start, and the start."""
     start = find_start(assembly)
     for _ in range(3):  # which is known only then
-        actual = actual_sides(assembly, start.time, start.coordinates, start.speeds, "reduced")
-        if not sides_differ(assembly, actual):
+        actual = actual_line_signs(assembly, start.time, start.coordinates, start.speeds, "reduced")
+        if not line_signs_differ(assembly, actual):
             return assembly, start
         assembly = assembly.other_mode(assembly.modes, actual)
         start = find_start(assembly)

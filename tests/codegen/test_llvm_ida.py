@@ -159,8 +159,8 @@ def test_ida_runs_on_compiled_functions_and_gets_where_python_gets(linear_solver
         chosen = ImplicitProblem(problem.size, problem.residual, problem.jacobian, problem.pattern, native=native)
         session = ida_native.open_session(chosen, options, 0.0, y, yp)
         for time in np.linspace(0.1, 1.0, 10):
-            advance = session.advance(time)
-        found.append(advance.y)
+            step_result = session.advance(time)
+        found.append(step_result.y)
     assert counted == [linear_solver]
     np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
 

@@ -85,16 +85,16 @@ def test_levels_of_constraints_are_derivatives_of_each_other(name: str, form: st
             np.zeros(n),
             step=1e-3,
         )
-        assert np.max(np.abs(now.slope[held] - slope)) < 1e-9 * max(1.0, float(np.max(np.abs(slope))))
+        assert np.max(np.abs(now.jacobian[held] - slope)) < 1e-9 * max(1.0, float(np.max(np.abs(slope))))
         rate = difference_quotient(
             lambda h, q=q, u=u: balance.at(t + h[0], moved(prepared, q, u, still, h[0], t), u).value[held],
             np.zeros(1),
             step=1e-3 / max(1.0, float(np.max(np.abs(u)))),
         )
         assert np.max(np.abs(now.rate[held] - rate[:, 0])) < 1e-8 * max(1.0, float(np.max(np.abs(u))))
-        assert np.max(np.abs(now.rate - now.slope @ u - now.drift)) < 1e-12 * max(1.0, np.max(np.abs(now.rate)))
+        assert np.max(np.abs(now.rate - now.jacobian @ u - now.drift)) < 1e-12 * max(1.0, np.max(np.abs(now.rate)))
         path = lambda h, q=q, u=u, a=a: balance.at(t + h, moved(prepared, q, u, a, h, t), u + h * a).rate  # noqa: E731
         # Steps so short that what turns fastest hardly turns within one.
         step = 1e-3 / max(1.0, float(np.max(np.abs(u))))
         second = difference_quotient(lambda h, path=path: path(h[0]), np.zeros(1), step=step)[:, 0]
-        assert np.max(np.abs(now.slope @ a + now.gamma - second)) < 1e-8 * max(1.0, float(np.max(np.abs(u))) ** 2)
+        assert np.max(np.abs(now.jacobian @ a + now.gamma - second)) < 1e-8 * max(1.0, float(np.max(np.abs(u))) ** 2)

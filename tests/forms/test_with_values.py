@@ -293,7 +293,7 @@ def test_modes_are_assembled_once_for_all_values() -> None:
     scene.start["bob.velocity.x"] = 5.9
     fresh = simulate(scene, t_end=1.5)
     assert_allclose(again["bob.position.z"], fresh["bob.position.z"], rtol=1e-9, atol=1e-9)
-    assert [one.time for one in again.happenings] == pytest.approx([one.time for one in fresh.happenings])
+    assert [one.time for one in again.events] == pytest.approx([one.time for one in fresh.events])
 
 
 def test_ropes_over_pulleys() -> None:

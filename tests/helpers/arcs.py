@@ -8,7 +8,7 @@ import numpy as np
 
 from atwood import Result
 from atwood.simulation.problem.projection import project_safely
-from atwood.simulation.run.record import Segment
+from atwood.simulation.run.record import SegmentRecord
 from atwood.simulation.singular.collocation import find_arc
 
 __all__ = ["by_arcs"]
@@ -25,8 +25,8 @@ def by_arcs(result: Result) -> Result:
     return Result(replace(result.run, segments=tuple(_anew(one) for one in result.run.segments)))
 
 
-def _anew(segment: Segment) -> Segment:
-    plan, turning = segment.plan, segment.plan.balance.turning
+def _anew(segment: SegmentRecord) -> SegmentRecord:
+    plan, kinematic_map = segment.plan, segment.plan.balance.kinematic_map
     places, speeds = segment.coordinates.copy(), segment.speeds.copy()
     t, q, u = float(segment.time[0]), places[:, 0], speeds[:, 0]
     end = float(segment.time[-1])
@@ -40,9 +40,9 @@ def _anew(segment: Segment) -> Segment:
             continue
         inside = (segment.time > t) & (segment.time <= arc.end)
         found = arc.at(segment.time[inside])
-        places[:, inside], speeds[:, inside] = turning.normalized(found[0]), found[1]
+        places[:, inside], speeds[:, inside] = kinematic_map.normalized(found[0]), found[1]
         q, u, _ = (one[:, 0] for one in arc.at(np.array([arc.end])))
-        q = turning.normalized(q)
+        q = kinematic_map.normalized(q)
         if plan.balance.constraints:
             q, u = project_safely(plan, arc.end, q, u)
         t, h = arc.end, 1.3 * h

@@ -17,8 +17,8 @@ from atwood.forms.places import to_maximal
 from atwood.forms.program import state_groups
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.pipeline import assemble
-from atwood.topology.charts import Chart
-from atwood.topology.forest import Coordinate
+from atwood.topology.orientation_coordinates import OrientationCoordinates
+from atwood.topology.spanning_forest import Coordinate
 
 Rewriter = Callable[[list[Expression]], list[Expression]]
 
@@ -69,7 +69,7 @@ def directions_of(equations: Equations) -> tuple[Equations, dict[Expression, Exp
     coordinates: list[Expression] = []
     names: list[Coordinate] = []
     rates: list[Expression] = []
-    charts: list[Chart] = []
+    orientation_coordinates: list[OrientationCoordinates] = []
     angles: dict[Expression, Expression] = {}
     for number, (q, one, u) in enumerate(zip(equations.coordinates, equations.names, equations.speeds, strict=True)):
         if one.unit != "rad":
@@ -79,7 +79,9 @@ def directions_of(equations: Equations) -> tuple[Equations, dict[Expression, Exp
             continue
         c, s = graph.symbol(f"{q.name}.c"), graph.symbol(f"{q.name}.s")
         angles[q] = atan2(s, c)
-        charts.append(Chart("direction", (len(coordinates), len(coordinates) + 1), (number,), one.name))
+        orientation_coordinates.append(
+            OrientationCoordinates("direction", (len(coordinates), len(coordinates) + 1), (number,), one.name)
+        )
         coordinates += [c, s]
         names += [Coordinate(f"{one.name}.c", "1"), Coordinate(f"{one.name}.s", "1")]
         rates += [-(s * u), c * u]
@@ -88,7 +90,7 @@ def directions_of(equations: Equations) -> tuple[Equations, dict[Expression, Exp
         coordinates=tuple(coordinates),
         names=tuple(names),
         rates=tuple(rates),
-        charts=tuple(charts),
+        orientation_coordinates=tuple(orientation_coordinates),
         kinematics=rewritten(equations.kinematics, angles),
         rows=rewritten(equations.rows, angles),
         constraint_rows=rewritten(equations.constraint_rows, angles),

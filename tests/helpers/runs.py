@@ -90,7 +90,7 @@ def nearby_states(prepared: Prepared, count: int, size: float = 0.3) -> list[tup
     plan, found = prepared.plan, []
     for _ in range(count):
         step = size * plan.sizes * random.uniform(-1.0, 1.0, len(prepared.u))
-        q = plan.balance.turning.moved(prepared.time, prepared.q, step)
+        q = plan.balance.kinematic_map.moved(prepared.time, prepared.q, step)
         u = prepared.u + plan.sizes * random.uniform(-1.0, 1.0, len(prepared.u))
         found.append(plan.balance.project(prepared.time, q, u, plan.sizes))
     return found
@@ -98,7 +98,7 @@ def nearby_states(prepared: Prepared, count: int, size: float = 0.3) -> list[tup
 
 def moved(prepared: Prepared, q: FloatArray, u: FloatArray, a: FloatArray, h: float, t: float = 0.0) -> FloatArray:
     """Return where coordinates are a time later, at speeds that change by given accelerations: one step of order 4."""
-    rates = prepared.plan.balance.turning.rates
+    rates = prepared.plan.balance.kinematic_map.rates
     k1 = rates(t, q, u)
     k2 = rates(t, q + 0.5 * h * k1, u + 0.5 * h * a)
     k3 = rates(t, q + 0.5 * h * k2, u + 0.5 * h * a)

@@ -71,7 +71,7 @@ def test_half_a_turn_is_seen_within_a_step(stiffness: float, rate: float, form: 
 @pytest.mark.parametrize(("form", "solver"), WAYS)
 def test_a_stop_that_is_just_passed_at_the_lowest_place(form: str, solver: str) -> None:
     passed = simulate(bouncer(depth=1e-4), form=form, solver=solver, rtol=1e-8)
-    assert (passed.status, passed.happenings[0].law) == ("stopped", "is_low")
+    assert (passed.status, passed.events[0].law) == ("stopped", "is_low")
     # -2 + cos w t = -3 + depth
     assert passed.time[-1] == pytest.approx(0.1 * math.acos(1e-4 - 1.0), abs=1e-5)
     missed = simulate(bouncer(depth=-1e-4), form=form, solver=solver, rtol=1e-8)

@@ -256,7 +256,7 @@ def test_statistics_count_calls(kind: Kind) -> None:
     statistics = session.statistics
     assert statistics.residual_evaluations == calls
     assert statistics.steps > 3
-    assert statistics.missing_values == 0
+    assert statistics.undefined_values == 0
     assert statistics.seconds > 0.0
     failures = statistics.error_test_failures
     assert failures is not None
@@ -336,7 +336,7 @@ def test_where_there_is_no_value_steps_are_shorter(kind: Kind) -> None:
     found = session.advance(1.5)
     assert found.status is Status.REACHED
     assert found.y[0] == pytest.approx(0.0625, rel=1e-4)
-    assert session.statistics.missing_values > 0
+    assert session.statistics.undefined_values > 0
 
 
 def test_growth_without_bound_ends_with_the_last_good_state(kind: Kind) -> None:

@@ -435,7 +435,7 @@ class TestMissingValues:
         assert end.status is Status.REACHED
         assert_allclose(end.y, [0.005**2], rtol=1e-2)
         end = session.advance(3.0)
-        assert session.statistics.missing_values > 0
+        assert session.statistics.undefined_values > 0
         assert end.status is Status.FAILED
         assert 1.99 < end.t < 2.01
         assert end.y[0] >= -1e-9
@@ -456,7 +456,7 @@ class TestMissingValues:
         end = session.advance(2.0)
         assert end.status is Status.REACHED
         assert_allclose(end.y, [math.exp(-2.0)], rtol=1e-3)
-        assert session.statistics.missing_values == 3
+        assert session.statistics.undefined_values == 3
 
     def test_a_wall_ends_the_run_with_the_equation_and_the_time(self, capfd: Any) -> None:
         problem = ImplicitProblem(
@@ -499,7 +499,7 @@ class TestMissingValues:
         end = session.advance(3.0)
         assert end.status is Status.REACHED
         assert_allclose(end.y[0], math.cos(3.0), atol=1e-6)
-        assert session.statistics.missing_values == 2
+        assert session.statistics.undefined_values == 2
 
     def test_a_solution_that_blows_up_is_a_failure(self, capfd: Any) -> None:
         """y' = y^2 from 1 has no solution past t = 1."""

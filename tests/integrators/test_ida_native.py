@@ -155,7 +155,7 @@ def with_c_functions(problem: ImplicitProblem, record: Record, weights: bool = F
             events=address(events) if events is not None else 0,
             weights=address(own) if weights else 0,
             set_weights=set_weights if weights else None,
-            missing_values=lambda: record.missing,
+            undefined_values=lambda: record.undefined,
             keep=(residual, jacobian, own, events),
         )
 
@@ -394,7 +394,7 @@ class TestCompiled:
         session = ida_native.open_session(problem, TIGHT, 0.0, np.array([1.0, 0]), np.array([0, -1.0]))
         end = session.advance(3.0)
         assert end.status is Status.FAILED
-        assert session.statistics.missing_values == record.missing > 0
+        assert session.statistics.undefined_values == record.undefined > 0
         assert_allclose(end.t, math.pi / 3, atol=1e-3)
         assert_allclose(end.y[0], math.cos(end.t), atol=1e-6)
         assert "the residual of equation 1 is nan" in end.message

@@ -136,7 +136,7 @@ def test_both_steppers_take_the_same_steps(tolerance: float) -> None:
         found.append(session.advance(5.0))
         statistics.append(session.statistics)
     assert_allclose(found[0].y, found[1].y, rtol=1e-12, atol=1e-13)
-    for name in ("steps", "residual_evaluations", "error_test_failures", "missing_values"):
+    for name in ("steps", "residual_evaluations", "error_test_failures", "undefined_values"):
         assert getattr(statistics[0], name) == getattr(statistics[1], name)
 
 
@@ -221,7 +221,7 @@ def test_coefficients_without_a_value_are_a_failure(kind: Kind) -> None:
     session = start(kind, system(lambda t, x: [1.0 + ex.sqrt(x[0])], 1), tight(1e-8), [0.0])
     found = session.advance(1.0)
     assert (found.status, found.t) == (Status.FAILED, 0.0)
-    assert session.statistics.missing_values > 0
+    assert session.statistics.undefined_values > 0
 
 
 def test_a_start_without_a_value_is_refused(kind: Kind) -> None:

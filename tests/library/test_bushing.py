@@ -128,7 +128,7 @@ def test_it_stops_before_half_a_turn() -> None:
     scene = mounted(turning_stiffness=(0.01, 0.01, 0.01))
     scene.start.update({"block.spin.x": 2.0})
     result = simulate(scene, t_end=5.0, outputs=11)
-    assert [one.law for one in result.happenings] == ["comes_to_half_a_turn"]
+    assert [one.law for one in result.events] == ["comes_to_half_a_turn"]
     assert result["mount.rotation.x"][-1] == pytest.approx(0.999 * math.pi, rel=1e-6)
 
 

@@ -105,7 +105,7 @@ def test_a_torsion_spring_in_space_stops_where_its_angle_is_not_told() -> None:
     scene = on_a_hinge("space", AXIS, ("spring", lib.TorsionSpring(stiffness=1e-3, axis=AXIS)))
     scene.start.update({"hinge.angle": 0.0, "hinge.angular_velocity": 4.0})
     result = simulate(scene, t_end=3.0, outputs=16)
-    assert [one.law for one in result.happenings] == ["comes_to_half_a_turn"]
+    assert [one.law for one in result.events] == ["comes_to_half_a_turn"]
     assert result.time[-1] == pytest.approx(0.999 * math.pi / 4.0, rel=1e-2)
     planar = on_a_hinge("plane", (0.0, -1.0, 0.0), ("spring", lib.TorsionSpring(stiffness=1e-3)))
     planar.start.update({"hinge.angle": 0.0, "hinge.angular_velocity": 4.0})

@@ -412,7 +412,7 @@ def test_a_gear_through_a_change_of_mode() -> None:
         scene.connect(far.frame, rope.b)
         scene.start.update({"hinge_one.angle": 0.0, "hinge_one.angular_velocity": 3.0})
         runs.append(simulate(scene, form=form, t_end=3.0, rtol=1e-10, outputs=7))
-    assert [one.law for one in runs[0].happenings][:2] == ["comes_taut", "goes_slack"]
+    assert [one.law for one in runs[0].events][:2] == ["comes_taut", "goes_slack"]
     for path in ("hinge_one.angle", "hinge_two.angle"):
         assert np.allclose(runs[0][path], runs[1][path], atol=1e-5)
 

@@ -37,7 +37,7 @@ def energies(prepared: Prepared, t: float, q: FloatArray, u: FloatArray) -> tupl
 def test_rows_are_lagranges_equations(name: str, form: str) -> None:
     # d/dt dT/du - dT/dq + dV/dq, time derivatives along (u, a); Goldstein, equation 1.57
     prepared = prepare(SCENES[name](), form)
-    if prepared.assembly.equations.charts or dampers(prepared):
+    if prepared.assembly.equations.orientation_coordinates or dampers(prepared):
         return  # speeds that are no rates of coordinates, forces that have no potential: see the balance of power below
     balance, t = prepared.plan.balance, 0.4
     n = len(prepared.q)

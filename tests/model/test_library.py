@@ -181,7 +181,7 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
         time=numbers.draw("time", 0.0, 2.0),
         space=space_name,
         line=space.line,
-        sides={(a, b): 1.0 if i < j else -1.0 for i, a in enumerate(names) for j, b in enumerate(names)},
+        line_signs={(a, b): 1.0 if i < j else -1.0 for i, a in enumerate(names) for j, b in enumerate(names)},
         reactions={name: numbers.draw(name) for name in reaction_names(component)},
         energies={"kinetic": numbers.draw("kinetic"), "potential": numbers.draw("potential")},
     )

@@ -26,7 +26,7 @@ def universal_joint(angle, bend):
 
     Returns
     -------
-    out, ratio, slope
+    out, ratio, jacobian
         Angle of the driven shaft; d out / d in; d^2 out / d in^2.
     """
     angle = np.asarray(angle, dtype=float)

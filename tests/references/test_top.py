@@ -100,8 +100,8 @@ def test_period_and_advance_are_the_integrals_they_stand_for(name):
         period = 4 * mp.quad(over, nodes)
         assert top.period == pytest.approx(float(period), rel=1e-12)
         if name != "past the top":  # its azimuth jumps too sharply for this integral
-            advance = 4 * mp.quad(lambda x: over(x, lambda u: (b - spin * u) / (1 - u * u)), nodes)
-            assert top.precession == pytest.approx(float(advance), rel=1e-12)
+            step_result = 4 * mp.quad(lambda x: over(x, lambda u: (b - spin * u) / (1 - u * u)), nodes)
+            assert top.precession == pytest.approx(float(step_result), rel=1e-12)
     later = top.axis(top.period + 0.1)
     turned = from_quaternion([math.cos(top.precession / 2), 0, 0, math.sin(top.precession / 2)]) @ top.axis(0.1)
     assert np.allclose(later, turned, atol=1e-12)

@@ -200,13 +200,13 @@ class Radial(Component):
     """A point moves towards the world's origin or away from it only: ``x z' - z x' = 0``, so that z/x is constant."""
 
     point: Point = connector(Point, "The point.")
-    turning: float = parameter(1.0, unit="1", doc="Share of the first term: with 1 it is integrable.")
+    kinematic_map: float = parameter(1.0, unit="1", doc="Share of the first term: with 1 it is integrable.")
 
     @constraint(reaction="across", unit="N/m", doc="Multiplier.")
     def straight(self) -> Scalar:
         """Return the rate of the area that is swept."""
         p, v = self.point.position, self.point.velocity
-        return p.x * v.z - self.turning * p.z * v.x
+        return p.x * v.z - self.kinematic_map * p.z * v.x
 
 
 class Contact(Component):

@@ -210,6 +210,6 @@ def test_a_rope_on_a_line_comes_taut_on_the_other_side_too(form: str) -> None:
     scene.connect(rope.b, mass.point)
     scene.start.update({"m.position.x": -0.5, "m.velocity.x": 10.0})
     result = simulate(scene, form=form, t_end=0.3)
-    assert [one.law for one in result.happenings][:1] == ["comes_taut"]
-    assert result.happenings[0].time == pytest.approx(0.15, abs=1e-6)
+    assert [one.law for one in result.events][:1] == ["comes_taut"]
+    assert result.events[0].time == pytest.approx(0.15, abs=1e-6)
     assert np.max(np.abs(result["m.position.x"])) < 1.0 + 1e-6

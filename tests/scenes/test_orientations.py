@@ -7,7 +7,7 @@ import pytest
 
 import atwood_library as lib
 from atwood import Scene, compare, report, simulate, sweep
-from atwood.simulation.dynamics.kinematic_map import turning_of
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.initialization.start import find_start
 
 from ..helpers.runs import FORMS, prepare
@@ -70,10 +70,10 @@ def caught() -> Scene:
 def test_orientations_pass_between_modes() -> None:
     ways = [("reduced", "ida"), ("reduced", "explicit"), ("dae", "ida")]
     runs = [simulate(caught(), form=form, solver=solver, rtol=1e-9, outputs=21) for form, solver in ways]
-    laws = [one.law for one in runs[0].happenings]
+    laws = [one.law for one in runs[0].events]
     assert laws[:2] == ["comes_taut", "goes_slack"]
     for one in runs:
-        assert [happening.law for happening in one.happenings] == laws
+        assert [happening.law for happening in one.events] == laws
         assert one.energy.max_drift < 1e-5
         for path in ("body.position.x", "body.position.y", "body.z_axis.x", "body.x_axis.y"):
             assert np.allclose(one.array(path)[-5:], runs[0].array(path)[-5:], atol=2e-5)
@@ -125,16 +125,18 @@ def test_orientations_are_compared_by_their_axes() -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_a_rough_run_goes_on_although_coordinates_shrink(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The size of a quaternion means nothing: one that has strayed is put back, and the motion goes on."""
-    from atwood.simulation.dynamics.kinematic_map import Turning
+    from atwood.simulation.dynamics.kinematic_map import KinematicMap
 
     strayed: list[bool] = []
-    strays = Turning.strays
-    monkeypatch.setattr(Turning, "strays", lambda self, q: strayed.append(strays(self, q)) or strayed[-1])
+    needs_normalization = KinematicMap.needs_normalization
+    monkeypatch.setattr(
+        KinematicMap, "needs_normalization", lambda self, q: strayed.append(needs_normalization(self, q)) or strayed[-1]
+    )
     made = simulate(top(gravity=0.0), form=form, solver="ida", rtol=1e-3, t_end=600.0, outputs=31)
     assert made.status == "finished"
     assert any(strayed)
     for segment in made.run.segments:
-        chart = list(made.assembly.equations.charts[0].coordinates)
+        chart = list(made.assembly.equations.orientation_coordinates[0].coordinates)
         assert np.allclose(np.sum(segment.coordinates[chart] ** 2, axis=0), 1.0, atol=1e-14)
 
 
@@ -145,7 +147,7 @@ def test_the_size_of_a_quaternion_changes_nothing() -> None:
     one, other = kernel([0.0], q, prepared.u), kernel([0.0], -3.0 * q, prepared.u)
     for group, again in zip(one, other, strict=True):
         assert np.allclose(group, again, rtol=1e-13, atol=1e-13)
-    turning = turning_of(prepared.assembly, "reduced")
+    turning = kinematic_map_of(prepared.assembly, "reduced")
     step = np.array([1e-6, -2e-6, 3e-6])
     moved = turning.moved(0.0, turning.normalized(q), step)
     # Either sign of a quaternion is the same orientation.

@@ -109,7 +109,7 @@ def test_reactions_of_redundant_constraints_are_those_of_least_size(make: type[S
         places, speeds = maximal_state(assembly, result.time, *states)
         balance = balance_of(assembly, "dae")
         for k, t in enumerate(result.time):
-            slope = balance.at(float(t), places[:, k], speeds[:, k]).slope
+            slope = balance.at(float(t), places[:, k], speeds[:, k]).jacobian
             _, sizes, directions = np.linalg.svd(slope.T)
             idle = directions[int(np.sum(sizes > 1e-9 * sizes[0])) :]
             assert len(idle) == redundant

@@ -11,8 +11,8 @@ from atwood import Component, Scene
 from atwood.errors import StartError
 from atwood.pipeline import assemble, simulate
 from atwood.simulation.initialization.assembly_branch import wrongly_turned
-from atwood.simulation.initialization.closure_error import find_gaps
-from atwood.simulation.initialization.report import find_placement
+from atwood.simulation.initialization.closure_error import find_closure_errors
+from atwood.simulation.initialization.report import report_initialization
 from atwood.simulation.initialization.start import find_start
 from atwood_library import (
     Cylindrical,
@@ -139,7 +139,7 @@ def test_a_loop_that_closes_only_far_from_the_guess_says_where() -> None:
     assert set(advised) == set(scene.guess)
     scene.guess.update({path: float(value) for path, value in advised.items()})
     assembly = assemble(scene)
-    found = find_placement(assembly, find_start(assembly))
+    found = report_initialization(assembly, find_start(assembly))
     assert all(abs(one.off) < 1e-3 for one in found.guesses)  # the advice is good
 
 
@@ -190,7 +190,7 @@ def test_gaps_are_seen_in_scenes_of_any_size(size: float) -> None:
 def test_gaps_of_joints_are_distances_and_angles() -> None:
     assembly = assemble(hinged_askew(0.0))
     equations = assembly.reduced
-    (gap,) = find_gaps(assembly, equations, 0.0, np.array([0.3]), 1.0)
+    (gap,) = find_closure_errors(assembly, equations, 0.0, np.array([0.3]), 1.0)
     assert gap.distance == pytest.approx(2.0 * math.sin(0.15), rel=1e-12)  # the chord that the bar's end went
     assert gap.angle < 1e-12
 
@@ -202,7 +202,7 @@ def test_what_was_guessed_is_moved_and_what_was_not_is_placed() -> None:
     scene = FourBar()
     assembly = assemble(scene)
     start = find_start(assembly)
-    found = find_placement(assembly, start)
+    found = report_initialization(assembly, start)
     at = dict(zip([one.name for one in assembly.reduced.names], start.coordinates.tolist(), strict=True))
     bodies = {one.path: one for one in found.bodies}
     assert set(bodies) == {"rocker", "coupler"}  # the crank's angle is fixed
@@ -221,7 +221,7 @@ def test_what_was_guessed_is_moved_and_what_was_not_is_placed() -> None:
     assert "moved to fit: rocker by 0.458 m and 26.5 deg" in found.summary
     scene.guess.clear()
     assembly = assemble(scene)
-    found = find_placement(assembly, find_start(assembly))
+    found = report_initialization(assembly, find_start(assembly))
     assert found.summary.startswith("placed by the solver, as not all was said of them")
     assert all(one.moved == (0.0, 0.0) for one in found.bodies)
 
@@ -229,7 +229,7 @@ def test_what_was_guessed_is_moved_and_what_was_not_is_placed() -> None:
 def test_nothing_moves_where_all_fits() -> None:
     for scene in (DoublePendulum(), Bricard()):
         assembly = assemble(scene)
-        found = find_placement(assembly, find_start(assembly))
+        found = report_initialization(assembly, find_start(assembly))
         assert found.bodies == found.opened == ()
         assert found.summary == ""
         assert "Nothing was moved" in str(found)
@@ -241,7 +241,7 @@ def test_a_guess_that_a_fixed_value_contradicts_is_said() -> None:
     scene.start.update({"rod1.angle": 0.3, "bob2.position.x": 0.5})
     scene.guess.update({"rod1.angle": 0.5, "rod2.angle": 0.4})
     assembly = assemble(scene)
-    found = find_placement(assembly, find_start(assembly))
+    found = report_initialization(assembly, find_start(assembly))
     off = {one.path: one.off for one in found.guesses}
     assert off["rod1.angle"] == pytest.approx(-0.2, abs=1e-9)
     assert off["rod2.angle"] == pytest.approx(math.asin(0.5 - math.sin(0.3)) - 0.4, abs=1e-9)
@@ -250,7 +250,7 @@ def test_a_guess_that_a_fixed_value_contradicts_is_said() -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_results_know_what_was_moved_in_both_forms(form: str) -> None:
     result = simulate(StewartPlatform(), form=form, t_end=1e-3, outputs=2, rtol=1e-6)
-    found = result.placement
+    found = result.initialization
     assert {one.path for one in found.bodies} >= {"upper3", "lower3"}
     leg = next(one for one in found.guesses if one.path == "leg2.displacement")
     assert leg.found == pytest.approx(result.array("leg2.displacement")[0], abs=1e-9)
@@ -382,7 +382,7 @@ def test_bodies_placed_roughly_by_position_and_orientation() -> None:
     for path in ("fore.position.x", "fore.position.y", "fore.position.z", "upper.z_axis.x"):
         assert result.array(path)[0] == pytest.approx(exact.array(path)[0], abs=0.15)
     assert result.constraint_max["position"] < 1e-10
-    assert len(result.placement.guesses) == 18
+    assert len(result.initialization.guesses) == 18
 
 
 def _arm() -> Scene:

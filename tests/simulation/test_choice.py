@@ -206,9 +206,9 @@ def test_a_mode_with_loops_is_followed_by_one_without() -> None:
     scene = pendulum_on_a_string(t_end=3.0, rope={"when_slack": "slack"})
     scene.start.update({"bob.position.x": 0.0, "bob.position.z": -1.0, "bob.velocity.x": math.sqrt(3.5 * 9.81)})
     result = simulate(scene, rtol=1e-8)
-    assert result.happenings
+    assert result.events
     assert solvers(result)[:2] == ["ida", "explicit"]
-    assert result.run.choices[1].time == result.happenings[0].time
+    assert result.run.choices[1].time == result.events[0].time
 
 
 def test_the_fallback_is_announced(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -92,10 +92,8 @@ def test_compiled_events_happen_when_those_in_python_do(
     in_python(monkeypatch)
     python = run()
     assert compiled.status == python.status == status
-    assert [(one.part, one.law) for one in compiled.happenings] == [(one.part, one.law) for one in python.happenings]
-    assert [one.time for one in compiled.happenings] == pytest.approx(
-        [one.time for one in python.happenings], abs=1e-12
-    )
+    assert [(one.part, one.law) for one in compiled.events] == [(one.part, one.law) for one in python.events]
+    assert [one.time for one in compiled.events] == pytest.approx([one.time for one in python.events], abs=1e-12)
     assert compiled.time == pytest.approx(python.time, abs=1e-12)
     assert compiled.statistics.steps == python.statistics.steps
     for path in ("bob.position.z", "bob1.position.z", "left.position.z"):
@@ -120,7 +118,7 @@ def test_no_python_looks_at_steps_in_which_nothing_happens(solver: str, monkeypa
 def test_what_is_watched_may_be_an_acceleration(solver: str) -> None:
     # z = -1 - g/w^2 (1 - cos w t): the acceleration -g cos w t passes g/2 upwards at w t = 2 pi/3.
     result = simulate(bouncer(acceleration=0.5 * G), rtol=1e-10, solver=solver)
-    assert (result.status, result.happenings[0].law) == ("stopped", "is_pushed")
+    assert (result.status, result.events[0].law) == ("stopped", "is_pushed")
     assert result.time[-1] == pytest.approx(2.0 * math.pi / 30.0, abs=1e-8)
 
 
@@ -128,7 +126,7 @@ def test_what_is_watched_may_be_an_acceleration(solver: str) -> None:
 def test_both_directions_count_for_one_that_has_none(solver: str) -> None:
     # z' = -(g/w) sin w t passes -g/w/2 downwards at w t = pi/6.
     result = simulate(bouncer(speed=-0.5 * G / 10.0), rtol=1e-10, solver=solver)
-    assert result.happenings[0].law == "is_fast"
+    assert result.events[0].law == "is_fast"
     assert result.time[-1] == pytest.approx(math.pi / 60.0, abs=1e-8)
 
 
@@ -152,6 +150,6 @@ def test_compiled_values_are_those_of_python(make: Callable[[], Scene], form: st
 def test_outputs_do_not_change_when_events_happen() -> None:
     scene = over_the_top()
     few, many = (simulate(scene, rtol=1e-8, outputs=count, samples=1) for count in (3, 1001))
-    times = [[one.time for one in result.happenings] for result in (few, many)]
+    times = [[one.time for one in result.events] for result in (few, many)]
     assert times[0] == pytest.approx(times[1], abs=1e-12)
     assert few.statistics.steps == many.statistics.steps

@@ -7,7 +7,7 @@ import pytest
 from atwood import simulate
 from atwood.codegen.python.backend import BoundKernel
 from atwood.linalg import sparse
-from atwood.simulation.singular.monitor import Guard
+from atwood.simulation.singular.monitor import SingularityMonitor
 from atwood_library.scenes import FourBar, FourBarRow
 
 FORMS = ("reduced", "dae")
@@ -17,7 +17,7 @@ FORMS = ("reduced", "dae")
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many kernels were called while something looked out for singular positions."""
     count, inside = [0], [False]
-    call, look = BoundKernel.__call__, Guard.look
+    call, look = BoundKernel.__call__, SingularityMonitor.look
 
     def counted(self, *groups):
         count[0] += inside[0]
@@ -31,14 +31,14 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
             inside[0] = False
 
     monkeypatch.setattr(BoundKernel, "__call__", counted)
-    monkeypatch.setattr(Guard, "look", looking)
+    monkeypatch.setattr(SingularityMonitor, "look", looking)
     return count
 
 
 @pytest.mark.parametrize(("form", "most"), [("reduced", 28), ("dae", 40)])
 def test_a_crossing_takes_few_evaluations(form: str, most: int, calls: list[int]) -> None:
     result = simulate(FourBarRow(windows=1), form=form)
-    assert len(result.passages) == 10
+    assert len(result.singular_crossings) == 10
     assert calls[0] <= 10 * most  # 55 and 111 before
 
 

@@ -14,7 +14,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.pipeline import assemble, assemble_flat, simulate
 from atwood.reporting import report
 from atwood.simulation.dynamics.balance import balance_of
-from atwood.simulation.dynamics.kinematic_map import resting_place, turning_of
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.problem.options import RunOptions
@@ -120,35 +120,35 @@ def test_slopes_are_derivatives_along_the_speeds(name: str, form: str) -> None:
     assembly, t, q, u = states(name, form)
     equations = assembly.reduced if form == "reduced" else assembly.maximal
     balance = balance_of(assembly, assembly.form)
-    turning = balance.turning
-    tangent = difference_quotient(lambda d: turning.moved(t, q, d), np.zeros_like(u))
-    assert np.allclose(tangent, turning.tangent(t, q), atol=1e-8)
-    assert np.allclose(turning.rates(t, q, u), turning.tangent(t, q) @ u, atol=1e-12)
+    kinematic_map = balance.kinematic_map
+    tangent = difference_quotient(lambda d: kinematic_map.moved(t, q, d), np.zeros_like(u))
+    assert np.allclose(tangent, kinematic_map.matrix(t, q), atol=1e-8)
+    assert np.allclose(kinematic_map.rates(t, q, u), kinematic_map.matrix(t, q) @ u, atol=1e-12)
     if equations.constraints:
-        along = difference_quotient(lambda d: balance.at(t, turning.moved(t, q, d), u).value, np.zeros_like(u))
-        assert np.allclose(along, balance.at(t, q, u).slope, atol=1e-8)
+        along = difference_quotient(lambda d: balance.at(t, kinematic_map.moved(t, q, d), u).value, np.zeros_like(u))
+        assert np.allclose(along, balance.at(t, q, u).jacobian, atol=1e-8)
 
 
 def test_a_difference_leads_from_place_to_place() -> None:
     assembly, t, q, _ = states("double-pendulum", "reduced")
-    turning = turning_of(assembly, "reduced")
+    kinematic_map = kinematic_map_of(assembly, "reduced")
     step = np.array([1e-5, -2e-5])
-    there = turning.moved(t, q, step)
-    assert np.allclose(turning.difference(t, q, there), step, atol=1e-13)
+    there = kinematic_map.moved(t, q, step)
+    assert np.allclose(kinematic_map.difference(t, q, there), step, atol=1e-13)
     # The same place with coordinates of another size.
-    assert np.allclose(turning.difference(t, q, 3.0 * there), step, atol=1e-13)
+    assert np.allclose(kinematic_map.difference(t, q, 3.0 * there), step, atol=1e-13)
 
 
 def test_orientations_are_brought_back_to_size_one() -> None:
     assembly, t, q, _ = states("pendulum-on-cart", "reduced")
-    turning = turning_of(assembly, "reduced")
-    assert resting_place(assembly.reduced).tolist() == [0.0, 1.0, 0.0]
+    kinematic_map = kinematic_map_of(assembly, "reduced")
+    assert reference_coordinates(assembly.reduced).tolist() == [0.0, 1.0, 0.0]
     many = np.array([q * [1.0, 3.0, 3.0], q * [1.0, 0.2, 0.2]]).T
-    assert np.allclose(turning.normalized(many), np.array([q, q]).T, atol=1e-15)
-    assert not turning.strays(q)
-    assert turning.strays(q * 3.0)
-    assert turning.strays(q * 0.3)
-    plain = turning_of(assemble(SCENES["pendulum-on-cart"]()), "reduced")
+    assert np.allclose(kinematic_map.normalized(many), np.array([q, q]).T, atol=1e-15)
+    assert not kinematic_map.needs_normalization(q)
+    assert kinematic_map.needs_normalization(q * 3.0)
+    assert kinematic_map.needs_normalization(q * 0.3)
+    plain = kinematic_map_of(assemble(SCENES["pendulum-on-cart"]()), "reduced")
     assert plain.is_plain
     assert np.array_equal(plain.moved(t, q[:2], q[:2]), 2.0 * q[:2])
 
@@ -159,7 +159,7 @@ def test_a_run_goes_on_from_size_one_where_coordinates_have_strayed() -> None:
     scene_start = find_start(assembly)
     far = Start(**{**vars(scene_start), "coordinates": 2.5 * scene_start.coordinates})
     ordinary = simulate(SCENES["simple-pendulum"](), t_end=2.0, outputs=21)
-    made = run(assembly, far, RunOptions(t_end=2.0, outputs=21), lambda modes, sides: assembly)
+    made = run(assembly, far, RunOptions(t_end=2.0, outputs=21), lambda modes, line_signs: assembly)
     assert_alike(ordinary, Result(made), 3e-6)
     sizes = np.sum(made.segments[0].coordinates ** 2, axis=0)
     assert np.allclose(sizes, 1.0, atol=1e-14)
@@ -174,12 +174,12 @@ def test_projection_finds_the_nearest_state(form: str) -> None:
     balance = balance_of(assembly, assembly.form)
     sizes = motion_scales(assembly.equations, 1.0)
     step = 1e-4 * np.random.default_rng(7).standard_normal(len(u))
-    moved = balance.turning.moved(t, q, step)
+    moved = balance.kinematic_map.moved(t, q, step)
     met, speeds = balance.project(t, moved, u, sizes)
     assert max(balance.misses(t, met, speeds, sizes)) < 1e-13
-    slope = balance.at(t, q, u).slope
+    slope = balance.at(t, q, u).jacobian
     across = np.linalg.pinv(slope) @ slope @ step  # what the nearest place is away by, to first order
-    assert np.allclose(balance.turning.difference(t, met, moved), across, atol=2e-7)
+    assert np.allclose(balance.kinematic_map.difference(t, met, moved), across, atol=2e-7)
 
 
 def test_a_start_is_found_from_what_is_said_of_places_and_velocities() -> None:
@@ -244,15 +244,15 @@ def rod_on_a_rope() -> Scene:
 @pytest.mark.parametrize("form", FORMS)
 def test_states_pass_between_modes(form: str) -> None:
     ordinary = simulate(rod_on_a_rope(), form=form, rtol=1e-9, outputs=31)
-    assert [one.law for one in ordinary.happenings][:2] == ["comes_taut", "goes_slack"]
+    assert [one.law for one in ordinary.events][:2] == ["comes_taut", "goes_slack"]
     assembly = with_directions(rod_on_a_rope(), form)
 
-    def reassemble(modes: Mapping[str, str], sides: Mapping[tuple[str, str, str], float], _: object) -> Assembly:
-        return turn_directed(assemble_flat(assembly.flat, form=form, modes=modes, sides=sides))
+    def reassemble(modes: Mapping[str, str], line_signs: Mapping[tuple[str, str, str], float], _: object) -> Assembly:
+        return turn_directed(assemble_flat(assembly.flat, form=form, modes=modes, line_signs=line_signs))
 
     options = RunOptions(t_end=1.5, relative_tolerance=1e-9, outputs=31)
     turned = Result(run(assembly, find_start(assembly), options, reassemble))
-    assert [one.law for one in turned.happenings] == [one.law for one in ordinary.happenings]
+    assert [one.law for one in turned.events] == [one.law for one in ordinary.events]
     assert np.allclose(turned.time, ordinary.time, rtol=0.0, atol=1e-7)
     for path in ("bob.position.x", "link.position.x", "link.position.z"):
         assert np.allclose(turned.array(path), ordinary.array(path), atol=1e-6)
@@ -263,6 +263,6 @@ def test_the_helper_leaves_no_angle() -> None:
     assembly = with_directions(SCENES["four-bar"]())
     every: tuple[Equations, ...] = (assembly.reduced, assembly.maximal)
     for equations in every:
-        assert equations.charts
+        assert equations.orientation_coordinates
         assert not {one.unit for one in equations.names} & {"rad"}
-        assert len(equations.coordinates) == len(equations.speeds) + len(equations.charts)
+        assert len(equations.coordinates) == len(equations.speeds) + len(equations.orientation_coordinates)

@@ -45,7 +45,7 @@ def test_a_rope_without_tension_stops_the_run(form: str) -> None:
     assert result.array("bob.position.z")[-1] == pytest.approx(0.5, abs=1e-7)
     assert result.array("rope.tension")[-1] == pytest.approx(0.0, abs=1e-6)
     assert np.all(result.array("rope.tension")[:-1] > 0.0)
-    (happening,) = result.happenings
+    (happening,) = result.events
     assert (happening.part, happening.law, happening.target) == ("rope", "goes_slack", "stop")
 
 
@@ -53,7 +53,7 @@ def test_a_rope_without_tension_stops_the_run(form: str) -> None:
 def test_a_slack_rope_lets_the_bob_fly_and_jerks(form: str) -> None:
     result = simulate(over_the_top("slack"), form=form, rtol=1e-10, outputs=601)
     assert result.status == "finished"
-    slack, taut = result.happenings[:2]
+    slack, taut = result.events[:2]
     assert (slack.law, slack.target, taut.law, taut.target) == ("goes_slack", "slack", "comes_taut", "taut")
     assert not slack.impact
     assert taut.impact
@@ -86,7 +86,7 @@ def test_a_slack_rope_lets_the_bob_fly_and_jerks(form: str) -> None:
 
 
 def test_event_times_agree_between_forms() -> None:
-    times = [[one.time for one in simulate(over_the_top("slack"), form=form, rtol=1e-10).happenings] for form in FORMS]
+    times = [[one.time for one in simulate(over_the_top("slack"), form=form, rtol=1e-10).events] for form in FORMS]
     assert times[0] == pytest.approx(times[1], abs=1e-7)
 
 
@@ -103,7 +103,7 @@ def test_a_rope_that_would_push_from_the_outset(form: str) -> None:
     assert (stopped.status, stopped.time[-1]) == ("stopped", 0.0)
     assert "rope" in stopped.message
     free = simulate(upside_down("slack"), form=form, rtol=1e-9)
-    assert free.happenings[0].time == 0.0
+    assert free.events[0].time == 0.0
     assert free.array("bob.position.z")[-1] == pytest.approx(1.0 - 0.5 * G * 0.25, abs=1e-7)
     assert free.array("bob.position.x")[-1] == pytest.approx(0.25, abs=1e-7)
 
@@ -125,7 +125,7 @@ def test_two_bodies_on_a_rope_keep_their_momentum_in_the_jerk(form: str) -> None
     # stretched out; the force -4 cos(5 t + 0.5) first pushes the ends together, and later apart
     scene.start.update({"one.position.x": 0.0, "two.position.x": 1.0, "one.velocity.x": 0.2, "two.velocity.x": 0.2})
     result = simulate(scene, form=form, rtol=1e-10, outputs=101)
-    assert [one.law for one in result.happenings[:2]] == ["goes_slack", "comes_taut"]
+    assert [one.law for one in result.events[:2]] == ["goes_slack", "comes_taut"]
     momentum = result.array("one.velocity.x") + 3.0 * result.array("two.velocity.x")
     expected = 0.8 - 0.8 * (np.sin(5.0 * result.time + 0.5) - math.sin(0.5))
     assert np.max(np.abs(momentum - expected)) < 1e-7

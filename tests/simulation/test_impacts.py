@@ -26,7 +26,7 @@ def two_masses(speed: float, space: str, **latch: object) -> Scene:
 @pytest.mark.parametrize(("speed", "space", "limit"), [(2.0, "plane", 1e3), (-2.0, "space", 1e3), (-2.0, "plane", 5.0)])
 def test_a_latch_takes_an_impulse_of_either_sign(form: str, speed: float, space: str, limit: float) -> None:
     result = simulate(two_masses(speed, space, limit=limit), form=form, rtol=1e-10, outputs=11)
-    (latched,) = result.happenings
+    (latched,) = result.events
     assert latched.impact
     assert latched.time == pytest.approx(0.5, abs=1e-9)
     one, two = result["one.velocity.x"], result["two.velocity.x"]
@@ -44,7 +44,7 @@ def test_what_is_one_sided_takes_one_sign_only(form: str, speed: float, bears: s
     scene = two_masses(speed, "plane", bears=bears)
     # The hook slows b down: its force on it is against the speed.
     if (speed > 0.0) == (bears == "pull"):
-        assert simulate(scene, form=form).happenings[0].impact
+        assert simulate(scene, form=form).events[0].impact
         return
     with pytest.raises(SolveError, match="one-sided") as caught:
         simulate(scene, form=form)

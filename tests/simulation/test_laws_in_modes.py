@@ -35,7 +35,7 @@ def block_on_a_rail(space: str = "plane", pull: object = 0.0, starts: str = "sti
 @pytest.mark.parametrize(("form", "space"), [("reduced", "plane"), ("dae", "plane"), ("dae", "space")])
 def test_a_block_sticks_until_it_is_pulled_too_hard(form: str, space: str) -> None:
     result = simulate(block_on_a_rail(space, pull=lambda t: 2.0 * t), form=form, t_end=3.0, rtol=1e-10, outputs=31)
-    (slips,) = result.happenings
+    (slips,) = result.events
     assert (slips.law, slips.target) == ("lets_go_ahead", "slips_ahead")
     assert slips.time == pytest.approx(LIMIT / 2.0, abs=1e-9)
     since = np.maximum(result.time - LIMIT / 2.0, 0.0)
@@ -51,8 +51,8 @@ def test_a_block_sticks_until_it_is_pulled_too_hard(form: str, space: str) -> No
 def test_a_sliding_block_comes_to_rest_and_stays(form: str) -> None:
     scene = block_on_a_rail(starts="slips_back", speed=-3.0)
     result = simulate(scene, form=form, t_end=3.0, rtol=1e-10, outputs=31)
-    assert [one.law for one in result.happenings] == ["stops_back"]
-    assert result.happenings[0].time == pytest.approx(3.0 * MASS / LIMIT, abs=1e-9)
+    assert [one.law for one in result.events] == ["stops_back"]
+    assert result.events[0].time == pytest.approx(3.0 * MASS / LIMIT, abs=1e-9)
     assert result.array("block.position.x")[-1] == pytest.approx(-MASS * 9.0 / (2.0 * LIMIT), abs=1e-8)
     assert result.energy.work[-1] == pytest.approx(-0.5 * MASS * 9.0, rel=1e-8)
 
@@ -62,9 +62,9 @@ def test_sticking_and_slipping_in_turn_is_alike_in_both_forms() -> None:
         return block_on_a_rail(pull=lambda t: 6.0 * sin(2.0 * t))
 
     reduced, dae = run_both(pulled, t_end=6.0, rtol=1e-10, outputs=61)
-    assert [one.law for one in reduced.happenings] == [one.law for one in dae.happenings]
-    assert {"lets_go_ahead", "lets_go_back", "stops_ahead", "stops_back"} <= {one.law for one in dae.happenings}
-    assert reduced.happenings[0].time == pytest.approx(math.asin(LIMIT / 6.0) / 2.0, abs=1e-9)
+    assert [one.law for one in reduced.events] == [one.law for one in dae.events]
+    assert {"lets_go_ahead", "lets_go_back", "stops_ahead", "stops_back"} <= {one.law for one in dae.events}
+    assert reduced.events[0].time == pytest.approx(math.asin(LIMIT / 6.0) / 2.0, abs=1e-9)
     assert np.max(np.abs(reduced.array("block.position.x") - dae.array("block.position.x"))) < 1e-8
 
 
@@ -80,7 +80,7 @@ def thrown(**cushion: float) -> Scene:
 @pytest.mark.parametrize("form", FORMS)
 def test_an_elastic_wall_throws_back(form: str) -> None:
     result = simulate(thrown(), form=form, t_end=2.0, rtol=1e-10, outputs=41)
-    touches, goes = result.happenings
+    touches, goes = result.events
     assert touches.time == pytest.approx(0.5, abs=1e-9)
     assert goes.time - touches.time == pytest.approx(math.pi / 10.0, abs=1e-7)  # half a period of sqrt(k/m) = 10/s
     assert result.array("mass.velocity.x")[-1] == pytest.approx(-2.0, abs=2e-7)
@@ -90,7 +90,7 @@ def test_an_elastic_wall_throws_back(form: str) -> None:
 
 def test_a_viscous_wall_takes_energy_while_it_is_touched() -> None:
     result = simulate(thrown(damping=4.0), t_end=2.0, rtol=1e-10, outputs=41)
-    touches, goes = result.happenings
+    touches, goes = result.events
     # x'' + 4 x' + 100 x = 0 with x = 0, x' = 2: it is back where it touched after half a period.
     w = math.sqrt(100.0 - 4.0)
     assert goes.time - touches.time == pytest.approx(math.pi / w, abs=1e-9)
@@ -101,7 +101,7 @@ def test_a_viscous_wall_takes_energy_while_it_is_touched() -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_energy_that_comes_with_a_mode_is_work(form: str) -> None:
     result = simulate(thrown(preload=5.0, store=3.0), form=form, t_end=0.6, rtol=1e-10, outputs=13)
-    assert [one.target for one in result.happenings] == ["touching"]
+    assert [one.target for one in result.events] == ["touching"]
     assert result.energy.work[0] == 0.0
     assert result.energy.work[-1] == pytest.approx(3.0, rel=1e-9)
     assert result.energy.max_drift < 1e-8

@@ -15,7 +15,7 @@ from atwood.clock import Clock, TimeIsUp, check_time, more_time, time_left, with
 from atwood.errors import ResultError, SolveError
 from atwood.integrators import explicit_session
 from atwood.integrators.ida import native as ida_native
-from atwood.simulation.initialization import massless as without_inertia
+from atwood.simulation.initialization import massless as massless_directions
 from atwood_library.scenes import DoublePendulum, FourBar, FourBarRow, SimplePendulum
 
 FORMS = ("reduced", "dae")
@@ -43,7 +43,7 @@ def test_a_limit_of_time_is_looked_at_all_along(form: str, looks: list[int]) -> 
     whole = simulate(scene, form=form, t_end=1.0, max_seconds=1e9)
     needed = looks[0] - before
     assert whole.status == "finished", whole.message
-    assert len(whole.passages) == 1
+    assert len(whole.singular_crossings) == 1
     for share in (1e-9, 0.1, 0.3, 0.6, 0.9):
         before = looks[0]
         found = simulate(scene, form=form, t_end=1.0, max_seconds=share * needed)
@@ -81,7 +81,7 @@ def test_what_has_inertia_everywhere_needs_no_singular_values(monkeypatch: pytes
     def refuse(*_: object) -> None:
         raise AssertionError("what is free to move is looked for")
 
-    monkeypatch.setattr(without_inertia, "open_directions", refuse)
+    monkeypatch.setattr(massless_directions, "open_directions", refuse)
     assert simulate(FourBarRow(windows=3), t_end=0.01).status == "finished"
 
 
@@ -143,5 +143,5 @@ def test_rounding_behind_a_singular_position_keeps_no_solver_from_going_on() -> 
     # Newton's iteration failed right behind the first place: rounding is larger there than the tolerance allows
     result = simulate(FourBarRow(windows=2, space="space"), form="dae", rtol=1e-12, t_end=0.8, outputs=11, samples=1)
     assert result.status == "finished"
-    assert [one.ways for one in result.passages] == [2]
+    assert [one.ways for one in result.singular_crossings] == [2]
     assert result.energy.max_drift < 1e-9

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from atwood import simulate
-from atwood.forms.loops import loop_program
+from atwood.forms.null_space import null_space_program
 from atwood.integrators.ida import library as sundials_library
-from atwood.simulation.dynamics.partitioning import POOR, choose_dependent, review_choice
-from atwood.simulation.problem.partition_arrays import choice_lists, loop_shape
+from atwood.simulation.dynamics.partitioning import POOR, choose_dependent_coordinates, review_partitioning
+from atwood.simulation.problem.partition_arrays import choice_lists, null_space_shape
 from atwood.simulation.problem.problem import Plan
 from atwood_library.scenes import FourBar, SliderCrank
 
@@ -42,16 +42,16 @@ def test_choices_are_as_good_as_can_be_reached_by_exchanges(rows: int, more: int
     random = np.random.default_rng(seed)
     slope = random.standard_normal((rows, rows + more)) * 10.0 ** random.uniform(-3.0, 3.0, (rows, 1))
     scales = 10.0 ** random.uniform(-2.0, 2.0, rows + more)
-    chosen = choose_dependent(slope, scales)
+    chosen = choose_dependent_coordinates(slope, scales)
     assert len(set(chosen)) == rows
     assert chosen == tuple(sorted(chosen))
     worst = min(combinations(range(rows + more), rows), key=lambda one: abs(np.linalg.det((slope * scales)[:, one])))
     for start in (chosen, worst):
-        settled = review_choice(slope, scales, start)
+        settled = review_partitioning(slope, scales, start)
         assert np.max(ratios(slope * scales, settled), initial=0.0) <= POOR + 1e-9
         # what is good enough stays, so that choices do not flicker
-        assert review_choice(slope, scales, settled) == settled
-    assert review_choice(7.0 * slope, scales, worst) == review_choice(slope, scales, worst)
+        assert review_partitioning(slope, scales, settled) == settled
+    assert review_partitioning(7.0 * slope, scales, worst) == review_partitioning(slope, scales, worst)
 
 
 def test_the_first_choice_is_that_of_a_pivoted_factorisation() -> None:
@@ -62,21 +62,21 @@ def test_the_first_choice_is_that_of_a_pivoted_factorisation() -> None:
         slope, scales = random.standard_normal((rows, columns)), np.ones(columns)
         size = np.max(np.abs(slope), axis=1)
         *_, pivots = qr(slope / size[:, None], pivoting=True, mode="economic")
-        assert choose_dependent(slope, scales) == tuple(sorted(int(one) for one in pivots[:rows]))
+        assert choose_dependent_coordinates(slope, scales) == tuple(sorted(int(one) for one in pivots[:rows]))
 
 
 def test_a_choice_that_cannot_be_solved_is_left() -> None:
     slope = np.array([[1.0, 1.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.5]])
-    assert review_choice(slope, np.ones(4), (0, 1)) in {(0, 3), (1, 3)}
+    assert review_partitioning(slope, np.ones(4), (0, 1)) in {(0, 3), (1, 3)}
     nothing = np.zeros((1, 2))
-    assert len(review_choice(nothing, np.ones(2), (0,))) == 1
+    assert len(review_partitioning(nothing, np.ones(2), (0,))) == 1
 
 
 def test_loops_that_share_nothing_are_solved_apart() -> None:
     prepared = prepare(two_four_bars(), "reduced")
     assembly = prepared.assembly
-    program = loop_program("two", assembly.equations, assembly.parameters, assembly.rows)
-    shape = loop_shape(program)
+    program = null_space_program("two", assembly.equations, assembly.parameters, assembly.rows)
+    shape = null_space_shape(program)
     lists = choice_lists(program, prepared.plan.dependent)
     at = shape.choice
     assert lists[at["blocks"]] == 2
@@ -137,9 +137,9 @@ def test_a_bob_that_goes_round_on_a_rope_changes_coordinates_four_times_a_turn()
 @needs_sundials
 def test_no_python_runs_between_outputs(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
-    kernels, review = Plan.kernels, Plan.review_dependent
+    kernels, review = Plan.kernels, Plan.review_partitioning
     monkeypatch.setattr(Plan, "kernels", lambda self: calls.append("kernels") or kernels(self))
-    monkeypatch.setattr(Plan, "review_dependent", lambda *given: calls.append("review") or review(*given))
+    monkeypatch.setattr(Plan, "review_partitioning", lambda *given: calls.append("review") or review(*given))
     result = simulate(FourBar(), t_end=5.0, solver="ida", outputs=11)
     assert result.statistics.steps > 300
     assert calls == []

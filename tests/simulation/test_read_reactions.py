@@ -44,7 +44,7 @@ def on_a_slope(starts: str = "slips_ahead", speed: float = 0.0, pull: Any = 0.0,
 @pytest.mark.parametrize("form", FORMS)
 def test_a_block_slides_down_a_slope(form: str) -> None:
     result = simulate(on_a_slope("slips_back"), form=form, t_end=2.0, rtol=1e-11, outputs=21)
-    assert not result.happenings
+    assert not result.events
     a = -G * (math.sin(SLOPE) - MU * math.cos(SLOPE))
     assert np.max(np.abs(result.array("slope.way") - 0.5 * a * result.time**2)) < 1e-8
     assert np.allclose(result.array("slope.normal"), MASS * G * math.cos(SLOPE), rtol=1e-12)
@@ -57,8 +57,8 @@ def test_thrown_up_it_stays_or_comes_back(friction: float, form: str) -> None:
     result = simulate(on_a_slope(speed=3.0, friction=friction), form=form, t_end=2.0, rtol=1e-11, outputs=21)
     up = G * (math.sin(SLOPE) + friction * math.cos(SLOPE))
     stop, highest = 3.0 / up, 4.5 / up
-    assert result.happenings[0].time == pytest.approx(stop, abs=1e-8)
-    laws = [one.law for one in result.happenings]
+    assert result.events[0].time == pytest.approx(stop, abs=1e-8)
+    laws = [one.law for one in result.events]
     if friction > math.tan(SLOPE):
         assert laws == ["stops_ahead"]
         assert result.array("slope.way")[-1] == pytest.approx(highest, abs=1e-8)
@@ -73,7 +73,7 @@ def test_thrown_up_it_stays_or_comes_back(friction: float, form: str) -> None:
 def test_it_slips_when_the_reaction_is_more_than_friction_can_hold(form: str) -> None:
     scene = on_a_slope("sticks", pull=lambda t: 20.0 * t, friction=0.8)
     result = simulate(scene, form=form, t_end=2.0, rtol=1e-11, outputs=21)
-    (slips,) = result.happenings
+    (slips,) = result.events
     limit = MASS * G * (math.sin(SLOPE) + 0.8 * math.cos(SLOPE))
     assert slips.law == "lets_go_ahead"
     assert slips.time == pytest.approx(limit / 20.0, abs=1e-9)

@@ -262,8 +262,8 @@ def test_a_jump_in_a_prescribed_speed_is_an_impact(form: str, solver: str, angle
     # The rod pushes along itself only: across it, the bob keeps its speed, along it, it has that of the pivot.
     np.testing.assert_allclose(speeds[1] @ along, speeds[0] @ along, rtol=1e-9)
     np.testing.assert_allclose(speeds[1] @ np.array([along[1], -along[0]]), 0.0, atol=1e-9)
-    assert [one.part for one in result.happenings] == ["drive"]
-    assert result.happenings[0].impact
+    assert [one.part for one in result.events] == ["drive"]
+    assert result.events[0].impact
     assert result.energy.max_drift < 3e-6
 
 
@@ -277,7 +277,7 @@ def test_a_jump_in_a_prescribed_position_is_refused_by_name(form: str, solver: s
 @pytest.mark.parametrize("form", FORMS)
 def test_a_jump_in_a_prescribed_acceleration_is_no_event_of_its_own(form: str) -> None:
     result = simulate(driven(lambda t: select(t < 0.5, 0.0, (t - 0.5) ** 2)), form=form, rtol=1e-9)
-    assert not result.happenings
+    assert not result.events
     assert result.energy.max_drift < 1e-7
 
 
@@ -352,7 +352,7 @@ def test_a_motor_in_a_loop_may_turn_back_at_once(space: str) -> None:
             scene.connect(a, b)
         scene.guess.update({"pivot2.angle": -0.7, "pivot4.angle": 1.9})
         result = simulate(scene, form=form, rtol=1e-9)
-        assert len(result.happenings) == 1
+        assert len(result.events) == 1
         return result.array("pivot4.angular_velocity")
 
     speeds = rows("reduced")
@@ -375,7 +375,7 @@ def test_a_rope_that_a_push_makes_slack_at_once_is_seen(form: str) -> None:
     fall = 0.1 * (30.0 - 9.81)  # the speed at which it is thrown
     height = 0.5 * 0.1 * fall
     again = 0.4 + (fall + math.sqrt(fall**2 + 2.0 * 9.81 * height)) / 9.81
-    assert [one.time for one in result.happenings] == pytest.approx([0.3, again], rel=1e-9)
+    assert [one.time for one in result.events] == pytest.approx([0.3, again], rel=1e-9)
 
 
 class Field(Component):
@@ -421,7 +421,7 @@ def test_a_motion_that_starts_infinitely_fast_is_refused_by_name(form: str) -> N
 @pytest.mark.parametrize("form", FORMS)
 def test_a_motion_that_fits_but_for_its_digits_is_continuous(form: str) -> None:
     result = simulate(driven(lambda t: select(t < 0.5235988, sin(t), 0.5)), form=form, rtol=1e-10)
-    assert len(result.happenings) == 1
+    assert len(result.events) == 1
     assert result.energy.max_drift < 1e-6
 
 
@@ -433,7 +433,7 @@ def test_each_part_whose_speed_jumps_is_told() -> None:
     for a, b in ((ground.frame, drive.a), (drive.b, lift.a), (lift.b, rod.a), (rod.b, bob.point)):
         scene.connect(a, b)
     scene.start.update({"rod.angle": 0.3, "rod.angular_velocity": 0.0})
-    assert [(one.time, one.part) for one in simulate(scene).happenings] == [(0.5, "drive"), (0.5, "lift")]
+    assert [(one.time, one.part) for one in simulate(scene).events] == [(0.5, "drive"), (0.5, "lift")]
 
 
 def test_switching_without_end_is_refused_by_name() -> None:

@@ -81,14 +81,14 @@ def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
             known = started, started.run(result.time, 1e-10)
         tried.append(f"compared {way.form}")
         loose = 300.0 if way.level == "index1" else 1.0
-        wrong = [(what, gap) for what, gap in _gaps(result, *known) if not gap <= ALLOWED * loose]
+        wrong = [(what, gap) for what, gap in _closure_errors(result, *known) if not gap <= ALLOWED * loose]
         if wrong:
             numbers = ", ".join(f"{what} {gap:.1e}" for what, gap in wrong)
             findings.append(Finding("wrong", f"{way.form}: {wrong[0][0]}", f"{words}: {numbers}\n{outline(mechanism)}"))
     return Trial(tuple(tried), tuple(findings))
 
 
-def _gaps(result: Result, oracle: Oracle, states: list[tuple[Place, Array]]) -> list[tuple[str, float]]:
+def _closure_errors(result: Result, oracle: Oracle, states: list[tuple[Place, Array]]) -> list[tuple[str, float]]:
     """Return what was compared and by how much it differs, the worst for each quantity."""
     worst: dict[str, float] = {}
     every = *_freedom(result, oracle), *_motion(result, oracle, states), *_reactions(result, oracle, states)

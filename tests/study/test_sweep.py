@@ -358,10 +358,10 @@ def test_unknown_files_are_refused(tmp_path: Any) -> None:
         made_for_files()["bob.position.y2"]
 
 
-def order_of(options: RunOptions, scene: Any = None, form: str = "reduced") -> sweep_runs.Order:
+def order_of(options: RunOptions, scene: Any = None, form: str = "reduced") -> sweep_runs.SweepRequest:
     assembly = assemble(scene or DoublePendulum(), form=form)
     cases = make_cases(scene or DoublePendulum(), {"gravity": [1.0]}, None, "grid")
-    return sweep_runs.Order(assembly, cases, ("rod1.angle",), np.array([1.0]), True, options)
+    return sweep_runs.SweepRequest(assembly, cases, ("rod1.angle",), np.array([1.0]), True, options)
 
 
 def test_nothing_is_batched_by_mistake() -> None:

@@ -16,7 +16,7 @@ from atwood.linalg.matrices import from_entries, to_array
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, solve_balance
-from atwood.simulation.dynamics.kinematic_map import Turning, turning_of
+from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
 from atwood.simulation.dynamics.rank import independent_rows
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start
@@ -66,7 +66,7 @@ class LooseScene:
     def __init__(self, assembly: Assembly, start: Start) -> None:
         self.assembly, self.start = assembly, start
         equations = assembly.reduced
-        self.turning: Turning = turning_of(assembly, "reduced")
+        self.kinematic_map: KinematicMap = kinematic_map_of(assembly, "reduced")
         self.sizes = motion_scales(equations, start.length)
         balance = assembly.balance("reduced")
         self._errors = balance_of(assembly, "reduced").errors
@@ -104,8 +104,8 @@ class LooseScene:
             value,
             rate,
             gamma,
-            slope,
-            drift,
+            constraint_jacobian,
+            explicit_rate,
             places,
             velocities,
             seconds,
@@ -116,8 +116,10 @@ class LooseScene:
             by_spin,
         ) = values
         matrix = to_array(from_entries(b.mass_rows, b.mass_columns, mass, (n, n), True))
-        jacobian_ = to_array(from_entries(b.slope_rows, b.slope_columns, slope, (b.constraints, n), True))
-        now = BalanceValues(matrix, bias, value, rate, gamma, jacobian_, drift)
+        jacobian_ = to_array(
+            from_entries(b.jacobian_rows, b.jacobian_columns, constraint_jacobian, (b.constraints, n), True)
+        )
+        now = BalanceValues(matrix, bias, value, rate, gamma, jacobian_, explicit_rate)
         points, turning = self._counts
         moved = (velocities, spins) if a is None else (seconds, turns)
         return now, Bodies(
@@ -132,8 +134,8 @@ class LooseScene:
     def accelerations(self, t: float, q: FloatArray, u: FloatArray) -> Bodies:
         """Return the accelerations of the bodies at a state."""
         now, _ = self.at(t, q, u)
-        errors = self._errors.of_slopes(t, q, self.sizes)
-        kept = np.asarray(independent_rows(np.asarray(now.slope) * self.sizes, errors), dtype=np.intp)
+        errors = self._errors.of_jacobian(t, q, self.sizes)
+        kept = np.asarray(independent_rows(np.asarray(now.jacobian) * self.sizes, errors), dtype=np.intp)
         return self.at(t, q, u, solve_balance(now, kept, t)[0])[1]
 
 

@@ -33,7 +33,7 @@ from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local
 from atwood.mechanics.kinematics.orientation_coordinates import euler_spin
 from atwood.mechanics.outputs.observables import add_up, part_energies
 from atwood.model.local.laws import LocalPart
-from atwood.topology.forest import Coordinate
+from atwood.topology.spanning_forest import Coordinate
 
 __all__ = ["Contribution", "Lagrangian", "lagrangian_of"]
 
@@ -201,15 +201,15 @@ def lagrangian_of(assembly: Assembly, form: FormName | None = None) -> Lagrangia
         If orientations are in three coordinates that are no Euler angles.
     """
     equations = assembly.in_coordinates(form or assembly.form)
-    for chart in equations.charts:
-        if not chart.is_homogeneous and not chart.kind.startswith("euler-"):
+    for orientation in equations.orientation_coordinates:
+        if not orientation.is_homogeneous and not orientation.kind.startswith("euler-"):
             raise UsageError(
-                f"the derivatives of {chart.kind} coordinates are no velocities that one would read",
+                f"the derivatives of {orientation.kind} coordinates are no velocities that one would read",
                 where=assembly.flat.name,
                 advice="Take quaternions, for Euler's equations, or Euler angles such as euler-zxz.",
             )
     made = _along_speeds(assembly, equations)
-    return _along_angles(made) if any(c.kind.startswith("euler-") for c in equations.charts) else made
+    return _along_angles(made) if any(c.kind.startswith("euler-") for c in equations.orientation_coordinates) else made
 
 
 def _along_speeds(assembly: Assembly, equations: Equations) -> Lagrangian:
@@ -338,21 +338,21 @@ def _along_angles(made: Lagrangian) -> Lagrangian:
     velocities, accelerations = list(made.velocities), list(made.accelerations)
     names, moves, rates = list(made.velocity_names), list(made.moves), list(made.rates)
     spins: dict[Expression, Expression] = {}
-    for chart in equations.charts:
-        if len(chart.speeds) < len(chart.coordinates):
+    for orientation in equations.orientation_coordinates:
+        if len(orientation.speeds) < len(orientation.coordinates):
             raise UsageError(
                 "rolling gives some of its angular velocities, so that its angles have no derivatives of their own",
-                where=chart.body,
+                where=orientation.body,
                 advice="Take quaternions, or the dae form.",
             )
-        for number, place in zip(chart.speeds, chart.coordinates, strict=True):
+        for number, place in zip(orientation.speeds, orientation.coordinates, strict=True):
             one = made.names[place]
             velocities[number] = rates[place] = graph.symbol(f"u:{one.name}")
             accelerations[number] = graph.symbol(f"a:{one.name}")
             names[number], moves[number] = Coordinate(f"{one.name}'", f"{one.unit}/s"), place
-        angles = [made.coordinates[i] for i in chart.coordinates]
-        spin = euler_spin(chart, angles, [velocities[i] for i in chart.speeds])
-        spins |= {made.velocities[i]: graph.convert(w) for i, w in zip(chart.speeds, spin, strict=True)}
+        angles = [made.coordinates[i] for i in orientation.coordinates]
+        spin = euler_spin(orientation, angles, [velocities[i] for i in orientation.speeds])
+        spins |= {made.velocities[i]: graph.convert(w) for i, w in zip(orientation.speeds, spin, strict=True)}
     rates = substitute(rates, spins)
     along: dict[Expression, Expression | float] = dict(zip(made.coordinates, rates, strict=True))
     along |= {made.time: 1.0} | dict(zip(velocities, accelerations, strict=True))

@@ -215,22 +215,22 @@ def _place(scene: LooseScene, one: Symmetry, t: float, first: Bodies, random: np
     """Return a place near the start that motion parallel to the plane leads to; None if none is found."""
     still = np.zeros(len(scene.sizes))
     now, bodies = scene.at(t, scene.start.coordinates, still)
-    free = _null_space(np.concatenate([now.slope[scene.holonomic], _slopes(one, bodies)]) * scene.sizes)
+    free = _null_space(np.concatenate([now.jacobian[scene.holonomic], _slopes(one, bodies)]) * scene.sizes)
     for reach in _REACHES:
         step = reach * scene.sizes * (free @ random.uniform(-1.0, 1.0, free.shape[1]))
-        q = scene.turning.moved(t, scene.start.coordinates, step)
+        q = scene.kinematic_map.moved(t, scene.start.coordinates, step)
         last = np.inf
         for _ in range(20):
             now, bodies = scene.at(t, q, still)
             misses = np.concatenate([now.value[scene.holonomic], _misses(one, bodies, first)])
-            slopes = np.concatenate([now.slope[scene.holonomic], _slopes(one, bodies)]) * scene.sizes
+            slopes = np.concatenate([now.jacobian[scene.holonomic], _slopes(one, bodies)]) * scene.sizes
             rows = np.max(np.abs(slopes), axis=1, initial=0.0)
             rows[rows < 1e-12 * max(scene.start.length, 1.0)] = 1.0
             miss = float(np.max(np.abs(misses / rows), initial=0.0))
             if miss < 1e-12 or (miss < 1e-10 and miss > 0.5 * last):
                 return q
             last = miss
-            q = scene.turning.moved(
+            q = scene.kinematic_map.moved(
                 t, q, -scene.sizes * np.linalg.lstsq(slopes / rows[:, None], misses / rows, rcond=1e-9)[0]
             )
     return None
@@ -242,10 +242,14 @@ def _speeds(
     """Return speeds parallel to the plane that meet all constraints; None if there are none."""
     now, bodies = scene.at(t, q, np.zeros(len(scene.sizes)))
     points, axes = _outward(one)
-    drift = np.concatenate([now.drift, (bodies.velocities @ points.T).ravel(), (bodies.spins @ axes.T).ravel()])
-    slopes = np.concatenate([now.slope, _slopes(one, bodies)]) * scene.sizes
-    u = np.linalg.lstsq(slopes, -drift, rcond=1e-10)[0]
-    if np.max(np.abs(slopes @ u + drift), initial=0.0) > _NEAR * max(float(np.max(np.abs(drift), initial=0.0)), 1e-300):
+    explicit_rate = np.concatenate(
+        [now.explicit_rate, (bodies.velocities @ points.T).ravel(), (bodies.spins @ axes.T).ravel()]
+    )
+    slopes = np.concatenate([now.jacobian, _slopes(one, bodies)]) * scene.sizes
+    u = np.linalg.lstsq(slopes, -explicit_rate, rcond=1e-10)[0]
+    if np.max(np.abs(slopes @ u + explicit_rate), initial=0.0) > _NEAR * max(
+        float(np.max(np.abs(explicit_rate), initial=0.0)), 1e-300
+    ):
         return None
     free = _null_space(slopes)
     found: FloatArray = scene.sizes * (u + pace * (free @ random.uniform(-1.0, 1.0, free.shape[1])))

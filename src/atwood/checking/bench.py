@@ -201,8 +201,8 @@ def on_bench(trial: Trial, name: str = "part") -> Scene:
     loose = not component.laws("constraint")
     for number, (end, one) in enumerate(component.connectors().items()):
         if isinstance(one, JointCoordinate):
-            if end in trial.grips:
-                _grip(scene, number, one)
+            if end in trial.joint_references:
+                _joint_reference(scene, number, one)
             continue
         kind = Block if isinstance(one, Frame) else PulleyBall if isinstance(one, Groove) else Ball
         body = scene.add(f"body{number}", _sized(kind, trial, number))
@@ -222,7 +222,7 @@ def _sized(kind: type[Component], trial: Trial, number: int) -> Any:
     return kind(mass=mass, size=0.5 * trial.length) if kind is Block else kind(mass=mass)
 
 
-def _grip(scene: Scene, number: int, one: JointCoordinate) -> None:
+def _joint_reference(scene: Scene, number: int, one: JointCoordinate) -> None:
     """Give a part a joint to take hold of."""
     mount = scene.add(f"mount{number}", Mount(place=(5.0 * number, 0.0, 0.0)))
     is_shaft = isinstance(one, Shaft)
@@ -247,11 +247,11 @@ def _place(target: Any, body: str, pose: Pose, trial: Trial, with_turn: bool) ->
 
 def _move(scene: Scene, body: str, end: str, trial: Trial, turns: bool) -> None:
     for axis in _axes(trial):
-        scene.start[f"{body}.velocity.{'xyz'[axis]}"] = float(trial.going[end][axis])
+        scene.start[f"{body}.velocity.{'xyz'[axis]}"] = float(trial.velocities[end][axis])
     if turns and trial.space.name == "plane":
-        scene.start[f"{body}.angular_speed"] = -float(trial.turning[end].y)
+        scene.start[f"{body}.angular_speed"] = -float(trial.angular_velocities[end].y)
     elif turns and trial.space.name == "space":
-        for i, component in enumerate(trial.turning[end]):
+        for i, component in enumerate(trial.angular_velocities[end]):
             scene.start[f"{body}.angular_velocity.{'xyz'[i]}"] = float(component)
 
 

@@ -12,7 +12,7 @@ from atwood.checking.report import Finding
 from atwood.consistency.joints import Unknown
 from atwood.consistency.trials import Trial
 from atwood.expr import Expression, Graph, evaluate
-from atwood.mechanics.dynamics.forces import slopes_of
+from atwood.mechanics.dynamics.forces import local_gradients
 from atwood.model.declare.connectors import JointCoordinate
 from atwood.model.declare.laws import Law
 from atwood.model.local.flatten import FlatScene, Part
@@ -74,15 +74,15 @@ def _localized(trial: Trial, mode: str) -> tuple[LocalPart, dict[Expression, flo
     graph = Graph()
     time, table = graph.symbol("t"), ParameterTable(graph, space=trial.space.name)
     carried: Any = {(part.path, name): body for name, body in trial.bodies.items()}
-    sides = {(part.path, a, b): side for (a, b), side in trial.sides.items()}
+    line_signs = {(part.path, a, b): side for (a, b), side in trial.line_signs.items()}
     modes = {part.path: mode} if mode else {}
-    local = localize(flat, trial.space, time, table, modes, sides, carried)[part.path]
+    local = localize(flat, trial.space, time, table, modes, line_signs, carried)[part.path]
     numbers: dict[Expression, float] = {**table.values, time: 0.0}
     for name, one in local.connectors.items():
         pose = trial.poses[name]
         numbers.update(zip(one.position, map(float, trial.space.components(pose.position)), strict=True))
-        numbers.update(zip(one.velocity, map(float, trial.space.components(trial.going[name])), strict=True))
-        spin = trial.turning[name]
+        numbers.update(zip(one.velocity, map(float, trial.space.components(trial.velocities[name])), strict=True))
+        spin = trial.angular_velocities[name]
         if one.angle is not None:
             numbers.update(zip((*one.orientation, *one.spin), (pose.angle, -spin.y), strict=True))
         elif one.axes is not None:
@@ -94,12 +94,12 @@ def _localized(trial: Trial, mode: str) -> tuple[LocalPart, dict[Expression, flo
 def _forces(trial: Trial, local: LocalPart, value: Expression, numbers: dict[Expression, float]) -> Any:
     """Return the forces that the engine finds by differentiating an energy."""
     found: list[float] = []
-    for name, slopes, turning in slopes_of(local, value, value.graph.constant(-1.0)):
-        found += evaluate(slopes, numbers)
-        torque = evaluate(turning, numbers)
+    for name, gradients, torques in local_gradients(local, value, value.graph.constant(-1.0)):
+        found += evaluate(gradients, numbers)
+        torque = evaluate(torques, numbers)
         if len(torque) == 3:
             torque = [float(c) for c in from_axes(trial.poses[name].axes, Vector(*torque))]
-        found += torque[: ways(trial, name) - len(slopes)]
+        found += torque[: ways(trial, name) - len(gradients)]
     return np.array(found)
 
 

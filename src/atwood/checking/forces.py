@@ -53,9 +53,9 @@ def in_motion(trial: Trial, poses: Mapping[str, Pose] | None = None, speed: floa
     """Return the component on numbers, with connectors that move as in the trial, so many times as fast."""
     found: dict[str, Motion] = {}
     for name, pose in (poses or trial.poses).items():
-        found[name] = trial.motion(name, pose, trial.going[name] * speed, trial.turning[name] * speed)
-    grips = {name: (value, rate * speed) for name, (value, rate) in trial.grips.items()}
-    return replace(trial, grips=grips).bound(0.0, poses or trial.poses, found)
+        found[name] = trial.motion(name, pose, trial.velocities[name] * speed, trial.angular_velocities[name] * speed)
+    joint_references = {name: (value, rate * speed) for name, (value, rate) in trial.joint_references.items()}
+    return replace(trial, joint_references=joint_references).bound(0.0, poses or trial.poses, found)
 
 
 def energy_forces(trial: Trial, law: Law) -> Wrench:
@@ -109,9 +109,9 @@ def _speeds(trial: Trial) -> Wrench:
     """Return the velocities of connectors along their ways to move."""
     found: list[float] = []
     for name in trial.poses:
-        found += [float(one) for one in trial.space.components(trial.going[name])]
+        found += [float(one) for one in trial.space.components(trial.velocities[name])]
         if ways(trial, name) > len(trial.space.basis):
-            spin = trial.turning[name]
+            spin = trial.angular_velocities[name]
             found += [-spin.y] if trial.space.name == "plane" else [*spin]
     return np.array(found)
 
@@ -152,9 +152,9 @@ def _of_loads(trial: Trial, law: Law, acting: list[Law]) -> Iterator[Finding | N
 
 
 def _loads_at_rest(trial: Trial, law: Law) -> Wrench | None:
-    still = {name: Vector() for name in trial.going}
+    still = {name: Vector() for name in trial.velocities}
     try:
-        return load_forces(replace(trial, going=still, turning=still), law)
+        return load_forces(replace(trial, velocities=still, angular_velocities=still), law)
     except Unknown:
         return None
 
@@ -194,8 +194,8 @@ def _sum(trial: Trial, loads: Wrench) -> tuple[NDArray[np.float64], NDArray[np.f
         at += count
         own = loads[at : at + ways(trial, name) - count]
         at += len(own)
-        turning = Vector(*own) if len(own) == 3 else Vector(0.0, -own[0], 0.0) if len(own) else Vector()
-        force, torque = force + one, torque + cross(pose.position, one) + turning
+        angular_velocities = Vector(*own) if len(own) == 3 else Vector(0.0, -own[0], 0.0) if len(own) else Vector()
+        force, torque = force + one, torque + cross(pose.position, one) + angular_velocities
     return np.array([float(c) for c in force]), np.array([float(c) for c in torque])
 
 
@@ -209,9 +209,14 @@ def _anchored(trial: Trial, law: Law, of_velocities: bool = False) -> Iterator[F
         drift, spin = Vector(0.3, -0.5, 0.4), Vector(0.2, 0.6, -0.3)
         drift = trial.space.vector(trial.space.components(drift)) * trial.length
         spin = spin if trial.space.name == "space" else Vector(0.0, spin.y, 0.0) if trial.frames else Vector()
-        going = {name: drift + _in_space(trial, cross(spin, pose.position)) for name, pose in trial.poses.items()}
-        grips = {name: (value, 0.0) for name, (value, _) in trial.grips.items()}
-        whole = replace(trial, going=going, turning=dict.fromkeys(trial.poses, spin), grips=grips)
+        velocities = {name: drift + _in_space(trial, cross(spin, pose.position)) for name, pose in trial.poses.items()}
+        joint_references = {name: (value, 0.0) for name, (value, _) in trial.joint_references.items()}
+        whole = replace(
+            trial,
+            velocities=velocities,
+            angular_velocities=dict.fromkeys(trial.poses, spin),
+            joint_references=joint_references,
+        )
         value = attempt(getattr(in_motion(whole), law.name))[0]
         usual = attempt(getattr(in_motion(trial), law.name))[0]
         changed = abs(value) > 1e-6 * (abs(usual) + abs(value))
@@ -223,7 +228,7 @@ def _anchored(trial: Trial, law: Law, of_velocities: bool = False) -> Iterator[F
         changed = bool(np.abs(force).max() > 1e-5 * size)
         changed |= trial.space.has_rotation and bool(np.abs(torque).max() > 1e-5 * size * _reach(trial))
         what = "it changes when the whole scene is moved or turned"
-    if changed and not trial.grips:
+    if changed and not trial.joint_references:
         message = f"{what}: it acts against the world"
         yield Finding("note", "reactions", law.name, trial.space.name, message)
     else:

@@ -94,7 +94,7 @@ def _compared(one: Result, other: Result, space: str, length: float) -> Iterator
         ledger = result.energy
         drift = float(np.ptp(ledger.kinetic + ledger.potential - ledger.work))
         drift /= max(*(float(np.ptp(part)) for part in (ledger.kinetic, ledger.potential, ledger.work)), length**2)
-        if not drift < 1e-3 and not result.happenings:
+        if not drift < 1e-3 and not result.events:
             message = f"energy and work differ by {drift:.2g} of what the scene exchanges ({result.form} form)"
             yield Finding("failure", "power", "", space, message)
         else:

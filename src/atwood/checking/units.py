@@ -136,19 +136,19 @@ def _bound(trial: Trial, units: Units) -> Any:
     motions: dict[str, Motion] = {}
     for name, one in component.connectors().items():
         if isinstance(one, JointCoordinate):
-            value, rate = trial.grips.get(name, (0.5, 0.3))
+            value, rate = trial.joint_references.get(name, (0.5, 0.3))
             size = length if isinstance(one, Slide) else 1.0
             motions[name] = Motion(value=value * size, rate=rate * size / time)
             continue
         held, body = trial.poses[name], trial.bodies[name]
         scaled = Body(body.mass * mass, body.center_of_mass * length, _scaled(body.inertia, mass * length**2))
-        spin = trial.turning[name] * (1.0 / time)
-        motion = trial.motion(name, held, trial.going[name] * (length / time), spin)
+        spin = trial.angular_velocities[name] * (1.0 / time)
+        motion = trial.motion(name, held, trial.velocities[name] * (length / time), spin)
         motions[name] = replace(
             motion,
             position=held.position * length,
-            acceleration=trial.going[name] * (0.7 * length / time**2),
-            angular_acceleration=trial.turning[name] * (0.4 / time**2),
+            acceleration=trial.velocities[name] * (0.7 * length / time**2),
+            angular_acceleration=trial.angular_velocities[name] * (0.4 / time**2),
             body=scaled,
         )
     reactions = {}
@@ -168,7 +168,7 @@ def _bound(trial: Trial, units: Units) -> Any:
         time=0.8 * time,
         space=trial.space.name,
         line=trial.space.line,
-        sides=trial.sides,
+        line_signs=trial.line_signs,
         reactions=reactions,
         energies={"kinetic": 0.7 * joule, "potential": -0.2 * joule},
     )
@@ -207,8 +207,8 @@ def _of_constraint(trial: Trial, law: Law, made: Any) -> Iterator[tuple[float, E
 
 
 def _bound_at_rest(trial: Trial) -> Any:
-    still = {name: Vector(0.0, 0.0, 0.0) for name in trial.going}
-    return _bound(replace(trial, going=still, turning=still), Units((1.0,) * 4))
+    still = {name: Vector(0.0, 0.0, 0.0) for name in trial.velocities}
+    return _bound(replace(trial, velocities=still, angular_velocities=still), Units((1.0,) * 4))
 
 
 def _of_loads(trial: Trial, law: Law, made: Any) -> Iterator[tuple[float, Exponents]]:

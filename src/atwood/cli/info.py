@@ -62,7 +62,7 @@ def _print(found: MechanismReport, moved: bool) -> None:
     out.print(table)
     if moved:
         out.print()
-        out.print(Text(str(found.placement)), soft_wrap=True)
+        out.print(Text(str(found.initialization)), soft_wrap=True)
         return
     groups: dict[tuple[str, float, str, str], list[str]] = {}
     for one in found.parameters:

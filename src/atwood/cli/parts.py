@@ -226,13 +226,13 @@ def _quantities(kind: type[Component]) -> Iterator[dict[str, str]]:
 def _value(one: Any) -> str:
     """Return the default of a parameter as a reader writes it."""
     from atwood.model.declare.fields import MISSING
-    from atwood.model.declare.parameter_expressions import Deferred
+    from atwood.model.declare.parameter_expressions import ParameterExpression
 
     if one.default is MISSING:
         return "required"
     if one.default is None:
         return "none"
-    if isinstance(one.default, Deferred):
+    if isinstance(one.default, ParameterExpression):
         return "follows"
     if isinstance(one.default, tuple):
         return f"({', '.join(f'{number:g}' for number in one.default)})"

@@ -179,7 +179,7 @@ def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
         "states": result.first_plan.program.size,
         "solver": data.pop("solver"),
         "immobile": None if result.immobile is None else result.immobile.to_dict(),
-        "placement": result.placement.to_dict(),
+        "placement": result.initialization.to_dict(),
         "start": result.at(0),
         "end": result.at(-1),
         "energy": data.pop("energy"),

@@ -97,19 +97,19 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     yield "mechanism", ", ".join(size)
     if result.immobile is not None:
         yield "immobile", result.immobile.describe()
-    if result.placement.summary:
-        yield "assembled", result.placement.summary
+    if result.initialization.summary:
+        yield "assembled", result.initialization.summary
     span = f"t = {result.start.time:g} to {result.time[-1]:.6g} s"
     yield "run", f"{span}, rtol {result.run.options.relative_tolerance:g}, {len(result.time)} outputs"
     if result.status != "finished":
         why = {"stopped": "stopped", "step_limit": "out of steps", "time_limit": "out of time"}
         said = why.get(result.status, result.status)
         yield "ended early", f"{said}: {result.message}" if result.message else said
-    yield from (("event", one.describe()) for one in result.happenings if one.target != "stop")
+    yield from (("event", one.describe()) for one in result.events if one.target != "stop")
     yield from _passages(result)
-    if result.restated:
-        times = sorted({one.time for one in result.restated})
-        often = count_of(len(result.restated), "time")
+    if result.coordinate_switches:
+        times = sorted({one.time for one in result.coordinate_switches})
+        often = count_of(len(result.coordinate_switches), "time")
         span = f"at t = {times[0]:.6g} s" if len(times) == 1 else f"from t = {times[0]:.6g} to {times[-1]:.6g} s"
         yield "orientation", f"{result.assembly.orientation.kind}, restated {often} {span}"
     yield (
@@ -130,7 +130,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
 def _passages(result: Result) -> Iterator[tuple[str, str]]:
     """Yield the singular positions of a run: the first of each kind, and when it came to others like it."""
     for through in (True, False):
-        found = [one for one in result.passages if (one.ways > 0) == through]
+        found = [one for one in result.singular_crossings if (one.ways > 0) == through]
         if not found:
             continue
         yield "singular" if through else "not sure", found[0].describe()

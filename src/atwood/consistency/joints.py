@@ -129,11 +129,11 @@ def _slopes(
     found = {name: np.array(made).T for name, made in columns.items()}
     for one in solved:
         if found[one.name].size and not found[one.name].any():  # it depends on velocities alone
-            found[one.name] = _slopes_of_velocities(trial, mover, one, poses, moving)
+            found[one.name] = _velocity_jacobian(trial, mover, one, poses, moving)
     return found
 
 
-def _slopes_of_velocities(
+def _velocity_jacobian(
     trial: Trial, mover: str, constraint: Law, poses: Mapping[str, Pose], moving: Mapping[str, Motion]
 ) -> np.ndarray:
     """Return the same for a constraint on velocities, along these."""

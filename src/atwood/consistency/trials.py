@@ -63,11 +63,11 @@ class Trial:
         Its size, m: of the parameters that are lengths, or one metre.
     values
         Parameters by name.
-    inputs, grips
+    inputs, joint_references
         Value and rate of each input, and of each joint coordinate that it takes hold of.
     poses
         Where its connectors are at time zero.
-    going, turning
+    velocities, angular_velocities
         Their velocities and angular velocities, in world axes.
     coordinates
         Value and rate of each joint coordinate, by name.
@@ -75,7 +75,7 @@ class Trial:
         Connectors that have an orientation here.
     bodies
         Inertia of the bodies that connectors are on.
-    sides
+    line_signs
         On a line, the signs of lengths, by the names of connectors.
     """
 
@@ -84,14 +84,14 @@ class Trial:
     length: float
     values: Mapping[str, Any]
     inputs: Mapping[str, tuple[float, float]]
-    grips: Mapping[str, tuple[float, float]]
+    joint_references: Mapping[str, tuple[float, float]]
     poses: Mapping[str, Pose]
-    going: Mapping[str, Vector]
-    turning: Mapping[str, Vector]
+    velocities: Mapping[str, Vector]
+    angular_velocities: Mapping[str, Vector]
     coordinates: Mapping[str, tuple[float, float]]
     frames: frozenset[str]
     bodies: Mapping[str, Body]
-    sides: Mapping[tuple[str, str], float]
+    line_signs: Mapping[tuple[str, str], float]
 
     @property
     def component(self) -> Component:
@@ -106,14 +106,14 @@ class Trial:
         """Return where connectors are at a time, each moving by itself."""
         found = {}
         for name, pose in self.poses.items():
-            spin = self.turning[name]
+            spin = self.angular_velocities[name]
             angle, axes = pose.angle - spin.y * t, pose.axes
             if self.space.name == "space":
                 speed = norm(spin)
                 axes = _compose(_turn(spin / speed, speed * t), axes) if speed else axes
             elif self.space.name == "plane":
                 axes = planar_axes(angle)
-            found[name] = Pose(pose.position + self.going[name] * t, angle, axes)
+            found[name] = Pose(pose.position + self.velocities[name] * t, angle, axes)
         return found
 
     def bound(self, t: float, poses: Mapping[str, Pose], motions: Mapping[str, Motion] | None = None) -> Any:
@@ -130,14 +130,16 @@ class Trial:
         """
         if motions is None:
             motions = {name: self.motion(name, pose) for name, pose in poses.items()}
-        held = {name: Motion(value=value + rate * t, rate=rate) for name, (value, rate) in self.grips.items()}
+        held = {
+            name: Motion(value=value + rate * t, rate=rate) for name, (value, rate) in self.joint_references.items()
+        }
         binding = Binding(
             values={**self.values, **{name: value + rate * t for name, (value, rate) in self.inputs.items()}},
             motions={**motions, **held},
             time=t,
             space=self.space.name,
             line=self.space.line,
-            sides=self.sides,
+            line_signs=self.line_signs,
         )
         return bind(self.component, binding)
 
@@ -305,7 +307,7 @@ def make_trial(part: Part, space: Space, seed: int) -> Trial:
     length = math.exp(sum(map(math.log, sizes)) / len(sizes)) if sizes else 1.0
     connectors = component.connectors()
     free = [name for name, one in connectors.items() if not isinstance(one, JointCoordinate)]
-    poses, going, turning = {}, {}, {}
+    poses, velocities, angular_velocities = {}, {}, {}
     for order, name in enumerate(free):
         place = [(3.0 * order + number()) * length] + [number() * length for _ in space.basis[1:]]
         axes, angle, spin = FIXED_AXES, 0.0, ZERO
@@ -317,8 +319,8 @@ def make_trial(part: Part, space: Space, seed: int) -> Trial:
             axes = _turn(raw / norm(raw), 2.0 * number())
             spin = Vector(number(), number(), number())
         poses[name] = Pose(space.vector(tuple(place)), angle, axes)
-        going[name] = space.vector(tuple(number() * length for _ in space.basis))
-        turning[name] = spin
+        velocities[name] = space.vector(tuple(number() * length for _ in space.basis))
+        angular_velocities[name] = spin
     coordinates: dict[str, tuple[float, float]] = {}
     units = {law.name: law.options.unit for law in component.laws("observable")}
     for law in component.laws("joint"):
@@ -329,11 +331,27 @@ def make_trial(part: Part, space: Space, seed: int) -> Trial:
     for name, signal in component.signal_specs().items():
         size = length if signal.unit.exponents == (0, 1, 0, 0) else 1.0
         inputs[name] = (abs(number()) * size, number() * size)
-    grips = {name: (number(), number()) for name in connectors if name not in free and not _is_offered(component, name)}
+    joint_references = {
+        name: (number(), number()) for name in connectors if name not in free and not _is_offered(component, name)
+    }
     frames = frozenset(name for name, one in connectors.items() if isinstance(one, Frame) and space.has_rotation)
-    sides = {(a, b): 1.0 if i < j else -1.0 for i, a in enumerate(free) for j, b in enumerate(free)}
+    line_signs = {(a, b): 1.0 if i < j else -1.0 for i, a in enumerate(free) for j, b in enumerate(free)}
     bodies = {name: _some_body(draw, length) for name in free}
-    return Trial(part, space, length, values, inputs, grips, poses, going, turning, coordinates, frames, bodies, sides)
+    return Trial(
+        part,
+        space,
+        length,
+        values,
+        inputs,
+        joint_references,
+        poses,
+        velocities,
+        angular_velocities,
+        coordinates,
+        frames,
+        bodies,
+        line_signs,
+    )
 
 
 def _some_body(draw: random.Random, length: float) -> Body:

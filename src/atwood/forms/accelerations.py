@@ -186,7 +186,7 @@ def _is_tree(assembly: Assembly) -> bool:
     return (
         not reduced.eliminated
         and not reduced.solved_speeds
-        and not reduced.forest.cuts
+        and not reduced.forest.loop_joints
         and (len(maximal.constraints) > 0 or not rates_are_speeds(maximal))
         and len(reduced.speeds) == len(maximal.speeds) - len(maximal.constraints)
     )
@@ -247,12 +247,12 @@ class _Tree:
         maximal, n = self.maximal, self.masses
         at_rest = dict.fromkeys(maximal.accelerations, 0.0)
         mass = jacobian(list(maximal.rows), list(maximal.accelerations))
-        slope = jacobian([one.rate for one in maximal.constraints], list(maximal.speeds))
+        constraint_jacobian = jacobian([one.rate for one in maximal.constraints], list(maximal.speeds))
         sides = [*maximal.rows, *(one.second for one in maximal.constraints)]
         sides = [-side for side in substitute(sides, at_rest)]
-        made = place_differences([*mass.entries, *slope.entries, *sides], self.places)
+        made = place_differences([*mass.entries, *constraint_jacobian.entries, *sides], self.places)
         places = [(r, c) for r, c in zip(mass.rows, mass.columns, strict=True)]
-        places += [(c, n + r) for r, c in zip(slope.rows, slope.columns, strict=True)]
+        places += [(c, n + r) for r, c in zip(constraint_jacobian.rows, constraint_jacobian.columns, strict=True)]
         entries = {(i, j): entry for (i, j), entry in zip(places, made, strict=False) if i <= j}
         return SymmetricSystem(entries, made[len(places) :], [1] * n + [-1] * len(maximal.constraints))
 

@@ -37,8 +37,8 @@ from atwood.mechanics.outputs.observables import Observable, Reaction, energies,
 from atwood.mechanics.outputs.reading import observe
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.showing import count_of, fitted
-from atwood.topology.charts import Orientation
-from atwood.topology.forest import grow_forest
+from atwood.topology.orientation_coordinates import Orientation
+from atwood.topology.spanning_forest import grow_spanning_forest
 
 __all__ = ["Assembly", "FormName"]
 
@@ -129,7 +129,9 @@ class Assembly:
 
     def _equations(self, form: FormName, orientation: Orientation) -> Equations:
         mechanism = self.mechanism
-        forest = grow_forest(form, mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space, orientation)
+        forest = grow_spanning_forest(
+            form, mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space, orientation
+        )
         with mechanism.relations.reading():
             made = build_equations(mechanism, forest)
         return made if form == "dae" or not made.read else with_reactions(made, self.maximal)
@@ -270,27 +272,27 @@ class Assembly:
     def other_mode(
         self,
         modes: Mapping[str, str],
-        sides: Mapping[tuple[str, str, str], float],
+        line_signs: Mapping[tuple[str, str, str], float],
         orientation: Orientation | None = None,
     ) -> Assembly:
         """Return the scene in other modes, with lengths on a line signed as given; what was made before is used again.
 
         Parameters
         ----------
-        modes, sides
+        modes, line_signs
             Mode of each part that has modes; on a line, the sign of lengths.
         orientation
             In which coordinates orientations are; the same if not given.
         """
         if self.source is None:
             raise UsageError("it was assembled from leaves, so that it has no other modes", where=self.flat.name)
-        source, charts = self.source, orientation or self.orientation
+        source, orientation_coordinates = self.source, orientation or self.orientation
 
         def make() -> Assembly:
-            made = source.assemble(self.flat, self, modes, sides)
-            return replace(made, source=source, shared=Shared(self.shared.family), orientation=charts)
+            made = source.assemble(self.flat, self, modes, line_signs)
+            return replace(made, source=source, shared=Shared(self.shared.family), orientation=orientation_coordinates)
 
-        key = ("mode", tuple(sorted(modes.items())), tuple(sorted(sides.items())), charts)
+        key = ("mode", tuple(sorted(modes.items())), tuple(sorted(line_signs.items())), orientation_coordinates)
         known = self.shared.family.get(key, make)
         mechanism, _ = moved_to(known, self.flat)
         if mechanism is None:

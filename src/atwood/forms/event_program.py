@@ -13,7 +13,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.forms.program import state_groups
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.outputs.internal_reactions import release_program
+from atwood.mechanics.outputs.internal_reactions import internal_reaction_program
 
 __all__ = ["event_program"]
 
@@ -69,12 +69,14 @@ def _solve(equations: Equations, kept: Sequence[int]) -> list[Expression] | None
     at_rest = dict.fromkeys(equations.accelerations, 0.0)
     constraints = [equations.constraints[i] for i in kept]
     mass = jacobian(list(equations.rows), list(equations.accelerations))
-    slope = jacobian([one.rate for one in constraints], list(equations.speeds)) if m else None
+    constraint_jacobian = jacobian([one.rate for one in constraints], list(equations.speeds)) if m else None
     matrix = [[graph.zero] * (n + m) for _ in range(n + m)]
     for row, column, entry in zip(mass.rows, mass.columns, mass.entries, strict=True):
         matrix[row][column] = entry
-    if slope is not None:
-        for row, column, entry in zip(slope.rows, slope.columns, slope.entries, strict=True):
+    if constraint_jacobian is not None:
+        for row, column, entry in zip(
+            constraint_jacobian.rows, constraint_jacobian.columns, constraint_jacobian.entries, strict=True
+        ):
             matrix[n + row][column] = entry
             matrix[column][n + row] = -entry
     sides = [*equations.rows, *(one.second for one in constraints)]
@@ -93,18 +95,18 @@ def _reactions(assembly: Assembly, wanted: set[Expression], kept: Sequence[int])
     n = len(maximal.speeds)
     solution = dict(zip((*maximal.accelerations, *maximal.multipliers), solved, strict=True))
     of_constraint = {one.key: i for i, one in enumerate(maximal.constraints)}
-    release = assembly.shared.get(
-        "release",
-        lambda: release_program(assembly.mechanism, maximal, assembly.reactions, assembly.parameters),
+    internal = assembly.shared.get(
+        "internal reactions",
+        lambda: internal_reaction_program(assembly.mechanism, maximal, assembly.reactions, assembly.parameters),
     )
     found: dict[Expression, Expression] = {}
     for one in assembly.reactions:
         if one.symbol not in wanted:
             continue
         if one.axis >= 0:
-            if release is None or one.path not in release.rows:
+            if internal is None or one.path not in internal.rows:
                 return None
-            value = substitute([release.program.results[release.rows[one.path]]], solution)[0]
+            value = substitute([internal.program.results[internal.rows[one.path]]], solution)[0]
         elif one.key in of_constraint:
             value = one.sign * solved[n + of_constraint[one.key]]
         else:

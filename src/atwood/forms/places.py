@@ -40,7 +40,7 @@ def _places(reduced: Equations, maximal: Equations) -> tuple[list[Expression], l
         for k, (coordinate, speed) in enumerate(zip(one.coordinates, one.speeds, strict=True)):
             positions[coordinate] = kinematics.placements.references[one.body][k]
             speeds[speed] = kinematics.reference_velocities[one.body][k]
-        for k, number in enumerate(one.chart):
+        for k, number in enumerate(one.orientation):
             positions[number] = kinematics.placements.quaternions[one.body][k]
         for k, number in enumerate(one.spin):
             speeds[number] = kinematics.angular_velocities[one.body][k]

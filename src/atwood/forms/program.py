@@ -27,7 +27,7 @@ from atwood.expr import (
 from atwood.forms.derivative import Derivative, derive, directions, is_too_long
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.topology.charts import Chart
+from atwood.topology.orientation_coordinates import OrientationCoordinates
 
 __all__ = [
     "BalanceProgram",
@@ -138,7 +138,7 @@ class BalanceProgram:
         Program of (t, q, u) with the entries of M, bias, the constraints' values, rates and gamma, the entries of G,
         and the rates' part that is not linear in the speeds. M and G belong to the speeds. The value of a constraint
         on velocities alone is zero.
-    mass_rows, mass_columns, slope_rows, slope_columns
+    mass_rows, mass_columns, jacobian_rows, jacobian_columns
         Where the entries of M and G are.
     speeds
         Number of speeds.
@@ -154,8 +154,8 @@ class BalanceProgram:
     program: Program
     mass_rows: NDArray[np.intp]
     mass_columns: NDArray[np.intp]
-    slope_rows: NDArray[np.intp]
-    slope_columns: NDArray[np.intp]
+    jacobian_rows: NDArray[np.intp]
+    jacobian_columns: NDArray[np.intp]
     speeds: int
     constraints: int
     holonomic: tuple[int, ...]
@@ -168,7 +168,7 @@ class BalanceProgram:
         Positions are looked at without speeds, where a force in the direction of a velocity has no value.
         """
         groups = {group.name: group for group in self.program.outputs}
-        outputs = tuple(groups[name] for name in ("value", "slope", "drift"))
+        outputs = tuple(groups[name] for name in ("value", "jacobian", "explicit_rate"))
         return replace(self.program, name=f"{self.program.name} of constraints", outputs=outputs)
 
 
@@ -184,7 +184,7 @@ class RatesProgram:
         Where the entries of B are.
     coordinates, speeds
         Number of coordinates and of speeds.
-    charts
+    orientation_coordinates
         Coordinates that stand for an orientation together.
     """
 
@@ -193,7 +193,7 @@ class RatesProgram:
     columns: NDArray[np.intp]
     coordinates: int
     speeds: int
-    charts: tuple[Chart, ...]
+    orientation_coordinates: tuple[OrientationCoordinates, ...]
 
 
 def state_groups(equations: Equations) -> tuple[InputGroup, ...]:
@@ -231,22 +231,24 @@ def rows_along_speeds(equations: Equations) -> list[Expression]:
     number = {speed: i for i, speed in enumerate(equations.speeds)}
     rows: dict[int, Expression] = {}
     more: list[Expression] = []
-    for chart in equations.charts:
-        rates = [symbols[i] for i in chart.coordinates]
-        speeds = [equations.speeds[i] for i in chart.speeds]
-        found = jacobian([equations.rates[i] for i in chart.coordinates], speeds)
+    for orientation in equations.orientation_coordinates:
+        rates = [symbols[i] for i in orientation.coordinates]
+        speeds = [equations.speeds[i] for i in orientation.speeds]
+        found = jacobian([equations.rates[i] for i in orientation.coordinates], speeds)
         entries = list(zip(found.rows, found.columns, found.entries, strict=True))
-        if not chart.is_homogeneous:
-            misses = [rate - equations.rates[i] for i, rate in zip(chart.coordinates, rates, strict=True)]
-            rows |= {i: _sum([e * misses[r] for r, c, e in entries if c == k]) for k, i in enumerate(chart.speeds)}
+        if not orientation.is_homogeneous:
+            misses = [rate - equations.rates[i] for i, rate in zip(orientation.coordinates, rates, strict=True)]
+            rows |= {
+                i: _sum([e * misses[r] for r, c, e in entries if c == k]) for k, i in enumerate(orientation.speeds)
+            }
             continue
         square = _sum([e * e for _, column, e in entries if column == 0])
-        for k, i in enumerate(chart.speeds):
+        for k, i in enumerate(orientation.speeds):
             rows[i] = _sum([e * rates[r] for r, column, e in entries if column == k]) - square * speeds[k]
-        more.append(_sum([equations.coordinates[i] * symbols[i] for i in chart.coordinates]))
-    in_charts = {i for chart in equations.charts for i in chart.coordinates}
+        more.append(_sum([equations.coordinates[i] * symbols[i] for i in orientation.coordinates]))
+    in_orientations = {i for orientation in equations.orientation_coordinates for i in orientation.coordinates}
     for i, (symbol, rate) in enumerate(zip(symbols, equations.rates, strict=True)):
-        if i not in in_charts:
+        if i not in in_orientations:
             rows[number[rate]] = symbol - rate
     return [*(rows[i] for i in range(len(equations.speeds))), *more]
 
@@ -360,7 +362,7 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
         mass = jacobian(list(equations.rows), list(equations.accelerations))
     rates = [one.rate for one in equations.constraints]
     values = [one.value for one in equations.constraints]
-    slope = jacobian(rates, list(equations.speeds))
+    constraint_jacobian = jacobian(rates, list(equations.speeds))
     still = dict.fromkeys(equations.speeds, 0.0)
     outputs = (
         OutputGroup("mass", tuple(mass.entries)),
@@ -368,15 +370,15 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
         OutputGroup("value", tuple(equations.graph.zero if v is None else v for v in values)),
         OutputGroup("rate", tuple(rates)),
         OutputGroup("gamma", tuple(substitute([one.second for one in equations.constraints], at_rest))),
-        OutputGroup("slope", tuple(slope.entries)),
-        OutputGroup("drift", tuple(substitute(rates, still))),
+        OutputGroup("jacobian", tuple(constraint_jacobian.entries)),
+        OutputGroup("explicit_rate", tuple(substitute(rates, still))),
     )
     return BalanceProgram(
         Program(f"{name} balance", inputs, known, outputs),
         np.asarray(mass.rows, dtype=np.intp),
         np.asarray(mass.columns, dtype=np.intp),
-        np.asarray(slope.rows, dtype=np.intp),
-        np.asarray(slope.columns, dtype=np.intp),
+        np.asarray(constraint_jacobian.rows, dtype=np.intp),
+        np.asarray(constraint_jacobian.columns, dtype=np.intp),
         len(equations.speeds),
         len(equations.constraints),
         tuple(i for i, one in enumerate(equations.constraints) if one.holonomic),
@@ -399,13 +401,13 @@ def rates_program(name: str, equations: Equations, parameters: Collection[Expres
     sizes = (len(equations.coordinates), len(equations.speeds))
     if rates_are_speeds(equations):
         everyone = np.arange(sizes[0], dtype=np.intp)
-        return RatesProgram(None, everyone, everyone, *sizes, equations.charts)
+        return RatesProgram(None, everyone, everyone, *sizes, equations.orientation_coordinates)
     tangent = jacobian(list(equations.rates), list(equations.speeds))
-    outputs = (OutputGroup("rates", equations.rates), OutputGroup("tangent", tuple(tangent.entries)))
+    outputs = (OutputGroup("rates", equations.rates), OutputGroup("matrix", tuple(tangent.entries)))
     return RatesProgram(
         Program(f"{name} rates", state_groups(equations), tuple(parameters), outputs),
         np.asarray(tangent.rows, dtype=np.intp),
         np.asarray(tangent.columns, dtype=np.intp),
         *sizes,
-        equations.charts,
+        equations.orientation_coordinates,
     )

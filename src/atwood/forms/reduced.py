@@ -68,8 +68,13 @@ def _project(
     equations: Equations, rows: Sequence[Expression], dependent: Sequence[int], independent: Sequence[int]
 ) -> list[Expression]:
     """Return ``r_i - G_i^T G_d^-T r_d``, solving separately for loops that share nothing."""
-    slope = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
-    entry = {(r, c): e for r, c, e in zip(slope.rows, slope.columns, slope.entries, strict=True)}
+    constraint_jacobian = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
+    entry = {
+        (r, c): e
+        for r, c, e in zip(
+            constraint_jacobian.rows, constraint_jacobian.columns, constraint_jacobian.entries, strict=True
+        )
+    }
     given = set(dependent)
     sharing = [(("constraint", r), ("speed", c)) for r, c in entry if c in given]
     members = [("constraint", r) for r in range(len(equations.constraints))]

@@ -18,7 +18,7 @@ from atwood.mechanics.build import Mechanism, check_closures
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.laws import LocalPart
-from atwood.topology.sides import find_sides
+from atwood.topology.line_signs import find_line_signs
 
 __all__ = ["DECIDED", "Shared", "Slot", "decided_alike", "find_slots", "with_values_of"]
 
@@ -173,7 +173,7 @@ def with_values_of(
     check_closures(moved)
     if not decided_alike(moved):
         return None, DECIDED
-    if mechanism.sides is not None and _sides(moved, other, shared) != mechanism.sides:
+    if mechanism.line_signs is not None and _line_signs(moved, other, shared) != mechanism.line_signs:
         return None, "on the line, parts start on other sides of each other"
     return moved, ""
 
@@ -228,7 +228,7 @@ def _local(local: LocalPart, now: Part) -> LocalPart:
     return replace(local, part=replace(part, values=now.values, signals=now.signals))
 
 
-def _sides(mechanism: Mechanism, flat: FlatScene, shared: Shared) -> Mapping[tuple[str, str, str], float]:
+def _line_signs(mechanism: Mechanism, flat: FlatScene, shared: Shared) -> Mapping[tuple[str, str, str], float]:
     bodies, space = mechanism.bodies, mechanism.space
     offsets = shared.get("offsets", lambda: {body.index: body_offsets(body, space)[0] for body in bodies.bodies})
-    return find_sides(flat, mechanism.graph, bodies, mechanism.locals_, offsets, mechanism.table.values, space)
+    return find_line_signs(flat, mechanism.graph, bodies, mechanism.locals_, offsets, mechanism.table.values, space)

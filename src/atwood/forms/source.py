@@ -27,7 +27,7 @@ class Assemble(Protocol):
         flat: FlatScene,
         like: Assembly,
         modes: Mapping[str, str] | None = None,
-        sides: Mapping[tuple[str, str, str], float] | None = None,
+        line_signs: Mapping[tuple[str, str, str], float] | None = None,
     ) -> Assembly:
         """Return the assembly."""
         ...

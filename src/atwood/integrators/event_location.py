@@ -27,7 +27,7 @@ from atwood.integrators.dips import Point, find_dip, may_dip
 from atwood.integrators.protocol import FloatArray, ImplicitProblem, IndexArray
 from atwood.late import dataclass
 
-__all__ = ["EventWatch", "Root", "State"]
+__all__ = ["EventLocator", "Root", "State"]
 
 State = tuple[float, FloatArray, FloatArray]
 Interpolant = Callable[[float], State]
@@ -45,7 +45,7 @@ class Root:
     events: tuple[int, ...]
 
 
-class EventWatch:
+class EventLocator:
     """The signs of a problem's event functions along a solution.
 
     Parameters

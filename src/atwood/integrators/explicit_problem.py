@@ -26,11 +26,11 @@ __all__ = [
     "CompiledEvents",
     "CompiledRates",
     "Counts",
+    "EventStepper",
     "ExplicitProblem",
     "HeedingStepper",
     "Outcome",
     "Stepper",
-    "WatchingStepper",
     "absolute_tolerances",
     "first_step",
 ]
@@ -153,7 +153,7 @@ class Counts:
     ----------
     steps, failures
         Steps that were kept, and steps whose error was too large or that had no value.
-    evaluations, missing
+    evaluations, undefined
         Calls of the right-hand side, and those of them that gave no finite value.
     stiff
         How often stability, not accuracy, seemed to keep steps short: `STIFF` steps with few others between.
@@ -162,12 +162,12 @@ class Counts:
     steps: int = 0
     failures: int = 0
     evaluations: int = 0
-    missing: int = 0
+    undefined: int = 0
     stiff: int = 0
 
 
 @runtime_checkable
-class WatchingStepper(Protocol):
+class EventStepper(Protocol):
     """What a stepper has in addition if it looks for events by itself."""
 
     def watch(self, events: CompiledEvents) -> None:

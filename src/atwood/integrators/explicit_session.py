@@ -14,16 +14,24 @@ from typing import Literal, cast
 import numpy as np
 
 from atwood.errors import KernelEvaluationError, StartError, UsageError
-from atwood.integrators.event_location import ROUNDING, EventWatch, Root, State
+from atwood.integrators.event_location import ROUNDING, EventLocator, Root, State
 from atwood.integrators.explicit_problem import (
+    EventStepper,
     ExplicitProblem,
     HeedingStepper,
     LimitedStepper,
     Outcome,
     Stepper,
-    WatchingStepper,
 )
-from atwood.integrators.protocol import Advance, Budget, FloatArray, ImplicitProblem, SolverOptions, Statistics, Status
+from atwood.integrators.protocol import (
+    Budget,
+    FloatArray,
+    ImplicitProblem,
+    SolverOptions,
+    Statistics,
+    Status,
+    StepResult,
+)
 
 __all__ = ["ExplicitSession", "open_explicit"]
 
@@ -110,8 +118,8 @@ class ExplicitSession:
         self._stepper = stepper
         # The watch reads nothing of a problem but its events.
         watched = cast("ImplicitProblem", problem)
-        self._watch = EventWatch(watched, options.horizon) if problem.events is not None else None
-        self._notices = self._watching_stepper(problem, stepper)
+        self._locator = EventLocator(watched, options.horizon) if problem.events is not None else None
+        self._notices = self._event_stepper(problem, stepper)
         if leave is not None and isinstance(stepper, HeedingStepper):
             stepper.heed_stiffness()
         self._no_events = (0,) * problem.event_count
@@ -121,9 +129,9 @@ class ExplicitSession:
         self.reinitialize(t, y)
 
     @staticmethod
-    def _watching_stepper(problem: ExplicitProblem, stepper: Stepper) -> WatchingStepper | None:
+    def _event_stepper(problem: ExplicitProblem, stepper: Stepper) -> EventStepper | None:
         """Let the stepper look for events by itself, if it can."""
-        if problem.compiled_events is None or not isinstance(stepper, WatchingStepper):
+        if problem.compiled_events is None or not isinstance(stepper, EventStepper):
             return None
         events = problem.compiled_events()
         if events is None:
@@ -134,12 +142,12 @@ class ExplicitSession:
     @property
     def statistics(self) -> Statistics:
         """What the session has cost so far, over all its restarts."""
-        counts, watch = self._stepper.counts, self._watch
+        counts, locator = self._stepper.counts, self._locator
         return Statistics(
             steps=counts.steps,
             residual_evaluations=counts.evaluations,
-            event_evaluations=watch.evaluations if watch else 0,
-            missing_values=counts.missing,
+            event_evaluations=locator.evaluations if locator else 0,
+            undefined_values=counts.undefined,
             reinitializations=self._starts - 1,
             seconds=self._seconds,
             error_test_failures=counts.failures,
@@ -166,15 +174,15 @@ class ExplicitSession:
         if not self._stepper.start(float(t), values):
             raise StartError(f"the right-hand side has no finite value at the start, t = {t:.9g}")
         self._here = self._newest = self._stepper.state()
-        if self._watch is not None:
-            self._watch.restart(self._here)
+        if self._locator is not None:
+            self._locator.restart(self._here)
         self._root: Root | None = None
         self._searched = self._here[0]
         self._stalled = 0
         self._broken = False
         self._starts += 1
 
-    def advance(self, t_out: float) -> Advance:
+    def advance(self, t_out: float) -> StepResult:
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
 
         Parameters
@@ -200,7 +208,7 @@ class ExplicitSession:
         finally:
             self._seconds += time.perf_counter() - began
 
-    def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, Advance]:
+    def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, StepResult]:
         """Go on through many times at once, as far as nothing stops it.
 
         Parameters
@@ -218,21 +226,23 @@ class ExplicitSession:
             raise UsageError(f"cannot sample from t = {self._here[0]:.9g} at these times: they must rise from there")
         values, rates = np.empty((len(times), self._size)), np.empty((len(times), self._size))
         filled, stopped = 0, None
-        looks_itself = self._watch is None or self._notices is not None
+        looks_itself = self._locator is None or self._notices is not None
         if looks_itself and self.budget.poll is None and not self._broken:
             filled, stopped = self._sample_quickly(times, values, rates)
         if stopped is not None:
             return values[:filled], rates[:filled], stopped
-        advance = Advance(*_copied(self._here), Status.REACHED, self._no_events)
+        step_result = StepResult(*_copied(self._here), Status.REACHED, self._no_events)
         while filled < len(times):
-            advance = self.advance(float(times[filled]))
-            if advance.status is not Status.REACHED:
+            step_result = self.advance(float(times[filled]))
+            if step_result.status is not Status.REACHED:
                 break
-            values[filled], rates[filled] = advance.y, advance.yp
+            values[filled], rates[filled] = step_result.y, step_result.yp
             filled += 1
-        return values[:filled], rates[:filled], advance
+        return values[:filled], rates[:filled], step_result
 
-    def _sample_quickly(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> tuple[int, Advance | None]:
+    def _sample_quickly(
+        self, times: FloatArray, values: FloatArray, rates: FloatArray
+    ) -> tuple[int, StepResult | None]:
         """Let the stepper go through times as long as no limit is near, and nothing happens.
 
         Returns
@@ -248,7 +258,7 @@ class ExplicitSession:
                 is_ahead = times[-1] > self._newest[0]
                 if is_ahead and self._exceeded() is not None:
                     break
-                if is_ahead and self._watch is not None and self._watch.is_settling:
+                if is_ahead and self._locator is not None and self._locator.is_settling:
                     outcome = self._take(float(times[-1]), 1)
                 else:
                     count, outcome = self._fill(times[filled:], values[filled:], rates[filled:])
@@ -291,20 +301,20 @@ class ExplicitSession:
         return outcome
 
     def _tell_signs(self) -> None:
-        if self._notices is not None and self._watch is not None:
-            self._notices.expect(self._watch.signs)
+        if self._notices is not None and self._locator is not None:
+            self._notices.expect(self._locator.signs)
 
     def _arrive(self, outcome: Outcome) -> None:
         """Take up where the stepper came to, and up to where nothing has happened for certain."""
         before = self._newest[0]
         self._newest = self._stepper.state()
-        if self._watch is None:
+        if self._locator is None:
             self._searched = self._newest[0]
-        elif self._notices is not None and self._newest[0] > before and not self._watch.is_settling:
+        elif self._notices is not None and self._newest[0] > before and not self._locator.is_settling:
             last = self._newest[0] if outcome is not Outcome.NOTICED else self._notices.begin_of_step()
             self._searched = max(self._searched, last)
 
-    def _run(self, t_out: float) -> Advance:
+    def _run(self, t_out: float) -> StepResult:
         if self._broken:
             self.reinitialize(self._here[0], self._here[1])
         while True:
@@ -312,10 +322,10 @@ class ExplicitSession:
             if root is not None and root.state[0] <= t_out:
                 self._root = None
                 self._here = root.state
-                return Advance(*_copied(root.state), Status.EVENT, root.events)
+                return StepResult(*_copied(root.state), Status.EVENT, root.events)
             if t_out <= self._newest[0]:
                 self._here = self._newest if t_out == self._newest[0] else self._stepper.interpolate(t_out)
-                return Advance(*_copied(self._here), Status.REACHED, self._no_events)
+                return StepResult(*_copied(self._here), Status.REACHED, self._no_events)
             self._here = self._newest
             limit = self._exceeded()
             if limit is not None:
@@ -326,17 +336,17 @@ class ExplicitSession:
 
     def _find_root(self) -> Root | None:
         """Return the first root in the part of the last step that has not been handed out."""
-        watch = self._watch
+        locator = self._locator
         end = min(self._newest[0], self._end)
-        if watch is not None and self._root is None and self._searched < end:
-            self._root = watch.search(self._searched, end, self._stepper.interpolate)
+        if locator is not None and self._root is None and self._searched < end:
+            self._root = locator.search(self._searched, end, self._stepper.interpolate)
             self._searched = self._root.state[0] if self._root else end
         return self._root
 
     def _allowed(self) -> int:
         """Return how many steps may be taken before the next look at limits and events."""
-        watch = self._watch
-        if self.budget.poll is not None or (watch is not None and (self._notices is None or watch.is_settling)):
+        locator = self._locator
+        if self.budget.poll is not None or (locator is not None and (self._notices is None or locator.is_settling)):
             return 1
         if self.budget.max_steps is None:
             return self._chunk
@@ -349,7 +359,7 @@ class ExplicitSession:
         elif outcome is Outcome.USED_UP and seconds < 0.5 * _MOMENT:
             self._chunk = min(2 * self._chunk, LARGEST_CHUNK)
 
-    def _step(self, t_out: float) -> Advance | None:
+    def _step(self, t_out: float) -> StepResult | None:
         """Take steps, and return an answer only if that failed."""
         before, steps = self._newest[0], self._stepper.counts.steps
         outcome = self._take(t_out, self._allowed())
@@ -357,7 +367,7 @@ class ExplicitSession:
             self._here = self._newest
             self._broken = True
             reason = "the steps became too small to move the time"
-            if self._stepper.counts.missing:
+            if self._stepper.counts.undefined:
                 reason += ": the right-hand side has no finite value beyond, or the solution grows without bound"
             return self._stopped(Status.FAILED, reason)
         taken = self._stepper.counts.steps - steps
@@ -378,7 +388,7 @@ class ExplicitSession:
             self._is_left = self._leave(*self._newest[:2])
         return self._is_left
 
-    def _exceeded(self) -> Advance | None:
+    def _exceeded(self) -> StepResult | None:
         budget, t = self.budget, self._here[0]
         if self._leave is not None and self._leaves():
             return self._stopped(Status.STIFF, "steps are kept short by stability alone")
@@ -391,9 +401,9 @@ class ExplicitSession:
             return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
         return None
 
-    def _stopped(self, status: Status, reason: str) -> Advance:
+    def _stopped(self, status: Status, reason: str) -> StepResult:
         message = f"{reason} (at t = {self._here[0]:.9g})"
-        return Advance(*_copied(self._here), status, self._no_events, message)
+        return StepResult(*_copied(self._here), status, self._no_events, message)
 
 
 def _copied(state: State) -> State:

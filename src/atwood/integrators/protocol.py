@@ -22,7 +22,6 @@ from atwood.errors import UsageError
 from atwood.late import dataclass
 
 __all__ = [
-    "Advance",
     "Budget",
     "FloatArray",
     "ImplicitProblem",
@@ -34,6 +33,7 @@ __all__ = [
     "SolverOptions",
     "Statistics",
     "Status",
+    "StepResult",
     "choose_linear_solver",
 ]
 
@@ -77,7 +77,7 @@ class NativeCallbacks:
     has_noticed
         Asked where `events` did not return 0: whether that was to say that a value may have passed zero and come back
         since they were called before, in which case they return 0 when they are called again.
-    missing_values
+    undefined_values
         How often residual and Jacobian had no finite value so far, if somebody counts it.
     attend
         ``attend(t, y)``, called where `weights` have made IDA stop between two steps: None if that was not on
@@ -98,7 +98,7 @@ class NativeCallbacks:
     events: int = 0
     restart_events: Callable[[float], None] | None = None
     has_noticed: Callable[[], bool] | None = None
-    missing_values: Callable[[], int] | None = None
+    undefined_values: Callable[[], int] | None = None
     attend: Callable[[float, FloatArray], bool | None] | None = None
     last_rate: Callable[[], float] | None = None
     keep: object = None
@@ -256,7 +256,7 @@ class Status(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Advance:
+class StepResult:
     """Where an advance ended, and why.
 
     Parameters
@@ -292,7 +292,7 @@ class Statistics:
         Accepted internal steps.
     residual_evaluations, jacobian_evaluations, event_evaluations
         Calls of the problem's functions, for whatever purpose.
-    missing_values
+    undefined_values
         Those of the calls that gave no finite value.
     reinitializations
         Restarts of the method.
@@ -306,7 +306,7 @@ class Statistics:
     residual_evaluations: int = 0
     jacobian_evaluations: int = 0
     event_evaluations: int = 0
-    missing_values: int = 0
+    undefined_values: int = 0
     reinitializations: int = 0
     seconds: float = 0.0
     error_test_failures: int | None = None
@@ -323,7 +323,7 @@ class Statistics:
 class Session(Protocol):
     """A run in progress."""
 
-    def advance(self, t_out: float) -> Advance:
+    def advance(self, t_out: float) -> StepResult:
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
 
         Parameters

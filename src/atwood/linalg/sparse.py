@@ -24,10 +24,10 @@ __all__ = [
     "csr_row_sizes",
     "csr_scaled",
     "free_columns",
+    "massless_directions",
     "rows_are_independent",
     "smallest_direction",
     "solve_bordered",
-    "without_inertia",
 ]
 
 
@@ -132,14 +132,14 @@ def smallest_direction(square: Any, iterations: int = 40) -> tuple[float, FloatA
     return max(value, 0.0), vector
 
 
-def without_inertia(mass: Any, slope: Any, sizes: FloatArray) -> FloatArray | None:
+def massless_directions(mass: Any, jacobian: Any, sizes: FloatArray) -> FloatArray | None:
     """Return how much each coordinate moves in a direction that nothing gives inertia to; None if there is none.
 
     Parameters
     ----------
     mass
         The mass matrix.
-    slope
+    jacobian
         Derivatives of the independent constraints.
     sizes
         Size of each coordinate.
@@ -147,9 +147,9 @@ def without_inertia(mass: Any, slope: Any, sizes: FloatArray) -> FloatArray | No
     weight = diags_array(sizes)
     square = weight @ mass @ weight
     square = square / (float(np.max(square.diagonal(), initial=0.0)) or 1.0)
-    if slope.shape[0]:
-        held = slope @ weight
-        held = diags_array(1.0 / np.maximum(csr_row_sizes(slope, sizes), 1e-300)) @ held
+    if jacobian.shape[0]:
+        held = jacobian @ weight
+        held = diags_array(1.0 / np.maximum(csr_row_sizes(jacobian, sizes), 1e-300)) @ held
         square = square + held.T @ held
     value, vector = smallest_direction(csr_array(square))
     return np.abs(vector) if value <= 1e-14 else None
@@ -188,9 +188,11 @@ def free_columns(matrix: Any) -> NDArray[np.bool_]:
     return found
 
 
-def solve_bordered(mass: Any, slope: Any, bias: FloatArray, gamma: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+def solve_bordered(
+    mass: Any, jacobian: Any, bias: FloatArray, gamma: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
     """Return a and lambda of ``M a + bias = G^T lambda``, ``G a + gamma = 0``; None where they are not determined."""
-    matrix = csc_array(block_array([[mass, -slope.T], [slope, None]])) if slope.shape[0] else csc_array(mass)
+    matrix = csc_array(block_array([[mass, -jacobian.T], [jacobian, None]])) if jacobian.shape[0] else csc_array(mass)
     right = np.concatenate([-bias, -gamma])
     large = abs(matrix)
     size = np.sqrt(np.maximum(large.max(axis=1).toarray(), large.max(axis=0).toarray()).ravel())

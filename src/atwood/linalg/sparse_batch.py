@@ -229,8 +229,8 @@ class Normal:
 
         def solve(right: FloatArray) -> FloatArray:
             found = self.pattern.times_across(entries, self.elimination.solve(factors, right))
-            missing = right - self.pattern.times(entries, found)
-            found += self.pattern.times_across(entries, self.elimination.solve(factors, missing))
+            residual = right - self.pattern.times(entries, found)
+            found += self.pattern.times_across(entries, self.elimination.solve(factors, residual))
             return found
 
         return solve
@@ -263,8 +263,8 @@ class Normal:
             wanted[self.whole.columns[own]] = scaled[own]
             found = self.elimination.solve(factors, self.pattern.times(held, wanted))
             for _ in range(2):
-                missing = wanted - self.pattern.times_across(held, found)
-                found = found + self.elimination.solve(factors, self.pattern.times(held, missing))
+                residual = wanted - self.pattern.times_across(held, found)
+                found = found + self.elimination.solve(factors, self.pattern.times(held, residual))
             shares[i] = found * sizes[row] / sizes[kept]
         moved = np.moveaxis(shares, 2, 0)
         square = np.eye(len(left_out)) + moved @ np.swapaxes(moved, 1, 2)
@@ -280,15 +280,15 @@ class Borders:
 
     Parameters
     ----------
-    mass, slope
+    mass, jacobian
         Where M and G have entries.
     """
 
-    def __init__(self, mass: Pattern, slope: Pattern) -> None:
-        self.mass, self.slope = mass, slope
-        n, m = slope.shape[1], slope.shape[0]
+    def __init__(self, mass: Pattern, jacobian: Pattern) -> None:
+        self.mass, self.jacobian = mass, jacobian
+        n, m = jacobian.shape[1], jacobian.shape[0]
         places = list(zip(mass.rows.tolist(), mass.columns.tolist(), strict=True))
-        borders = [(c, n + r) for r, c in zip(slope.rows.tolist(), slope.columns.tolist(), strict=True)]
+        borders = [(c, n + r) for r, c in zip(jacobian.rows.tolist(), jacobian.columns.tolist(), strict=True)]
         self._elimination = Elimination(n + m, [*places, *borders], range(n, n + m))
         number = self._elimination.number
         self._upper = np.flatnonzero(mass.rows <= mass.columns)
@@ -296,13 +296,13 @@ class Borders:
         self._slopes = np.array([number[one] for one in borders], dtype=np.intp)
 
     def solve(
-        self, masses: FloatArray, slopes: FloatArray, bias: FloatArray, gamma: FloatArray
+        self, masses: FloatArray, jacobian: FloatArray, bias: FloatArray, gamma: FloatArray
     ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
         """Return the solutions.
 
         Parameters
         ----------
-        masses, slopes
+        masses, jacobian
             Entries of M and G for each state.
         bias, gamma
             Shape (number, states).
@@ -318,28 +318,28 @@ class Borders:
         elimination = self._elimination
         entries = np.zeros((len(elimination.number), bias.shape[1]))
         entries[self._masses] = masses[self._upper]
-        entries[self._slopes] = -slopes
+        entries[self._slopes] = -jacobian
         factors = elimination.factorise(entries)
         right = np.concatenate([-bias, gamma])
         found = elimination.solve(factors, right)
-        found = found + elimination.solve(factors, self._missing(masses, slopes, right, found))
+        found = found + elimination.solve(factors, self._residual(masses, jacobian, right, found))
         a, multipliers = found[:n], found[n:]
         sizes = np.zeros((n + m, bias.shape[1]))
         sizes[:n] = self.mass.times(np.abs(masses), np.abs(a))
-        sizes[:n] += self.slope.times_across(np.abs(slopes), np.abs(multipliers))
-        sizes[n:] = self.slope.times(np.abs(slopes), np.abs(a))
+        sizes[:n] += self.jacobian.times_across(np.abs(jacobian), np.abs(multipliers))
+        sizes[n:] = self.jacobian.times(np.abs(jacobian), np.abs(a))
         scale = np.max(sizes, axis=0, initial=0.0) + np.max(np.abs(right), axis=0, initial=0.0)
-        left = self._missing(masses, slopes, right, found)
+        left = self._residual(masses, jacobian, right, found)
         with np.errstate(invalid="ignore"):
             good: NDArray[np.bool_] = np.all(np.abs(left) <= 1e-10 * np.maximum(scale, 1e-300), axis=0)
         return a, multipliers, good
 
-    def _missing(self, masses: FloatArray, slopes: FloatArray, right: FloatArray, found: FloatArray) -> FloatArray:
-        n = self.slope.shape[1]
+    def _residual(self, masses: FloatArray, jacobian: FloatArray, right: FloatArray, found: FloatArray) -> FloatArray:
+        n = self.jacobian.shape[1]
         a, multipliers = found[:n], found[n:]
-        forces = self.slope.times_across(slopes, multipliers) - self.mass.times(masses, a)
-        missing: FloatArray = right + np.concatenate([forces, self.slope.times(slopes, a)])
-        return missing
+        forces = self.jacobian.times_across(jacobian, multipliers) - self.mass.times(masses, a)
+        residual: FloatArray = right + np.concatenate([forces, self.jacobian.times(jacobian, a)])
+        return residual
 
 
 class Augmented:
@@ -350,13 +350,13 @@ class Augmented:
 
     Parameters
     ----------
-    mass, slope
+    mass, jacobian
         Where M and G have entries.
     """
 
-    def __init__(self, mass: Pattern, slope: Pattern) -> None:
+    def __init__(self, mass: Pattern, jacobian: Pattern) -> None:
         by_row: dict[int, list[tuple[int, int]]] = {}
-        for entry, (row, column) in enumerate(zip(slope.rows.tolist(), slope.columns.tolist(), strict=True)):
+        for entry, (row, column) in enumerate(zip(jacobian.rows.tolist(), jacobian.columns.tolist(), strict=True)):
             by_row.setdefault(row, []).append((column, entry))
         number: dict[tuple[int, int], int] = {}
         own = [
@@ -370,16 +370,16 @@ class Augmented:
         self._first, self._second = first, second
         self._targets, self._starts = np.unique(targets, return_index=True)
         rows, columns = (np.array([one[k] for one in number], dtype=np.intp) for k in range(2))
-        self._slope, self._borders = slope, Borders(Pattern(rows, columns, mass.shape), slope)
+        self._slope, self._borders = jacobian, Borders(Pattern(rows, columns, mass.shape), jacobian)
 
     def solve(
-        self, masses: FloatArray, slopes: FloatArray, bias: FloatArray, gamma: FloatArray
+        self, masses: FloatArray, jacobian: FloatArray, bias: FloatArray, gamma: FloatArray
     ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
         """Return the solutions; see `Borders.solve`."""
-        share = np.max(np.abs(masses), axis=0, initial=0.0) / np.max(np.abs(slopes), axis=0, initial=1e-300) ** 2
+        share = np.max(np.abs(masses), axis=0, initial=0.0) / np.max(np.abs(jacobian), axis=0, initial=1e-300) ** 2
         share[share == 0.0] = 1.0
         entries = np.zeros((len(self._borders.mass.rows), bias.shape[1]))
-        products = slopes[self._first] * slopes[self._second]
+        products = jacobian[self._first] * jacobian[self._second]
         entries[self._targets] = share * _sums(products, self._starts, len(self._targets))
         entries[self._own] += masses
-        return self._borders.solve(entries, slopes, bias + share * self._slope.times_across(slopes, gamma), gamma)
+        return self._borders.solve(entries, jacobian, bias + share * self._slope.times_across(jacobian, gamma), gamma)

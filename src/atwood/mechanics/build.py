@@ -23,12 +23,12 @@ from atwood.model.declare.component import bind
 from atwood.model.local.laws import LocalConstraint
 from atwood.model.local.parts import multiplier_symbol
 from atwood.model.values.vector import Vector
-from atwood.topology.forest import Forest
+from atwood.topology.spanning_forest import SpanningForest
 
 __all__ = ["Mechanism", "build_equations", "check_closures", "extent", "make_gravity", "resolve_signals"]
 
 
-def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
+def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
     """Derive the equations of motion of a mechanism in one form.
 
     Parameters
@@ -98,7 +98,7 @@ def build_equations(mechanism: Mechanism, forest: Forest) -> Equations:
         constraints=constraints,
         eliminated=tuple(c.name for c, s in zip(forest.coordinates, every, strict=True) if s in solution),
         prescribed=prescribed,
-        charts=state.charts,
+        orientation_coordinates=state.orientation_coordinates,
         solved_speeds=tuple(s.name.removeprefix("u:") for s in taken.speeds),
         integrals=(*taken.integrals, *integrals.values()),
     )

@@ -33,7 +33,7 @@ from atwood.showing import fitted, html_table
 from atwood.simulation.dynamics.rank import FREE, row_scales
 from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
-from atwood.simulation.initialization.report import Placement, find_placement
+from atwood.simulation.initialization.report import InitializationReport, report_initialization
 from atwood.simulation.initialization.start import Start, find_start, own_state, settle
 from atwood.simulation.problem.arguments import NAME, ORIENTATION
 from atwood.simulation.problem.problem import Plan, make_plan
@@ -97,7 +97,7 @@ class MechanismReport:
         What nothing fixes at the start; it keeps its guess as far as it can, or starts at zero.
     repeated
         Start values that follow from the others.
-    placement
+    initialization
         What the start moved from where it was guessed.
     immobile
         Why nothing can move, and what would have to let go; None if something can, or is driven.
@@ -136,7 +136,7 @@ class MechanismReport:
     on_surfaces: tuple[str, ...]
     solved_speeds: tuple[str, ...]
     idle_spins: tuple[str, ...]
-    placement: Placement
+    initialization: InitializationReport
     immobile: Immobile | None
     states: Mapping[str, int]
     operations: Mapping[str, Mapping[str, int]]
@@ -195,7 +195,7 @@ class MechanismReport:
                 "free_speeds": list(self.free_speeds),
                 "repeated": list(self.repeated),
             },
-            "placement": self.placement.to_dict(),
+            "placement": self.initialization.to_dict(),
             "immobile": None if self.immobile is None else self.immobile.to_dict(),
             "states": dict(self.states),
             "operations": {form: dict(counts) for form, counts in self.operations.items()},
@@ -279,7 +279,7 @@ def report(scene: Model | Assembly, name: str | None = None, *, orientation: str
             one for one in reduced.reduced.solved_speeds if not one.startswith(tuple(f"{name}.spin." for name in idle))
         ),
         idle_spins=idle,
-        placement=find_placement(reduced, start),
+        initialization=report_initialization(reduced, start),
         immobile=find_immobile(reduced, len(reduced.reduced.speeds) - plans["reduced"].finding.rank, start),
         states={form: plan.program.size for form, plan in plans.items()},
         operations={form: plan.program.operations for form, plan in plans.items()},
@@ -311,9 +311,9 @@ def _plan(assembly: Assembly, start: Start) -> Plan:
 def _not_unique(assembly: Assembly, plan: Plan, start: Start) -> tuple[str, ...]:
     """Return the reactions that a stress without any force from outside could change."""
     q, u = own_state(assembly, start)
-    slope = scaled(to_array(plan.balance.at(start.time, q, np.zeros_like(u)).slope), plan.sizes)
-    rows = row_scales(slope, np.ones_like(u), plan.balance.errors.near(start.time, q, plan.sizes))
-    _, _, directions = np.linalg.svd((slope / rows[:, None]).T)
+    constraint_jacobian = scaled(to_array(plan.balance.at(start.time, q, np.zeros_like(u)).jacobian), plan.sizes)
+    rows = row_scales(constraint_jacobian, np.ones_like(u), plan.balance.errors.near(start.time, q, plan.sizes))
+    _, _, directions = np.linalg.svd((constraint_jacobian / rows[:, None]).T)
     involved = np.max(np.abs(directions[plan.finding.rank :]), axis=0, initial=0.0) > FREE
     constraints = assembly.maximal.constraints
     return tuple(

@@ -236,8 +236,10 @@ def _nodes(assembly: Assembly, start: Start) -> dict[tuple[str, str], FloatArray
     balance = balance_of(assembly, "reduced")
     q, u = start.coordinates, start.speeds
     sizes = motion_scales(equations, start.length)
-    slope = scaled(balance.at(start.time, q, u).slope, sizes)
-    kept = np.asarray(independent_rows(slope, balance.errors.of_slopes(start.time, q, sizes)), dtype=np.intp)
+    constraint_jacobian = scaled(balance.at(start.time, q, u).jacobian, sizes)
+    kept = np.asarray(
+        independent_rows(constraint_jacobian, balance.errors.of_jacobian(start.time, q, sizes)), dtype=np.intp
+    )
     a, _ = balance.accelerate(start.time, q, u, kept)
     placements = kinematics.placements
     tables = (placements.positions, kinematics.velocities, kinematics.accelerations)

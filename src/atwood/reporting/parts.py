@@ -11,8 +11,8 @@ from atwood.mechanics.build import Mechanism
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene
 from atwood.model.local.laws import LocalPart
-from atwood.topology.forest import Forest
 from atwood.topology.graph import Joint
+from atwood.topology.spanning_forest import SpanningForest
 
 __all__ = [
     "BodyEntry",
@@ -144,7 +144,7 @@ def list_joints(assembly: Assembly) -> tuple[JointEntry, ...]:
         The scene.
     """
     mechanism, forest = assembly.mechanism, assembly.reduced.forest
-    bodies, cuts = mechanism.bodies, {id(joint) for joint in forest.cuts}
+    bodies, loop_joints = mechanism.bodies, {id(joint) for joint in forest.loop_joints}
     names = {one.name for one in assembly.reduced.names}
     found: dict[str, JointEntry] = {}
     for joint in mechanism.graph.joints:
@@ -157,12 +157,12 @@ def list_joints(assembly: Assembly) -> tuple[JointEntry, ...]:
             type(assembly.flat.parts[joint.part].component).__name__,
             (bodies.bodies[ends[0]].name, bodies.bodies[ends[1]].name),
             tuple(name for name in _coordinates_of(forest, joint) if name in names),
-            id(joint) in cuts,
+            id(joint) in loop_joints,
         )
     return tuple(found.values())
 
 
-def _coordinates_of(forest: Forest, joint: Joint) -> Iterator[str]:
+def _coordinates_of(forest: SpanningForest, joint: Joint) -> Iterator[str]:
     """Yield the coordinates that place and turn the body that hangs on a joint."""
     for one in forest.attachments:
         if one.joint is not joint:

@@ -181,8 +181,8 @@ def _warnings(report: MechanismReport) -> Iterator[tuple[str, str]]:
         yield "redundant", text
     if report.immobile is not None:
         yield "immobile", report.immobile.describe()
-    if report.placement.summary:
-        yield "assembled", report.placement.summary
+    if report.initialization.summary:
+        yield "assembled", report.initialization.summary
     if report.starts_singular:
         yield "singular start", "here constraints lose rank; the motion from this position is not unique"
     if report.repeated:

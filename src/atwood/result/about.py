@@ -57,14 +57,14 @@ def describe_run(result: Result) -> dict[str, Any]:
         "t_start": float(result.start.time),
         "t_end": float(result.time[-1]),
         "happenings": [
-            {"time": one.time, "part": one.part, "what": one.message, "mode": one.target} for one in result.happenings
+            {"time": one.time, "part": one.part, "what": one.message, "mode": one.target} for one in result.events
         ],
         "singular_positions": [
             {"time": one.time, "ways": one.ways, "parts": list(one.parts), "what": one.describe()}
-            for one in result.passages
+            for one in result.singular_crossings
         ],
         "orientation": result.assembly.orientation.kind,
-        "restated": [{"time": one.time, "body": one.body} for one in result.restated],
+        "restated": [{"time": one.time, "body": one.body} for one in result.coordinate_switches],
         "solver": {
             "name": solver_name(result),
             "why": result.run.why,

@@ -13,12 +13,12 @@ from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.outputs.moving_inertia import MovingMass, moving_masses
 from atwood.mechanics.outputs.power import applied_power, switched_energy
 from atwood.result.energy import Motion, Piece
-from atwood.simulation.run.record import Segment
+from atwood.simulation.run.record import SegmentRecord
 
 __all__ = ["DrivePower", "account", "power_into"]
 
 
-DrivePower = Callable[[Segment], FloatArray]
+DrivePower = Callable[[SegmentRecord], FloatArray]
 """Gives the power of constraints that move with time."""
 
 _DRAWS = 3
@@ -28,7 +28,7 @@ _DIGIT = 4.0 * np.finfo(float).eps
 """Of each number in a state, relative to itself or to its size in the scene."""
 
 
-def account(segment: Segment, drives: DrivePower) -> Piece:
+def account(segment: SegmentRecord, drives: DrivePower) -> Piece:
     """Return the samples that a ledger is made of.
 
     Parameters
@@ -58,7 +58,7 @@ def account(segment: Segment, drives: DrivePower) -> Piece:
     )
 
 
-def _motions(segment: Segment) -> tuple[Motion, ...]:
+def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
     """Return what moves with which velocities."""
     assembly = segment.assembly
     masses: list[MovingMass] = assembly.shared.get(
@@ -79,7 +79,7 @@ def _motions(segment: Segment) -> tuple[Motion, ...]:
     return tuple(found)
 
 
-def power_into(segment: Segment, drives: DrivePower) -> FloatArray | None:
+def power_into(segment: SegmentRecord, drives: DrivePower) -> FloatArray | None:
     """Return the power that is put into the scene at each sample, or None if nothing can."""
     assembly = segment.assembly
     program = assembly.known_program("power", "power", lambda: [applied_power(assembly.mechanism, assembly.equations)])
@@ -105,7 +105,7 @@ def _values(assembly: Assembly, program: Program, t: FloatArray, q: FloatArray, 
     return np.array([np.broadcast_to(row, t.shape) for row in found])
 
 
-def _rounding(segment: Segment, energy: FloatArray) -> float:
+def _rounding(segment: SegmentRecord, energy: FloatArray) -> float:
     """Return by how much the energy changes at most, J, where all that it is computed from changes in its last digits.
 
     States are known to some units of rounding of themselves, or of the size that such coordinates have in the scene.

@@ -23,17 +23,17 @@ from atwood.result.energy import EnergyLedger
 from atwood.result.trajectories import Trajectories
 from atwood.result.work import find_ledger
 from atwood.showing import count_of, listed
-from atwood.simulation.dynamics.orientation_coordinates import Restated
+from atwood.simulation.dynamics.orientation_coordinates import CoordinateSwitch
 from atwood.simulation.dynamics.reactions import ReactionSolver
-from atwood.simulation.events.modes import Happening
+from atwood.simulation.events.modes import EventRecord
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
-from atwood.simulation.initialization.report import Placement, find_placement
+from atwood.simulation.initialization.report import InitializationReport, report_initialization
 from atwood.simulation.initialization.start import Start
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
-from atwood.simulation.run.record import Segment
+from atwood.simulation.run.record import SegmentRecord
 from atwood.simulation.run.run import Run
-from atwood.simulation.singular.crossing import Passage
+from atwood.simulation.singular.crossing import SingularCrossing
 
 __all__ = ["Result"]
 
@@ -100,7 +100,7 @@ class Result(Trajectories):
         return self.run.start
 
     @property
-    def _segments(self) -> tuple[Segment, ...]:
+    def _segments(self) -> tuple[SegmentRecord, ...]:
         if not self.run.segments:
             raise self._empty()
         return self.run.segments
@@ -114,19 +114,19 @@ class Result(Trajectories):
         return ResultError(f"there is nothing in it: {self.message}", where=self.assembly.flat.name, advice=_LONGER)
 
     @property
-    def happenings(self) -> tuple[Happening, ...]:
+    def events(self) -> tuple[EventRecord, ...]:
         """Events on the way, in order."""
-        return self.run.happenings
+        return self.run.events
 
     @property
-    def passages(self) -> tuple[Passage, ...]:
+    def singular_crossings(self) -> tuple[SingularCrossing, ...]:
         """Singular positions that the run passed through, or came too close to, in order."""
-        return self.run.passages
+        return self.run.singular_crossings
 
     @property
-    def restated(self) -> tuple[Restated, ...]:
+    def coordinate_switches(self) -> tuple[CoordinateSwitch, ...]:
         """When which orientation went on in other coordinates, since its own came near to where they are singular."""
-        return self.run.restated
+        return self.run.coordinate_switches
 
     @property
     def solver(self) -> str:
@@ -141,9 +141,9 @@ class Result(Trajectories):
         return find_immobile(self.assembly, freedom, start)
 
     @cached_property
-    def placement(self) -> Placement:
+    def initialization(self) -> InitializationReport:
         """What the start moved: bodies and guesses, and the joints that were open before."""
-        return find_placement(self.assembly, self.start)
+        return report_initialization(self.assembly, self.start)
 
     @property
     def statistics(self) -> Statistics:
@@ -231,7 +231,7 @@ class Result(Trajectories):
                 turning = (self._all_time, self.samples(rate)) if rate else (None, None)
                 self._cache[path] = unwrap(self._cache[path], guesses.get(path), *turning)
 
-    def _evaluate(self, segment: Segment, paths: tuple[str, ...]) -> FloatArray:
+    def _evaluate(self, segment: SegmentRecord, paths: tuple[str, ...]) -> FloatArray:
         assembly = segment.assembly
         observables = assembly.find_observables(paths)
         symbols = [one.symbol for one in assembly.reactions]
@@ -257,32 +257,32 @@ class Result(Trajectories):
     def _reaction_cache(self) -> dict[int, tuple[FloatArray, FloatArray]]:
         return {}
 
-    def _solver(self, segment: Segment) -> ReactionSolver:
+    def _solver(self, segment: SegmentRecord) -> ReactionSolver:
         if id(segment) not in self._solvers:
             self._solvers[id(segment)] = ReactionSolver(
                 segment.assembly, float(segment.time[0]), segment.coordinates[:, 0], segment.speeds[:, 0]
             )
         return self._solvers[id(segment)]
 
-    def _accelerations(self, segment: Segment) -> FloatArray:
+    def _accelerations(self, segment: SegmentRecord) -> FloatArray:
         """Return the accelerations of the form's coordinates; near singular positions those of the smooth motion."""
         solver = self._solver(segment)
         found, clear = np.zeros_like(segment.speeds), np.ones(len(segment.time), dtype=bool)
-        for passage in segment.passages:
-            inside = passage.has_in_its_middle(segment.time)
-            if passage.path is not None:
-                found[:, inside] = passage.path.at(segment.time[inside])[2]
+        for crossing in segment.singular_crossings:
+            inside = crossing.has_in_its_middle(segment.time)
+            if crossing.path is not None:
+                found[:, inside] = crossing.path.at(segment.time[inside])[2]
                 clear &= ~inside
         state = segment.time[clear], segment.coordinates[:, clear], segment.speeds[:, clear]
         found[:, clear] = solver.own_accelerations(*state, segment.plan.finding)
         return found
 
-    def _reactions(self, segment: Segment) -> tuple[FloatArray, FloatArray]:
+    def _reactions(self, segment: SegmentRecord) -> tuple[FloatArray, FloatArray]:
         """Return all reactions, not known (nan) at singular positions, and the power of moving constraints."""
         if id(segment) not in self._reaction_cache:
             t, clear = segment.time, np.ones(len(segment.time), dtype=bool)
-            for passage in segment.passages:
-                clear &= ~passage.leaves_open(t)
+            for crossing in segment.singular_crossings:
+                clear &= ~crossing.leaves_open(t)
             values, power = np.full((len(segment.assembly.reactions), len(t)), np.nan), np.zeros(len(t))
             if np.any(clear):  # otherwise it is a stretch within a moment, in which no work is done
                 values[:, clear], power[clear] = self._solver(segment).at(
@@ -307,7 +307,7 @@ class Result(Trajectories):
             )
         return find_ledger(self.run, pieces, self._shown, lambda run: Result(run)._power_of_drives)
 
-    def _power_of_drives(self, segment: Segment) -> FloatArray:
+    def _power_of_drives(self, segment: SegmentRecord) -> FloatArray:
         """Return the power of constraints that move with time."""
         return self._reactions(segment)[1]
 
@@ -373,8 +373,8 @@ class Result(Trajectories):
         yield "solver", f"{self.solver} ({count_of(self.statistics.steps, 'step')})"
         names = [one.name for one in self.assembly.equations.names]
         yield "coordinates", listed(names)
-        told = [f"{one.message or one.part} at {one.time:.6g} s" for one in self.happenings]
+        told = [f"{one.message or one.part} at {one.time:.6g} s" for one in self.events]
         if told:
             yield "events", listed(told, 4)
-        if self.passages:
-            yield "singular positions", listed((f"{one.time:.6g} s" for one in self.passages), 4)
+        if self.singular_crossings:
+            yield "singular positions", listed((f"{one.time:.6g} s" for one in self.singular_crossings), 4)

@@ -147,18 +147,18 @@ def _nodes(flat: FlatScene) -> tuple[tuple[Node, ...], dict[tuple[str, str], int
     owners: dict[str, tuple[str, str]] = {}
     frames: set[str] = set()
     meeting: dict[str, None] = {}
-    grips: set[str] = set()
+    joint_references: set[str] = set()
     for path, part in flat.parts.items():
         for name, one in part.component.connectors().items():
             full = f"{path}.{name}"
             if isinstance(one, JointCoordinate):
-                grips.add(full)
+                joint_references.add(full)
                 continue
             owners[full] = (path, name)
             meeting[full] = None
             if isinstance(one, Frame):
                 frames.add(full)
-    connections = [pair for pair in flat.connections if grips.isdisjoint(pair)]
+    connections = [pair for pair in flat.connections if joint_references.isdisjoint(pair)]
     for a, b in connections:
         for end in (a, b):
             # A connector of a nested model is no leaf's: it only passes the connection on.

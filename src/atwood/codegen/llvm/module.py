@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from atwood.codegen.llvm.layout import Body, Layout, lay_out, main_body, prologue_body
 from atwood.codegen.llvm.linear_systems import ROUTINES, Solver
 from atwood.codegen.llvm.text import LIBRARY_FUNCTIONS, Needs, Writer
-from atwood.codegen.llvm.unit import opening, write_unit
+from atwood.codegen.llvm.unit import prologue, write_unit
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
@@ -230,14 +230,14 @@ def _pack(writer: Writer, lanes: int) -> None:
 def _as_chunk(name: str, writer: Writer) -> str:
     """Return a chunk as a function of its own, which returns the sum of its results."""
     checked = writer.checked()
-    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *opening(writer)]
+    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *prologue(writer)]
     return "\n".join([*start, *writer.lines, f"  ret double {checked}", "}"])
 
 
 def _as_function(name: str, writer: Writer) -> str:
     """Return the only chunk of a body as the whole function."""
     checked = writer.checked()
-    start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *opening(writer)]
+    start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *prologue(writer)]
     return "\n".join([*start, *writer.lines, *_ending(checked)])
 
 

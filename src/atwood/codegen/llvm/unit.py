@@ -6,7 +6,7 @@ from atwood.codegen.llvm.layout import Unit
 from atwood.codegen.llvm.linear_systems import Solver
 from atwood.codegen.llvm.text import Writer
 
-__all__ = ["opening", "write_unit"]
+__all__ = ["prologue", "write_unit"]
 
 
 def write_unit(writer: Writer, solver: Solver, unit: Unit) -> None:
@@ -21,7 +21,7 @@ def write_unit(writer: Writer, solver: Solver, unit: Unit) -> None:
         writer.write(node)
 
 
-def opening(writer: Writer) -> list[str]:
+def prologue(writer: Writer) -> list[str]:
     """Return the instructions that fetch the pointers that a chunk uses."""
     lines = ["  %sine = alloca double", "  %cosine = alloca double"] if writer.waves else []
     for pointer in sorted(writer.pointers):

@@ -21,7 +21,7 @@ from atwood.codegen.llvm.text import literal
 from atwood.codegen.sundials.text import SundialsLayout
 from atwood.late import dataclass
 
-__all__ = ["ATTENTION", "FIELDS", "LIMIT", "RATE", "LoopShape", "loop_text"]
+__all__ = ["ATTENTION", "FIELDS", "LIMIT", "RATE", "NullSpaceShape", "null_space_text"]
 
 FIELDS = (
     "derived_residual",
@@ -41,7 +41,7 @@ ATTENTION, RATE, LIMIT = range(3)
 
 
 @dataclass(frozen=True)
-class LoopShape:
+class NullSpaceShape:
     """How many there are of each.
 
     Attributes
@@ -92,7 +92,7 @@ class LoopShape:
         m = self.rates
         lengths = {
             "stack": self.stack,
-            "slope": m * self.speeds,
+            "jacobian": m * self.speeds,
             "derivatives": self.stack * self.size,
             "multipliers": m,
             "matrix": m * m,
@@ -116,7 +116,7 @@ def _places(lengths: dict[str, int]) -> dict[str, int]:
 class _Evaluation:
     """What residual and Jacobian have in common while they are written."""
 
-    def __init__(self, layout: SundialsLayout, shape: LoopShape) -> None:
+    def __init__(self, layout: SundialsLayout, shape: NullSpaceShape) -> None:
         self.layout, self.shape = layout, shape
         self.code = Routine()
         self.data = {name: self.code.load_pointer("%data", k) for k, name in enumerate(FIELDS)}
@@ -171,7 +171,7 @@ class _Evaluation:
     def solve_multipliers(self) -> None:
         """Write ``lambda = G_d^-T r_d``, block by block."""
         code, shape = self.code, self.shape
-        slope, matrix, pivots, side = (self.array(name) for name in ("slope", "matrix", "pivots", "side"))
+        jacobian, matrix, pivots, side = (self.array(name) for name in ("jacobian", "matrix", "pivots", "side"))
         balances = code.place(self.array("stack"), shape.coordinates)
         multipliers = self.array("multipliers")
         with code.loop(0, self.listed("blocks", 0)) as block:
@@ -182,7 +182,7 @@ class _Evaluation:
                 at = code.index("mul", row.index, count)
                 with code.loop(0, count) as column:
                     constraint = self.listed("constraints", code.index("add", start, column.index))
-                    entry = code.load(slope, code.index("mul", constraint, shape.speeds), speed)
+                    entry = code.load(jacobian, code.index("mul", constraint, shape.speeds), speed)
                     code.store(entry, matrix, at, column.index)
             code.do(f"call void @factorise_block(i64 {count}, ptr {matrix}, ptr {pivots})")
             code.do(f"call void @substitute_block(i64 {count}, ptr {matrix}, ptr {pivots}, ptr {side})")
@@ -193,14 +193,14 @@ class _Evaluation:
     def solve_weights(self) -> str:
         """Write ``W = G_d^-1 G_i``, one row for each independent speed; return whether it is finite."""
         code, shape = self.code, self.shape
-        slope, matrix, pivots, side = (self.array(name) for name in ("slope", "matrix", "pivots", "side"))
+        jacobian, matrix, pivots, side = (self.array(name) for name in ("jacobian", "matrix", "pivots", "side"))
         weights, sizes, state = self.array("weights"), self.data["sizes"], self.data["state"]
         limit = code.load(state, LIMIT)
         with code.loop(0, self.listed("blocks", 0), (literal(0.0),)) as block:
             start, count = self._block(block.index)
             with code.loop(0, count) as row:
                 constraint = self.listed("constraints", code.index("add", start, row.index))
-                entries = code.place(slope, code.index("mul", constraint, shape.speeds))
+                entries = code.place(jacobian, code.index("mul", constraint, shape.speeds))
                 at = code.index("mul", row.index, count)
                 with code.loop(0, count) as column:
                     speed = self.listed("dependent", code.index("add", start, column.index))
@@ -210,7 +210,7 @@ class _Evaluation:
                 speed = self.listed("independent", free.index)
                 with code.loop(0, count, (literal(0.0),)) as row:
                     constraint = self.listed("constraints", code.index("add", start, row.index))
-                    entry = code.load(slope, code.index("mul", constraint, shape.speeds), speed)
+                    entry = code.load(jacobian, code.index("mul", constraint, shape.speeds), speed)
                     code.store(entry, side, row.index)
                     size = code.put(f"call double @llvm.fabs.f64(double {entry})")
                     row.following = (code.number("fadd", row.carried[0], size),)
@@ -236,7 +236,7 @@ class _Evaluation:
         return start, self.code.index("sub", self.listed("starts", self.code.index("add", block, 1)), start)
 
 
-def loop_text(layout: SundialsLayout, shape: LoopShape, sparse: bool) -> str:
+def null_space_text(layout: SundialsLayout, shape: NullSpaceShape, sparse: bool) -> str:
     """Write residual, Jacobian and error weights with IDA's signatures.
 
     Parameters
@@ -254,18 +254,18 @@ def loop_text(layout: SundialsLayout, shape: LoopShape, sparse: bool) -> str:
     return routines + "".join(texts)
 
 
-def _residual_text(layout: SundialsLayout, shape: LoopShape) -> str:
+def _residual_text(layout: SundialsLayout, shape: NullSpaceShape) -> str:
     """Write the residual with IDA's signature."""
     made = _Evaluation(layout, shape)
     code = made.code
     t, y, yp, out = made.scalar("%t"), *(made.vector(name) for name in ("%yy", "%yyp", "%rr"))
-    stack, slope = made.array("stack"), made.array("slope")
+    stack, jacobian = made.array("stack"), made.array("jacobian")
     missing = made.call("residual", (t, y, yp), stack)
     made.solve_multipliers()
     multipliers, balances = made.array("multipliers"), code.place(stack, shape.coordinates)
     with code.loop(0, shape.rates) as row:
         multiplier = code.load(multipliers, row.index)
-        entries = code.place(slope, code.index("mul", row.index, shape.speeds))
+        entries = code.place(jacobian, code.index("mul", row.index, shape.speeds))
         with code.loop(0, shape.speeds) as speed:
             force = code.number("fmul", code.load(entries, speed.index), multiplier)
             code.store(code.number("fsub", code.load(balances, speed.index), force), balances, speed.index)
@@ -277,7 +277,7 @@ def _residual_text(layout: SundialsLayout, shape: LoopShape) -> str:
     return code.function("define i32 @ida_residual(double %t, ptr %yy, ptr %yyp, ptr %rr, ptr %data) #0")
 
 
-def _jacobian_text(layout: SundialsLayout, shape: LoopShape, sparse: bool) -> str:
+def _jacobian_text(layout: SundialsLayout, shape: NullSpaceShape, sparse: bool) -> str:
     """Write the Jacobian with IDA's signature; it writes every entry of the matrix, and the pattern of a sparse one."""
     made = _Evaluation(layout, shape)
     code = made.code
@@ -341,7 +341,7 @@ def _write_pattern(made: _Evaluation) -> None:
         write(row.index, rows, code.index("add", code.index("mul", column.index, size), row.index))
 
 
-def _weights_text(layout: SundialsLayout, shape: LoopShape) -> str:
+def _weights_text(layout: SundialsLayout, shape: NullSpaceShape) -> str:
     """Write the error weights with IDA's signature.
 
     They are ``1 / (relative |y| + absolute)``.  IDA asks for them before every step; -1, on which it hands over what

@@ -6,7 +6,7 @@ it knows of a problem comes in through pointers, so that it is compiled once and
 
 from __future__ import annotations
 
-from atwood.integrators.dop853.layout import COUNTS, NUMBERS, POINTERS, opening
+from atwood.integrators.dop853.layout import COUNTS, NUMBERS, POINTERS, prologue
 from atwood.integrators.dop853.reference import GROWTH, RETREAT, SAFETY, SHRINKAGE
 from atwood.integrators.dop853.start_code import begin_code
 from atwood.integrators.dop853.stepping_code import ROWS, exact, loop_code
@@ -35,7 +35,7 @@ after{stage}:""")
 def _evaluate() -> str:
     """Return the function that takes a slope: from a row, to a row, and counts it."""
     return f"""define internal i32 @evaluate(ptr %session, double %t, i64 %from, i64 %to) #0 {{
-{opening()}
+{prologue()}
   %i = mul i64 %from, %m
   %o = mul i64 %to, %m
   %y = getelementptr double, ptr %arrays, i64 %i
@@ -46,9 +46,9 @@ def _evaluate() -> str:
   store i64 %raised, ptr %evaluations.at
   %bad = icmp ne i32 %code, 0
   %one = zext i1 %bad to i64
-  %lost = load i64, ptr %missing.at
+  %lost = load i64, ptr %undefined.at
   %more = add i64 %lost, %one
-  store i64 %more, ptr %missing.at
+  store i64 %more, ptr %undefined.at
   ret i32 %code
 }}"""
 
@@ -61,7 +61,7 @@ def _run() -> str:
     """
     return f"""define i32 @run(ptr %session) #0 {{
 entry:
-{opening()}
+{prologue()}
   %stop = load double, ptr %stop.at
   %relative = load double, ptr %relative.at
   %longest = load double, ptr %longest.at
@@ -101,7 +101,7 @@ def _look() -> str:
     """Return the function that tells whether an event may have happened in the last step."""
     return f"""define internal i32 @look(ptr %session, double %t) #0 {{
 entry:
-{opening()}
+{prologue()}
   %watched = load i64, ptr %event_count.at
   %is_watched = icmp sgt i64 %watched, 0
   br i1 %is_watched, label %ask, label %nothing
@@ -256,7 +256,7 @@ def _interpolate() -> str:
     """Return the function that writes values and rates at a time within the last step; 3 where there are none."""
     return f"""define i32 @interpolate(ptr %session, double %time, ptr %y_out, ptr %yp_out) #0 {{
 entry:
-{opening()}
+{prologue()}
   %bytes = mul i64 %n, 8
   %t_new = load double, ptr %t.at
   %t = load double, ptr %t_old.at
@@ -305,7 +305,7 @@ def _sample() -> str:
     """Return the function that goes through output times and fills a table; it ends as `run` does."""
     return f"""define i32 @sample(ptr %session, ptr %times, i64 %wanted, ptr %ys, ptr %yps) #0 {{
 entry:
-{opening()}
+{prologue()}
   br label %next
 next:
   %i = phi i64 [ 0, %entry ], [ %following, %filled ]

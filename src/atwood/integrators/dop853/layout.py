@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["COUNTS", "NUMBERS", "POINTERS", "opening"]
+__all__ = ["COUNTS", "NUMBERS", "POINTERS", "prologue"]
 
 NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first")
 COUNTS = (
@@ -12,7 +12,7 @@ COUNTS = (
     "steps",
     "failures",
     "evaluations",
-    "missing",
+    "undefined",
     "stiff",
     "is_dense",
     "filled",
@@ -29,7 +29,7 @@ def _fields(names: tuple[str, ...], group: str) -> str:
     return "\n".join(f"  %{name}.at = getelementptr i64, ptr %{group}, i64 {k}" for k, name in enumerate(names))
 
 
-def opening() -> str:
+def prologue() -> str:
     """Return the instructions that unpack the pointers of a session, which `%session` points to."""
     lines = []
     for k, name in enumerate(POINTERS):

@@ -167,7 +167,7 @@ class ReferenceStepper:
         except (KernelEvaluationError, ArithmeticError):
             slope = np.full(self._size, np.nan)
         if not isfinite(slope.dot(slope)) and not np.isfinite(slope).all():
-            self._counts.missing += 1
+            self._counts.undefined += 1
         return slope
 
     def _step(self) -> bool:

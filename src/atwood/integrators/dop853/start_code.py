@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood.integrators.dop853.layout import opening
+from atwood.integrators.dop853.layout import prologue
 from atwood.integrators.dop853.stepping_code import ROWS, exact
 
 __all__ = ["begin_code"]
@@ -15,7 +15,7 @@ def begin_code() -> str:
     """
     return f"""define i32 @begin(ptr %session, double %t, ptr %start) #0 {{
 entry:
-{opening()}
+{prologue()}
   store double %t, ptr %t.at
   store double %t, ptr %t_old.at
   store i64 0, ptr %edgy.at

@@ -47,7 +47,7 @@ _ADDRESSES = {
 _CHANGING = {"run", "done", "base"}
 
 
-def _opening() -> str:
+def _prologue() -> str:
     lines = []
     for k, name in enumerate(FIELDS):
         lines.append(f"  %{name}.at = getelementptr i64, ptr %job, i64 {k}")
@@ -65,7 +65,7 @@ def batch_code() -> str:
     """
     return f"""define i32 @batch(ptr %job) #0 {{
 entry:
-{_opening()}
+{_prologue()}
   %bytes = mul i64 %size, 8
   %row = mul i64 %wanted, %size
   %count.bytes = mul i64 %counts, 8

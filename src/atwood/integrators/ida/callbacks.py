@@ -49,7 +49,7 @@ class Record:
 
     Attributes
     ----------
-    missing
+    undefined
         How often there was no finite value.
     complaint, equation, time
         The last of these: in words, in which equation, and when.
@@ -61,7 +61,7 @@ class Record:
         Whether any of the functions is one of Python.
     """
 
-    missing: int = 0
+    undefined: int = 0
     complaint: str = ""
     equation: int | None = None
     time: float = -inf
@@ -71,7 +71,7 @@ class Record:
 
     def note(self, t: float, what: str, equation: int | None = None) -> int:
         """Take up that there was no value, and return the answer to IDA."""
-        self.missing += 1
+        self.undefined += 1
         self.complaint = f"at t = {t:.9g} {what}"
         self.equation = equation
         self.time = t
@@ -305,7 +305,7 @@ def explain(problem: ImplicitProblem, record: Record, states: Iterable[State]) -
     states
         Where to ask; the first answer counts.
     """
-    missing = record.missing
+    undefined = record.undefined
     for t, y, yp in states:
         try:
             values = np.asarray(problem.residual(t, y, yp), dtype=np.float64)
@@ -317,4 +317,4 @@ def explain(problem: ImplicitProblem, record: Record, states: Iterable[State]) -
             equation = int(finite.argmin())
             record.note(t, f"the residual of equation {equation} is {values[equation]}", equation)
             break
-    record.missing = missing
+    record.undefined = undefined

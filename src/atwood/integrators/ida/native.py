@@ -18,7 +18,7 @@ from math import inf
 import numpy as np
 
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.event_location import EventWatch, Root, State
+from atwood.integrators.event_location import EventLocator, Root, State
 from atwood.integrators.ida.callbacks import InterruptLater, Record, explain
 from atwood.integrators.ida.library import available, why_not
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
@@ -27,13 +27,13 @@ from atwood.integrators.ida.setup import IdaTuning, prepare
 from atwood.integrators.ida.states import checked_state, copied, is_finite
 from atwood.integrators.ida.sundae import REASONS
 from atwood.integrators.protocol import (
-    Advance,
     Budget,
     FloatArray,
     ImplicitProblem,
     SolverOptions,
     Statistics,
     Status,
+    StepResult,
     choose_linear_solver,
 )
 
@@ -116,7 +116,7 @@ class NativeSession:
         )
         self._stop_time = None if tuning is None else tuning.stop_time
         self._guard = self._memory.library.sparse_guard if linear_solver == "sparse" else nullcontext()
-        self._watch = EventWatch(problem, options.horizon) if problem.events is not None else None
+        self._locator = EventLocator(problem, options.horizon) if problem.events is not None else None
         # Whether IDA itself can tell in which steps something happens.
         self._finds_events = self._native is not None and self._native.events != 0
         self._no_events = (0,) * problem.event_count
@@ -142,11 +142,11 @@ class NativeSession:
     def statistics(self) -> Statistics:
         """What the session has cost so far, over all its restarts."""
         sums = self._earlier if self._memory.is_closed else self._earlier + self._since_start()
-        counted = self._native.missing_values if self._native is not None else None
+        counted = self._native.undefined_values if self._native is not None else None
         return replace(
             sums,
-            event_evaluations=self._watch.evaluations if self._watch else 0,
-            missing_values=self._record.missing if counted is None else counted(),
+            event_evaluations=self._locator.evaluations if self._locator else 0,
+            undefined_values=self._record.undefined if counted is None else counted(),
             reinitializations=self._starts - 1,
             seconds=self._seconds,
         )
@@ -162,7 +162,7 @@ class NativeSession:
         self._check_open()
         self._restart(checked_state(self._problem.size, t, y, yp))
 
-    def advance(self, t_out: float) -> Advance:
+    def advance(self, t_out: float) -> StepResult:
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
 
         Parameters
@@ -183,7 +183,7 @@ class NativeSession:
         began = time.perf_counter()
         self._opened = self._opened or began
         try:
-            if not self._record.calls_python and (self._watch is None or self._finds_events):
+            if not self._record.calls_python and (self._locator is None or self._finds_events):
                 return self._run(float(t_out))
             with np.errstate(all="ignore"), InterruptLater(self._record):
                 end = self._run(float(t_out))
@@ -215,8 +215,8 @@ class NativeSession:
         """Set all that belongs to a start of IDA."""
         if self._stop_time is not None:
             self._memory.call("IDASetStopTime", self._stop_time)
-        if self._watch is not None:
-            self._watch.restart(state)
+        if self._locator is not None:
+            self._locator.restart(state)
         if self._native is not None and self._native.restart_events is not None:
             self._native.restart_events(state[0])
         self._here = state
@@ -241,16 +241,16 @@ class NativeSession:
             convergence_failures=counts.solve_failures,
         )
 
-    def _run(self, t_out: float) -> Advance:
+    def _run(self, t_out: float) -> StepResult:
         if self._stale:
             self._restart(self._here)
-        by_steps = self.budget.poll is not None or (self._watch is not None and not self._finds_events)
+        by_steps = self.budget.poll is not None or (self._locator is not None and not self._finds_events)
         while True:
             is_known = self._looks_on and not self._searched < t_out <= self._reached
             root = None if is_known else self._find_root()
             if root is not None and root.state[0] <= t_out:
                 self._root, self._here = None, root.state
-                return Advance(*copied(root.state), Status.EVENT, root.events)
+                return StepResult(*copied(root.state), Status.EVENT, root.events)
             if t_out <= self._reached:
                 return self._arrive(t_out)
             if by_steps:
@@ -262,20 +262,20 @@ class NativeSession:
             if failure is not None:
                 return failure
 
-    def _arrive(self, t_out: float) -> Advance:
+    def _arrive(self, t_out: float) -> StepResult:
         if t_out > self._here[0]:
             state = self._interpolate(t_out)
             if not is_finite(state[1], state[2]):
                 self._stale = True
                 return self._stopped(Status.FAILED, "the solution is no longer finite")
             self._here = state
-        return Advance(*copied(self._here), Status.REACHED, self._no_events)
+        return StepResult(*copied(self._here), Status.REACHED, self._no_events)
 
     def _find_root(self) -> Root | None:
         """Return the first root in the part of the last step that has not been handed out."""
-        watch = self._watch
-        if watch is not None and self._root is None and self._searched < self._reached:
-            self._root = watch.search(self._searched, self._reached, self._interpolate)
+        locator = self._locator
+        if locator is not None and self._root is None and self._searched < self._reached:
+            self._root = locator.search(self._searched, self._reached, self._interpolate)
             self._searched = self._root.state[0] if self._root else self._reached
         return self._root
 
@@ -295,7 +295,7 @@ class NativeSession:
     def _steps(self) -> int:
         return self._earlier.steps + self._memory.steps()
 
-    def _exceeded(self) -> Advance | None:
+    def _exceeded(self) -> StepResult | None:
         budget = self.budget
         if budget.poll is not None:
             budget.poll(self._here[0])
@@ -305,7 +305,7 @@ class NativeSession:
             return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
         return None
 
-    def _step(self) -> Advance | None:
+    def _step(self) -> StepResult | None:
         """Take one internal step, and return an answer only if that failed."""
         before = self._reached
         flag, t = self._solve(before + self._horizon, ONE_STEP)
@@ -320,7 +320,7 @@ class NativeSession:
             self._newest = None if self._behind else (t, self._memory.y.copy(), self._memory.yp.copy())
         return failure
 
-    def _stride(self, t_out: float) -> Advance | None:
+    def _stride(self, t_out: float) -> StepResult | None:
         """Take steps until a time is passed or a moment is over, and return an answer only if that failed."""
         pace, allowed = self._pace, self._pace.chunk
         if self.budget.max_steps is not None:
@@ -334,7 +334,7 @@ class NativeSession:
         pace.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
         if flag >= 0:
             self._reached = self._memory.time()
-            if self._watch is not None:
+            if self._locator is not None:
                 # IDA has looked for events: up to where it was sent, or not up to the end of a step that has one.
                 begin = self._memory.begin_of_step()
                 self._searched = max(self._searched, begin if flag == ROOT_RETURN else t)
@@ -372,7 +372,7 @@ class NativeSession:
             self._memory.renew_factors(t, native.last_rate(), native.user_data)
         return changed is not None
 
-    def _judge(self, flag: int, t: float) -> Advance | None:
+    def _judge(self, flag: int, t: float) -> StepResult | None:
         """Return an answer if IDA has failed, or does not get on, after it went to a time."""
         finite = is_finite(self._memory.y, self._memory.yp)
         if flag < 0:
@@ -407,10 +407,10 @@ class NativeSession:
         t, y, yp = self._here
         return [(t + h, y + h * yp, yp) for h in (1e-9 * self._horizon, 1e-6 * self._horizon)]
 
-    def _stopped(self, status: Status, reason: str, since: float = inf) -> Advance:
+    def _stopped(self, status: Status, reason: str, since: float = inf) -> StepResult:
         """Return where the run ended, with a complaint that came after the last good step, or since a time."""
         t, record = self._here[0], self._record
         message, equation = f"{reason} (at t = {t:.9g})", None
         if status is Status.FAILED and record.complaint and record.time >= min(t, since):
             message, equation = f"{message}; {record.complaint}", record.equation
-        return Advance(*copied(self._here), status, self._no_events, message, equation)
+        return StepResult(*copied(self._here), status, self._no_events, message, equation)

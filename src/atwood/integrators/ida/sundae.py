@@ -25,10 +25,9 @@ from typing import Any
 import numpy as np
 
 from atwood.errors import KernelEvaluationError, StartError, UsageError
-from atwood.integrators.event_location import ROUNDING, EventWatch, Root, State
+from atwood.integrators.event_location import ROUNDING, EventLocator, Root, State
 from atwood.integrators.ida.quiet import without_solver_messages
 from atwood.integrators.protocol import (
-    Advance,
     Budget,
     FloatArray,
     ImplicitProblem,
@@ -36,6 +35,7 @@ from atwood.integrators.protocol import (
     SolverOptions,
     Statistics,
     Status,
+    StepResult,
     choose_linear_solver,
 )
 from atwood.late import dataclass
@@ -100,12 +100,12 @@ class _Record:
 
     residuals: int = 0
     jacobians: int = 0
-    missing: int = 0
+    undefined: int = 0
     complaint: str = ""
     equation: int | None = None
 
     def note(self, t: float, what: str, equation: int | None = None) -> None:
-        self.missing += 1
+        self.undefined += 1
         self.complaint = f"at t = {t:.9g} {what}"
         self.equation = equation
 
@@ -137,7 +137,7 @@ class SundaeSession:
         self._horizon = options.horizon
         self._record = _Record()
         self._solver = _create_solver(problem, options, self._record)
-        self._watch = EventWatch(problem, options.horizon) if problem.events is not None else None
+        self._locator = EventLocator(problem, options.horizon) if problem.events is not None else None
         self._no_events = (0,) * problem.event_count
         self._steps = 0
         self._starts = 0
@@ -147,13 +147,13 @@ class SundaeSession:
     @property
     def statistics(self) -> Statistics:
         """What the session has cost so far, over all its restarts."""
-        record, watch = self._record, self._watch
+        record, locator = self._record, self._locator
         return Statistics(
             steps=self._steps,
             residual_evaluations=record.residuals,
             jacobian_evaluations=record.jacobians,
-            event_evaluations=watch.evaluations if watch else 0,
-            missing_values=record.missing,
+            event_evaluations=locator.evaluations if locator else 0,
+            undefined_values=record.undefined,
             reinitializations=self._starts - 1,
             seconds=self._seconds,
         )
@@ -162,7 +162,7 @@ class SundaeSession:
         """Go on from another consistent state, after an event, a change of mode, or a projection."""
         self._set_start(t, y, yp)
 
-    def advance(self, t_out: float) -> Advance:
+    def advance(self, t_out: float) -> StepResult:
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
 
         Parameters
@@ -205,8 +205,8 @@ class SundaeSession:
 
     def _restart(self, state: State) -> None:
         self._solver.init_step(*state)
-        if self._watch is not None:
-            self._watch.restart(state)
+        if self._locator is not None:
+            self._locator.restart(state)
         self._here = self._newest = state
         self._behind = False  # whether IDA last handed out a time before the newest
         self._root: Root | None = None
@@ -215,7 +215,7 @@ class SundaeSession:
         self._stale = False
         self._starts += 1
 
-    def _run(self, t_out: float) -> Advance:
+    def _run(self, t_out: float) -> StepResult:
         if self._stale:
             self._restart(self._here)
         while True:
@@ -224,7 +224,7 @@ class SundaeSession:
                 return self._deliver(root)
             if t_out <= self._newest[0]:
                 self._here = self._interpolate(t_out)
-                return Advance(*_copied(self._here), Status.REACHED, self._no_events)
+                return StepResult(*_copied(self._here), Status.REACHED, self._no_events)
             self._here = self._newest
             limit = self._exceeded()
             if limit is not None:
@@ -235,16 +235,16 @@ class SundaeSession:
 
     def _find_root(self) -> Root | None:
         """Return the first root in the part of the last step that has not been handed out."""
-        watch = self._watch
-        if watch is not None and self._root is None and self._searched < self._newest[0]:
-            self._root = watch.search(self._searched, self._newest[0], self._interpolate)
+        locator = self._locator
+        if locator is not None and self._root is None and self._searched < self._newest[0]:
+            self._root = locator.search(self._searched, self._newest[0], self._interpolate)
             self._searched = self._root.state[0] if self._root else self._newest[0]
         return self._root
 
-    def _deliver(self, root: Root) -> Advance:
+    def _deliver(self, root: Root) -> StepResult:
         self._root = None
         self._here = root.state
-        return Advance(*_copied(root.state), Status.EVENT, root.events)
+        return StepResult(*_copied(root.state), Status.EVENT, root.events)
 
     def _interpolate(self, t: float) -> State:
         if t == self._newest[0]:
@@ -255,7 +255,7 @@ class SundaeSession:
         self._behind = True
         return t, result.y, result.yp
 
-    def _exceeded(self) -> Advance | None:
+    def _exceeded(self) -> StepResult | None:
         budget, t = self.budget, self._here[0]
         if budget.poll is not None:
             budget.poll(t)
@@ -265,7 +265,7 @@ class SundaeSession:
             return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
         return None
 
-    def _step(self) -> Advance | None:
+    def _step(self) -> StepResult | None:
         """Take one internal step, and return an answer only if that failed."""
         t_before = self._newest[0]
         result = self._solver.step(t_before + self._horizon, "onestep", None)
@@ -291,12 +291,12 @@ class SundaeSession:
             return self._stopped(Status.FAILED, "the steps became too small to move the time")
         return None
 
-    def _stopped(self, status: Status, reason: str) -> Advance:
+    def _stopped(self, status: Status, reason: str) -> StepResult:
         t = self._here[0]
         message, equation = f"{reason} (at t = {t:.9g})", None
         if status is Status.FAILED and self._record.complaint:
             message, equation = f"{message}; {self._record.complaint}", self._record.equation
-        return Advance(*_copied(self._here), status, self._no_events, message, equation)
+        return StepResult(*_copied(self._here), status, self._no_events, message, equation)
 
 
 def _copied(state: State) -> State:

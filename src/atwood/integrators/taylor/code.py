@@ -19,7 +19,7 @@ NUMBERS = (
 )
 COUNTS = (
     *("size", "padded", "order", "pair_blocks", "square_blocks", "limit"),
-    *("steps", "failures", "evaluations", "missing", "stiff", "filled"),
+    *("steps", "failures", "evaluations", "undefined", "stiff", "filled"),
 )
 POINTERS = (
     *("start", "prologue", "recurrence"),  # functions
@@ -30,7 +30,7 @@ POINTERS = (
 FUNCTIONS = ("run", "interpolate", "sample", "evaluate")
 
 
-def _opening() -> str:
+def _prologue() -> str:
     """Return the instructions that unpack the pointers of a session."""
     lines = []
     for k, name in enumerate(POINTERS):
@@ -54,15 +54,15 @@ def _evaluate() -> str:
     Where they are found and where they go are the pointers of `from` and `to`.
     """
     return f"""define i32 @evaluate(ptr %session, ptr %from, ptr %to) #0 {{
-{_opening()}
+{_prologue()}
   %code = call i32 %start(ptr %from, ptr %start_derived, ptr %scratch, ptr %to)
   %count = load i64, ptr %evaluations.at
   %raised = add i64 %count, 1
   store i64 %raised, ptr %evaluations.at
   %one = zext i32 %code to i64
-  %lost = load i64, ptr %missing.at
+  %lost = load i64, ptr %undefined.at
   %more = add i64 %lost, %one
-  store i64 %more, ptr %missing.at
+  store i64 %more, ptr %undefined.at
   ret i32 %code
 }}"""
 
@@ -71,7 +71,7 @@ def _expand() -> str:
     """Return the function that finds the coefficients at the state: 0, or 1 where one is not finite."""
     return f"""define internal i32 @expand(ptr %session) #0 {{
 entry:
-{_opening()}
+{_prologue()}
   %last = load double, ptr %last.at
   %moved = fcmp ogt double %last, 0.0
   %unit.old = load double, ptr %unit.at
@@ -96,9 +96,9 @@ attempt:
   br label %order1
 {chr(10).join(_order(k) for k in range(1, HIGHEST))}
 failed:
-  %lost = load i64, ptr %missing.at
+  %lost = load i64, ptr %undefined.at
   %more = add i64 %lost, 1
-  store i64 %more, ptr %missing.at
+  store i64 %more, ptr %undefined.at
   %tried = add i64 %tries, 1
   %given.up = icmp sge i64 %tried, {RETRIES}
   br i1 %given.up, label %none, label %again
@@ -197,7 +197,7 @@ def _choose() -> str:
     lines, largest = _logarithms()
     return f"""define internal double @choose(ptr %session) #0 {{
 entry:
-{_opening()}
+{_prologue()}
   %first = load double, ptr %first.at
   %is.given = fcmp ogt double %first, 0.0
   br i1 %is.given, label %given, label %found
@@ -265,7 +265,7 @@ def _run() -> str:
     """Return the function that takes steps: 0 at the stop time, 1 at the limit of steps, 2 if steps get too small."""
     return f"""define i32 @run(ptr %session) #0 {{
 entry:
-{_opening()}
+{_prologue()}
   %stop = load double, ptr %stop.at
   %stop_time = load double, ptr %stop_time.at
   %allowed = load double, ptr %allowed.at
@@ -323,7 +323,7 @@ def _interpolate() -> str:
     """Return the function that writes values and rates at a time within the last step; 3 where there are none."""
     return f"""define i32 @interpolate(ptr %session, double %time, ptr %y_out, ptr %yp_out) #0 {{
 entry:
-{_opening()}
+{_prologue()}
   %bytes = mul i64 %n, 8
   %t_new = load double, ptr %t.at
 {_row("end.y", "y")}
@@ -356,7 +356,7 @@ def _sample() -> str:
     """Return the function that goes through output times and fills a table; it ends as `run` does."""
     return f"""define i32 @sample(ptr %session, ptr %times, i64 %wanted, ptr %ys, ptr %yps) #0 {{
 entry:
-{_opening()}
+{_prologue()}
   br label %next
 next:
   %i = phi i64 [ 0, %entry ], [ %following, %filled ]

@@ -159,10 +159,10 @@ class ReferenceStepper:
         try:
             rates, known = self._start([t], y)
         except (KernelEvaluationError, ArithmeticError):
-            self._counts.missing += 1
+            self._counts.undefined += 1
             return None
         if not (np.isfinite(rates).all() and np.isfinite(known).all()):
-            self._counts.missing += 1
+            self._counts.undefined += 1
             return None
         return np.array(rates), known
 
@@ -173,7 +173,7 @@ class ReferenceStepper:
             self._unit = unit
             if self._fill():
                 return True
-            self._counts.missing += 1
+            self._counts.undefined += 1
             unit *= SMALLER
         return False
 

@@ -11,7 +11,7 @@ from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.inertia import Masses
 from atwood.mechanics.kinematics.mechanism import CLOSES, Mechanism, decide, extent
 from atwood.model.local.laws import LocalConstraint
-from atwood.topology.forest import Forest
+from atwood.topology.spanning_forest import SpanningForest
 
 __all__ = ["SOLVED", "check_held", "drop_closed", "eliminate_linear"]
 
@@ -19,7 +19,7 @@ __all__ = ["SOLVED", "check_held", "drop_closed", "eliminate_linear"]
 def check_held(
     mechanism: Mechanism,
     masses: Masses,
-    forest: Forest,
+    forest: SpanningForest,
     q: Sequence[Expression],
     values: Values,
     on_velocities: Sequence[tuple[str, LocalConstraint]],
@@ -48,7 +48,7 @@ SOLVED: Expression = _Solved()  # type: ignore[assignment]
 def eliminate_linear(
     mechanism: Mechanism,
     masses: Masses,
-    forest: Forest,
+    forest: SpanningForest,
     q: Sequence[Expression],
     values: Values,
     before: Mapping[Expression, Expression] | None = None,
@@ -60,9 +60,11 @@ def eliminate_linear(
     """
     parameters = mechanism.table.values
     weightless = _weightless(mechanism, masses, forest)
-    charts = {number for chart in forest.charts for number in chart.coordinates}
-    curved = [s for number, s in enumerate(q) if number in charts]
-    flat = [s for number, s in enumerate(q) if number not in charts]
+    orientation_coordinates = {
+        number for orientation in forest.orientation_coordinates for number in orientation.coordinates
+    }
+    curved = [s for number, s in enumerate(q) if number in orientation_coordinates]
+    flat = [s for number, s in enumerate(q) if number not in orientation_coordinates]
     solution = dict(before or {})
     for number, (path, constraint, original) in enumerate(values):
         value = substitute([original], solution)[0]
@@ -101,7 +103,7 @@ def _pivot(coefficients: list[Expression], light: list[bool], mechanism: Mechani
     return max((i for i, size in enumerate(sizes) if size >= 0.1 * largest), key=lambda i: (light[i], i))
 
 
-def _weightless(mechanism: Mechanism, masses: Masses, forest: Forest) -> set[int]:
+def _weightless(mechanism: Mechanism, masses: Masses, forest: SpanningForest) -> set[int]:
     """Return the numbers of the coordinates that only place a body without mass."""
     nodes = {node for one in masses.coupled for node in one.nodes}
     nodes |= {mechanism.graph.node_of[path, one.frame.name] for path, one in masses.varying}

@@ -47,8 +47,10 @@ def integrable_together(mechanism: Mechanism, equations: Equations) -> bool | No
     graph, still = equations.graph, dict.fromkeys(equations.speeds, 0.0)
     fields = _fields(equations)
     forms = np.full((m, n + 1), graph.zero, dtype=object)
-    slopes = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
-    for row, column, entry in zip(slopes.rows, slopes.columns, slopes.entries, strict=True):
+    velocity_jacobian = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
+    for row, column, entry in zip(
+        velocity_jacobian.rows, velocity_jacobian.columns, velocity_jacobian.entries, strict=True
+    ):
         forms[row, column] = entry
     forms[:, n] = substitute([one.rate for one in equations.constraints], still)
     # How forms and fields change along each field, one sweep each.

@@ -48,9 +48,9 @@ class Form:
         The part and its constraint.
     rate
         What stays zero, in terms of coordinates and speeds.
-    slopes
+    coefficients
         The coefficient of each speed.
-    drift
+    explicit_rate
         What does not depend on speeds.
     terms
         What the coefficients are sums of, each with the number of its speed: slope by a connector's velocity times what
@@ -60,14 +60,14 @@ class Form:
     path: str
     constraint: LocalConstraint
     rate: Expression
-    slopes: tuple[Expression, ...]
-    drift: Expression
+    coefficients: tuple[Expression, ...]
+    explicit_rate: Expression
     terms: tuple[tuple[int, Expression], ...] = ()
 
     @property
     def switches(self) -> bool:
         """Whether a coefficient switches with the motion or the clock, so that some places say nothing of others."""
-        return switches((*self.slopes, self.drift))
+        return switches((*self.coefficients, self.explicit_rate))
 
 
 def switches(expressions: Sequence[Expression]) -> bool:
@@ -92,10 +92,10 @@ def pfaffian_forms(state: Movement | Equations, rates: Sequence[tuple[str, Local
     found = []
     for path, one, rate in rates:
         entries = jacobian([rate], list(state.speeds))
-        slopes = [rate.graph.zero] * len(state.speeds)
+        coefficients = [rate.graph.zero] * len(state.speeds)
         for column, entry in zip(entries.columns, entries.entries, strict=True):
-            slopes[column] = entry
-        found.append(Form(path, one, rate, tuple(slopes), substitute([rate], still)[0]))
+            coefficients[column] = entry
+        found.append(Form(path, one, rate, tuple(coefficients), substitute([rate], still)[0]))
     return found
 
 
@@ -142,16 +142,19 @@ class Places:
             numbers *= (1.0, 0.3, 0.1)[attempt % 3]  # far away and near, since some things end somewhere
             for i, one in enumerate(state.names):
                 numbers[i] *= length if one.unit == "m" else 2.0 if one.unit == "rad" else 1.0
-            for chart in state.charts:
-                own = list(chart.coordinates)
+            for orientation in state.orientation_coordinates:
+                own = list(orientation.coordinates)
                 numbers[own] /= np.linalg.norm(numbers[own]) or 1.0
             yield {**dict(zip(state.coordinates, numbers.tolist(), strict=True)), self.time: 0.3 * attempt}
 
     def reference(self) -> dict[Expression, float]:
         """Return a place without turns and displacements."""
         place = dict.fromkeys((*self.state.coordinates, self.time), 0.0)
-        for chart in self.state.charts:
-            place |= {self.state.coordinates[i]: x for i, x in zip(chart.coordinates, chart.reference, strict=True)}
+        for orientation in self.state.orientation_coordinates:
+            place |= {
+                self.state.coordinates[i]: x
+                for i, x in zip(orientation.coordinates, orientation.reference, strict=True)
+            }
         return place
 
 
@@ -166,11 +169,13 @@ def is_idle(mechanism: Mechanism, places: Places, form: Form) -> bool:
         sizes = places.sizes(mechanism)[[number for number, _ in form.terms]]
         return bool(np.max(np.abs(values)) <= _SAME * np.max(np.abs(terms * sizes), initial=0.0))
 
-    return all(c.is_zero for c in (*form.slopes, form.drift)) or (not form.switches and decide(mechanism, how))
+    return all(c.is_zero for c in (*form.coefficients, form.explicit_rate)) or (
+        not form.switches and decide(mechanism, how)
+    )
 
 
 def _scaled(places: Places, form: Form, mechanism: Mechanism) -> FloatArray:
-    return places.values(mechanism, [*form.slopes, form.drift]) * places.sizes(mechanism)
+    return places.values(mechanism, [*form.coefficients, form.explicit_rate]) * places.sizes(mechanism)
 
 
 def constant_pivot(
@@ -204,7 +209,7 @@ def constant_pivot(
     pivot = decide(mechanism, how)
     if pivot is None:
         return None
-    (coefficient,) = _at_reference(mechanism, places, [form.slopes[pivot]])
+    (coefficient,) = _at_reference(mechanism, places, [form.coefficients[pivot]])
     return pivot, coefficient
 
 
@@ -254,9 +259,9 @@ def linear_integrals(mechanism: Mechanism, places: Places, forms: Sequence[Form]
     for number, form in enumerate(forms):
         if form.switches or not decide(mechanism, partial(_is_constant, places, form, own)):
             continue
-        entries = [*form.slopes, form.drift]
+        entries = [*form.coefficients, form.explicit_rate]
         coefficients = _at_reference(mechanism, places, entries)
-        kept = {i: c for i, c in enumerate(coefficients) if (i in own or i == len(form.slopes)) and not c.is_zero}
+        kept = {i: c for i, c in enumerate(coefficients) if (i in own or i == len(form.coefficients)) and not c.is_zero}
         found.append(((number,), kept))
     if found or not together or len(forms) < 2:
         return found
@@ -281,7 +286,7 @@ def _is_constant(places: Places, form: Form, own: Sequence[int], mechanism: Mech
     if pivot is None or not least[pivot] > 1e-6 * float(np.max(np.abs(values))):
         return False
     ratios = values / values[:, pivot : pivot + 1]
-    others = [i for i in range(len(form.slopes)) if i not in set(own)]
+    others = [i for i in range(len(form.coefficients)) if i not in set(own)]
     size = float(np.max(np.abs(ratios)))
     return bool(np.max(np.ptp(ratios, axis=0)) <= _SAME * size and not np.any(np.abs(ratios[:, others]) > _SAME * size))
 

@@ -122,9 +122,14 @@ def _solve_system(
     """Return accelerations and multipliers for a right-hand side: written out if that is short, else in numbers."""
     graph, n, size = rows[0].graph, len(speeds), len(right)
     mass = jacobian(list(rows), list(accelerations))
-    slope = jacobian([one.rate for one in constraints], list(speeds))
+    constraint_jacobian = jacobian([one.rate for one in constraints], list(speeds))
     full = {(r, c): e for r, c, e in zip(mass.rows, mass.columns, mass.entries, strict=True)}
-    slopes = {(n + r, c): e for r, c, e in zip(slope.rows, slope.columns, slope.entries, strict=True)}
+    slopes = {
+        (n + r, c): e
+        for r, c, e in zip(
+            constraint_jacobian.rows, constraint_jacobian.columns, constraint_jacobian.entries, strict=True
+        )
+    }
     upper = {(r, c): e for (r, c), e in full.items() if r <= c} | {(c, r): e for (r, c), e in slopes.items()}
     order = [*range(n), *(i for i in minimum_degree(_after(list(upper), n, size), size) if i >= n)]
     if all((i, i) in full for i in range(n)) and fill_of(list(upper), order) <= _LARGEST_FILL:

@@ -36,7 +36,7 @@ from atwood.mechanics.dynamics.inertia import Masses
 from atwood.mechanics.kinematics.mechanism import Mechanism, decide, extent, from_start
 from atwood.mechanics.kinematics.motion import Motion, Movement
 from atwood.model.local.laws import LocalConstraint
-from atwood.topology.forest import Forest
+from atwood.topology.spanning_forest import SpanningForest
 
 __all__ = ["Taken", "integrated", "take_up", "without_idle_spins"]
 
@@ -69,7 +69,7 @@ def take_up(
     mechanism: Mechanism,
     site: Site,
     masses: Masses,
-    forest: Forest,
+    forest: SpanningForest,
     motion: Motion,
     solution: Mapping[Expression, Expression],
     values: Values,
@@ -168,9 +168,9 @@ def _held_still(
         if alone is None:
             continue
         symbol = state.coordinates[alone]
-        (slope,) = jvp([value], {symbol: 1.0})
+        (gradient,) = jvp([value], {symbol: 1.0})
         is_length = state.names[alone].unit == "m"
-        if not decide(mechanism, partial(_stands_by_itself, places, symbol, slope, is_length)):
+        if not decide(mechanism, partial(_stands_by_itself, places, symbol, gradient, is_length)):
             continue
         constant = mechanism.table.graph.zero  # it shapes the equations, as other zeros do
         if not decide(mechanism, partial(_is_at_zero, symbol, is_length)):
@@ -184,7 +184,7 @@ def _held_still(
 
 
 def _stands_by_itself(
-    places: Places, symbol: Expression, slope: Expression, is_length: bool, mechanism: Mechanism
+    places: Places, symbol: Expression, gradient: Expression, is_length: bool, mechanism: Mechanism
 ) -> bool:
     """Return whether a coordinate starts at a root that stands by itself, of a value with the given slope.
 
@@ -193,7 +193,7 @@ def _stands_by_itself(
     assert mechanism.places is not None
     start = {**places.some(mechanism), **mechanism.table.values, **mechanism.places["reduced"]}
     step = 0.5 * _unit(mechanism, is_length)
-    near, away = (evaluate([slope], {**start, symbol: start[symbol] + far})[0] for far in (0.0, step))
+    near, away = (evaluate([gradient], {**start, symbol: start[symbol] + far})[0] for far in (0.0, step))
     return abs(near) > 1e-3 * abs(away)
 
 
@@ -234,9 +234,9 @@ def _forms(mechanism: Mechanism, site: Site, state: Movement, rolling: OnVelocit
         mapping = local_map(site, local, state.kinematics)
         (form,) = pfaffian_forms(state, [(path, one, put_in_place(one.value, mapping))])
         velocities = local.velocities
-        slopes = substitute(vjp([one.value], [one.value.graph.constant(1.0)], velocities), mapping)
+        gradients = substitute(vjp([one.value], [one.value.graph.constant(1.0)], velocities), mapping)
         moved = jacobian([mapping.get(s, s) for s in velocities], list(state.speeds))
-        terms = tuple((c, slopes[r] * e) for r, c, e in zip(moved.rows, moved.columns, moved.entries, strict=True))
+        terms = tuple((c, gradients[r] * e) for r, c, e in zip(moved.rows, moved.columns, moved.entries, strict=True))
         forms.append(replace(form, terms=terms))
     return forms
 

@@ -13,10 +13,10 @@ from atwood.mechanics.dynamics.forces import (
     in_body,
     in_coordinates,
     is_on_velocities,
-    joint_slopes,
+    joint_gradients,
+    local_gradients,
     local_map,
     rate_symbol,
-    slopes_of,
 )
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.motion import Movement
@@ -24,7 +24,7 @@ from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.mechanics.kinematics.positions import Kinematics, Placements
 from atwood.model.local.laws import LocalConstraint, LocalPart
 from atwood.model.values.vector import Vector, cross
-from atwood.topology.forest import Forest
+from atwood.topology.spanning_forest import SpanningForest
 
 __all__ = [
     "LeftOver",
@@ -66,7 +66,7 @@ def holds_velocities(mechanism: Mechanism) -> bool:
     return False
 
 
-def find_constraints(mechanism: Mechanism, forest: Forest, placements: Placements) -> LeftOver:
+def find_constraints(mechanism: Mechanism, forest: SpanningForest, placements: Placements) -> LeftOver:
     """Return the constraints that hold only if somebody sees to it, in joint coordinates where these are known.
 
     Raises
@@ -120,7 +120,7 @@ def levels(
     rates, seconds = constraint_levels([] if by_parts else placed, mechanism.time, *symbols)
     for number, ((path, one, multiplier), value) in enumerate(zip(chosen, placed, strict=True)):
         if by_parts:
-            rate = _rate_by_slopes(site, mechanism.locals_[path], one, state.kinematics, mechanism.time)
+            rate = _rate_by_gradients(site, mechanism.locals_[path], one, state.kinematics, mechanism.time)
             second = _differentiated_twice(site, mechanism.locals_[path], one, state.kinematics, mechanism.time)
         else:
             rate, second = rates[number], seconds[number]
@@ -160,8 +160,8 @@ def velocity_levels(
 
 def _check_affine(path: str, local: LocalPart, one: LocalConstraint) -> None:
     velocities = [s for connector in local.connectors.values() for s in (*connector.velocity, *connector.spin)]
-    slopes = [slope for velocity in velocities for slope in jvp([one.value], {velocity: 1.0})]
-    if any(depends_on(slope, velocities) for slope in slopes):
+    gradients = [gradient for velocity in velocities for gradient in jvp([one.value], {velocity: 1.0})]
+    if any(depends_on(gradient, velocities) for gradient in gradients):
         raise UnsupportedError(
             "a constraint on velocities must be linear in them",
             where=f"{path}.{one.law.name}",
@@ -169,23 +169,23 @@ def _check_affine(path: str, local: LocalPart, one: LocalConstraint) -> None:
         )
 
 
-def _rate_by_slopes(
+def _rate_by_gradients(
     site: Site, local: LocalPart, one: LocalConstraint, kinematics: Kinematics, time: Expression
 ) -> Expression:
     """Return the rate of a constraint: the virtual power of its force for a multiplier of one, and what time adds."""
     graph, mapping = site.graph, local_map(site, local, kinematics)
     (total,) = substitute(jvp([one.value], {time: 1.0}), mapping)
-    for name, slopes, turning in slopes_of(local, one.value, graph.constant(1.0)):
+    for name, gradients, torques in local_gradients(local, one.value, graph.constant(1.0)):
         node = site.node(local.part.path, name)
         body = site.bodies.body_of[node]
-        for slope, v in zip(substitute(slopes, mapping), kinematics.velocities[node], strict=True):
-            total = total + slope * v
-        if turning and not all(slope.is_zero for slope in turning):
-            torque = in_body(site, node, substitute(turning, mapping))
+        for gradient, v in zip(substitute(gradients, mapping), kinematics.velocities[node], strict=True):
+            total = total + gradient * v
+        if torques and not all(gradient.is_zero for gradient in torques):
+            torque = in_body(site, node, substitute(torques, mapping))
             for t, w in zip(torque, kinematics.angular_velocities[body], strict=True):
                 total = total + t * w
-    for symbol, slope in joint_slopes(local, one.value):
-        total = total + substitute([slope], mapping)[0] * kinematics.joint_rates[symbol]
+    for symbol, gradient in joint_gradients(local, one.value):
+        total = total + substitute([gradient], mapping)[0] * kinematics.joint_rates[symbol]
     return total
 
 

@@ -13,14 +13,14 @@ from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.forces import Forces, Site, constraint_forces, local_map, part_forces
 from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
-from atwood.mechanics.kinematics.body_points import arm_of
+from atwood.mechanics.kinematics.body_points import body_point_of
 from atwood.mechanics.kinematics.orientation import inertial_torque, torque_components
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.laws import LocalConstraint, LocalPart
 from atwood.model.values.vector import cross
-from atwood.topology.charts import Chart
-from atwood.topology.forest import Coordinate, Forest
+from atwood.topology.orientation_coordinates import OrientationCoordinates
+from atwood.topology.spanning_forest import Coordinate, SpanningForest
 
 __all__ = ["Constraint", "Equations", "Integral", "balance_rows", "inertia_forces"]
 
@@ -125,7 +125,7 @@ class Equations:
         Coordinates that linear constraints gave as functions of the others, by name.
     prescribed
         Constraints that no coordinate can change and that depend on time, with their residuals.
-    charts
+    orientation_coordinates
         Groups of coordinates that stand for an orientation together.
     solved_speeds
         Speeds that constraints on velocities gave as functions of the others, by name.
@@ -138,7 +138,7 @@ class Equations:
     """
 
     graph: Graph
-    forest: Forest
+    forest: SpanningForest
     site: Site
     locals_: Mapping[str, LocalPart]
     masses: Masses
@@ -156,7 +156,7 @@ class Equations:
     constraints: tuple[Constraint, ...]
     eliminated: tuple[str, ...]
     prescribed: tuple[tuple[tuple[str, str, int], Expression], ...]
-    charts: tuple[Chart, ...] = ()
+    orientation_coordinates: tuple[OrientationCoordinates, ...] = ()
     solved_speeds: tuple[str, ...] = ()
     integrals: tuple[Integral, ...] = ()
     read: Mapping[Expression, Expression] = field(default_factory=dict)
@@ -229,7 +229,7 @@ def push_body(
     space = site.space
     node = site.node(path, body.frame.name)
     index, turn = site.bodies.body_of[node], site.node_turns[node]
-    arm = arm_of(kinematics, index, turn, body.center_of_mass, space)
+    arm = body_point_of(kinematics, index, turn, body.center_of_mass, space)
     parts = zip(falling[0], arm.acceleration, falling[1], strict=True)
     force = [site.graph.convert(-body.mass * (a + swing - g)) for a, swing, g in parts]
     forces.push(node, force)
@@ -243,8 +243,8 @@ def push_body(
         forces.twist(index, about_node, node)
         return
     moment = turned_tensor(tensor_of(path, body), turn) if space.name == "space" else body.moment
-    turning = inertial_torque(moment, spins[0], spins[1])
-    forces.twist(index, [t - i for t, i in zip(about_node, turning, strict=True)], node)
+    euler_torque = inertial_torque(moment, spins[0], spins[1])
+    forces.twist(index, [t - i for t, i in zip(about_node, euler_torque, strict=True)], node)
 
 
 def balance_rows(

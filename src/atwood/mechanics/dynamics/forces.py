@@ -195,11 +195,11 @@ def _add_gradient(
     for function in functions:
         for symbol in hung:
             moved = rate_symbol(symbol) if of_velocities else symbol
-            (slope,) = vjp([function], [site.graph.constant(-1.0)], [moved])
-            if not slope.is_zero:
-                forces.push_joint(symbol, substitute([slope], mapping)[0])
-        for name, slopes, turning in slopes_of(local, function, site.graph.constant(-1.0), of_velocities):
-            _push_mapped(site, local, name, slopes, turning, mapping, forces)
+            (gradient,) = vjp([function], [site.graph.constant(-1.0)], [moved])
+            if not gradient.is_zero:
+                forces.push_joint(symbol, substitute([gradient], mapping)[0])
+        for name, gradients, torques in local_gradients(local, function, site.graph.constant(-1.0), of_velocities):
+            _push_mapped(site, local, name, gradients, torques, mapping, forces)
 
 
 def _add_lagrangians(
@@ -216,21 +216,21 @@ def _add_lagrangians(
     there = {**mapping, **placed}
     for function in functions:
         for symbol in hung:
-            slope, momentum = vjp([function], [one], [symbol, rate_symbol(symbol)])
-            force = slope - jvp([momentum], along)[0]
+            gradient, momentum = vjp([function], [one], [symbol, rate_symbol(symbol)])
+            force = gradient - jvp([momentum], along)[0]
             if not force.is_zero:
                 forces.push_joint(symbol, substitute([force], there)[0])
         momenta = iter(vjp([function], [one], local.velocities))
-        for name, slopes, turning in slopes_of(local, function, one):
+        for name, gradients, torques in local_gradients(local, function, one):
             symbols = local.connectors[name]
             linear, angular = [next(momenta) for _ in symbols.velocity], [next(momenta) for _ in symbols.spin]
-            slopes = [s - r for s, r in zip(slopes, jvp(linear, along), strict=True)]
+            gradients = [s - r for s, r in zip(gradients, jvp(linear, along), strict=True)]
             rates = jvp(angular, along) if angular else []
             if symbols.axes is not None and symbols.angular_velocity is not None:
                 turned = cross(symbols.angular_velocity, Vector(*angular)) - Vector(*rates)
                 rates = [-one for one in _along(symbols.axes, [graph.convert(c) for c in turned])]
-            turning = [s - r for s, r in zip(turning, rates, strict=True)]
-            _push_mapped(site, local, name, slopes, turning, there, forces)
+            torques = [s - r for s, r in zip(torques, rates, strict=True)]
+            _push_mapped(site, local, name, gradients, torques, there, forces)
 
 
 def _rates_of_symbols(
@@ -263,7 +263,7 @@ def _rates_of_symbols(
     return along, placed
 
 
-def slopes_of(
+def local_gradients(
     local: LocalPart, function: Expression, factor: Expression, of_velocities: bool = False
 ) -> list[tuple[str, list[Expression], list[Expression]]]:
     """Return, for each connector, force and torque of a function: its derivatives times a factor, in one reverse sweep.
@@ -288,46 +288,46 @@ def slopes_of(
     wanted: list[Expression] = []
     for symbols in local.connectors.values():
         wanted += [*symbols.velocity, *symbols.spin] if of_velocities else [*symbols.position, *symbols.orientation]
-    slopes = iter(vjp([function], [factor], wanted))
+    gradients = iter(vjp([function], [factor], wanted))
     found = []
     for name, symbols in local.connectors.items():
-        force = [next(slopes) for _ in symbols.position]
-        turning = [next(slopes) for _ in (symbols.spin if of_velocities else symbols.orientation)]
+        force = [next(gradients) for _ in symbols.position]
+        torques = [next(gradients) for _ in (symbols.spin if of_velocities else symbols.orientation)]
         if symbols.axes is not None:
-            turning = _torque_of_axes(symbols.axes, turning) if not of_velocities else _along(symbols.axes, turning)
-        found.append((name, force, turning))
+            torques = _torque_of_axes(symbols.axes, torques) if not of_velocities else _along(symbols.axes, torques)
+        found.append((name, force, torques))
     return found
 
 
-def _torque_of_axes(axes: Axes, slopes: Sequence[Expression]) -> list[Expression]:
+def _torque_of_axes(axes: Axes, gradients: Sequence[Expression]) -> list[Expression]:
     """Return the torque along the axes of a frame from derivatives with respect to the components of its axes.
 
     Turning by a small angle about x moves y along z and z against y; so its virtual work is ``g_y . z - g_z . y``.
     """
     x, y, z = axes
-    gx, gy, gz = (Vector(*slopes[3 * i : 3 * i + 3]) for i in range(3))
+    gx, gy, gz = (Vector(*gradients[3 * i : 3 * i + 3]) for i in range(3))
     return [dot(gy, z) - dot(gz, y), dot(gz, x) - dot(gx, z), dot(gx, y) - dot(gy, x)]
 
 
-def _along(axes: Axes, slopes: Sequence[Expression]) -> list[Expression]:
+def _along(axes: Axes, gradients: Sequence[Expression]) -> list[Expression]:
     """Return the components of a torque in world axes along the axes of a frame."""
-    return [dot(axis, Vector(*slopes)) for axis in axes]
+    return [dot(axis, Vector(*gradients)) for axis in axes]
 
 
 def _push_mapped(
     site: Site,
     local: LocalPart,
     name: str,
-    slopes: list[Expression],
-    turning: list[Expression],
+    gradients: list[Expression],
+    torques: list[Expression],
     mapping: Mapping[Expression, Expression],
     forces: Forces,
 ) -> None:
     path, node = local.part.path, site.node(local.part.path, name)
-    if not all(slope.is_zero for slope in slopes):
-        forces.push(node, substitute(slopes, mapping))
-    if not all(slope.is_zero for slope in turning):
-        forces.twist(site.body(path, name), in_body(site, node, substitute(turning, mapping)), node)
+    if not all(gradient.is_zero for gradient in gradients):
+        forces.push(node, substitute(gradients, mapping))
+    if not all(gradient.is_zero for gradient in torques):
+        forces.twist(site.body(path, name), in_body(site, node, substitute(torques, mapping)), node)
 
 
 def in_body(site: Site, node: int, torque: Sequence[Expression]) -> list[Scalar]:
@@ -347,14 +347,17 @@ def constraint_forces(
     """Add the forces of a constraint: its multiplier times its derivatives (Goldstein, section 2.4)."""
     # The derivatives first, and then times the multiplier: so both sets of multipliers and the rate share them.
     of_velocities = is_on_velocities(local, value)
-    for name, slopes, turning in slopes_of(local, value, site.graph.constant(1.0), of_velocities):
-        pushes, twists = [slope * multiplier for slope in slopes], [slope * multiplier for slope in turning]
+    for name, gradients, torques in local_gradients(local, value, site.graph.constant(1.0), of_velocities):
+        pushes, twists = (
+            [gradient * multiplier for gradient in gradients],
+            [gradient * multiplier for gradient in torques],
+        )
         _push_mapped(site, local, name, pushes, twists, mapping, forces)
-    for symbol, slope in joint_slopes(local, value):
-        forces.push_joint(symbol, substitute([slope * multiplier], mapping)[0])
+    for symbol, gradient in joint_gradients(local, value):
+        forces.push_joint(symbol, substitute([gradient * multiplier], mapping)[0])
 
 
-def joint_slopes(local: LocalPart, value: Expression) -> list[tuple[Expression, Expression]]:
+def joint_gradients(local: LocalPart, value: Expression) -> list[tuple[Expression, Expression]]:
     """Return the derivatives of a function with respect to the joint coordinates that it depends on."""
     if not local.formulas or not depends_on(value, list(local.formulas)):
         return []

@@ -10,11 +10,11 @@ from atwood.model.values.rotation import from_axes
 from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector, cross
 
-__all__ = ["Arm", "arm_of"]
+__all__ = ["BodyPoint", "body_point_of"]
 
 
 @dataclass(frozen=True)
-class Arm:
+class BodyPoint:
     """An arm that a body carries, along the free components in world axes.
 
     Attributes
@@ -30,7 +30,7 @@ class Arm:
     acceleration: tuple[Scalar, ...]
 
 
-def arm_of(kinematics: Kinematics, body: int, turn: NodeTurn, vector: Vector, space: Space) -> Arm:
+def body_point_of(kinematics: Kinematics, body: int, turn: NodeTurn, vector: Vector, space: Space) -> BodyPoint:
     """Return an arm that is given in the axes of a node.
 
     Parameters
@@ -55,21 +55,21 @@ def arm_of(kinematics: Kinematics, body: int, turn: NodeTurn, vector: Vector, sp
     arm = space.components(vector if axes is None else from_axes(axes, vector))
     still = (0.0,) * len(arm)
     if space.name == "line" or not spin:
-        return Arm(arm, still, still)
+        return BodyPoint(arm, still, still)
     w, alpha = spin[0], spin_rate[0]
     velocity = (-w * arm[1], w * arm[0])
     acceleration = (-alpha * arm[1] - w * w * arm[0], alpha * arm[0] - w * w * arm[1])
-    return Arm(arm, velocity, acceleration)
+    return BodyPoint(arm, velocity, acceleration)
 
 
 def _arm_in_space(
     kinematics: Kinematics, body: int, turn: NodeTurn, vector: Vector, spin: Components, spin_rate: Components
-) -> Arm:
+) -> BodyPoint:
     axes = kinematics.placements.axes.get(body)
     if axes is None:
-        return Arm(tuple(vector), (0.0,) * 3, (0.0,) * 3)
+        return BodyPoint(tuple(vector), (0.0,) * 3, (0.0,) * 3)
     arm = rotate(vector, turn)
     w, alpha = Vector(*spin), Vector(*spin_rate)
     velocity = cross(w, arm)
     acceleration = cross(alpha, arm) + cross(w, velocity)
-    return Arm(*(tuple(from_axes(axes, one)) for one in (arm, velocity, acceleration)))
+    return BodyPoint(*(tuple(from_axes(axes, one)) for one in (arm, velocity, acceleration)))

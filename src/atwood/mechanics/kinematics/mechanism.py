@@ -45,7 +45,7 @@ class Mechanism:
         Parts, nodes and bodies.
     links
         For each linked input, the output that feeds it.
-    sides
+    line_signs
         On a line, the signs of lengths as the start values tell them; None elsewhere, and where they were given.
     decisions
         What shaped the equations by the size of numbers: how each was decided, and how it came out.
@@ -69,7 +69,7 @@ class Mechanism:
     graph: MechanismGraph
     bodies: Bodies
     links: Mapping[tuple[str, str], tuple[str, str]]
-    sides: Mapping[tuple[str, str, str], float] | None = None
+    line_signs: Mapping[tuple[str, str, str], float] | None = None
     decisions: list[tuple[Callable[[Mechanism], object], object]] = field(default_factory=list)
     places: Mapping[str, Mapping[Expression, float]] | None = None
     constants: dict[Expression, tuple[str, Expression]] = field(default_factory=dict)

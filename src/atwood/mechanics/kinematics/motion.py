@@ -9,7 +9,7 @@ from typing import Protocol
 from atwood.expr import Expression, jvp, substitute
 from atwood.late import dataclass
 from atwood.mechanics.kinematics.mechanism import Mechanism
-from atwood.mechanics.kinematics.orientation_coordinates import chart_rates
+from atwood.mechanics.kinematics.orientation_coordinates import orientation_rates
 from atwood.mechanics.kinematics.positions import (
     BodyShape,
     Components,
@@ -20,8 +20,8 @@ from atwood.mechanics.kinematics.positions import (
     place,
 )
 from atwood.mechanics.kinematics.spatial import Course, move_in_space
-from atwood.topology.charts import Chart
-from atwood.topology.forest import Coordinate, Forest
+from atwood.topology.orientation_coordinates import OrientationCoordinates
+from atwood.topology.spanning_forest import Coordinate, SpanningForest
 
 __all__ = ["Motion", "Movement", "motion_in_plane", "motion_in_space"]
 
@@ -44,7 +44,7 @@ class Movement:
         Names and units of coordinates and speeds.
     rates
         Derivatives of the coordinates.
-    charts
+    orientation_coordinates
         Coordinates that stand for an orientation together.
     kinematics
         Positions, velocities, accelerations.
@@ -58,7 +58,7 @@ class Movement:
     names: tuple[Coordinate, ...]
     speed_names: tuple[Coordinate, ...]
     rates: tuple[Expression, ...]
-    charts: tuple[Chart, ...]
+    orientation_coordinates: tuple[OrientationCoordinates, ...]
     kinematics: Kinematics
     lifted: Lifted
 
@@ -100,14 +100,14 @@ class _Symbols:
     names: tuple[Coordinate, ...]
     speed_names: tuple[Coordinate, ...]
     rates: tuple[Expression, ...]
-    charts: tuple[Chart, ...]
+    orientation_coordinates: tuple[OrientationCoordinates, ...]
 
 
-def _all_symbols(mechanism: Mechanism, forest: Forest) -> tuple[Expression, ...]:
+def _all_symbols(mechanism: Mechanism, forest: SpanningForest) -> tuple[Expression, ...]:
     return tuple(mechanism.table.graph.symbol(f"q:{c.name}") for c in forest.coordinates)
 
 
-def _left(mechanism: Mechanism, forest: Forest, solution: Solution, solved: Solution = _NONE) -> _Symbols:
+def _left(mechanism: Mechanism, forest: SpanningForest, solution: Solution, solved: Solution = _NONE) -> _Symbols:
     """Return the symbols that a solution for coordinates leaves, and one for speeds."""
     graph = mechanism.table.graph
     every = _all_symbols(mechanism, forest)
@@ -118,20 +118,22 @@ def _left(mechanism: Mechanism, forest: Forest, solution: Solution, solved: Solu
     stems = [forest.speeds[i].name.removesuffix("'") for i in kept_speeds]
     u = tuple(graph.symbol(f"u:{stem}") for stem in stems)
     a = tuple(graph.symbol(f"a:{stem}") for stem in stems)
-    charts = tuple(
+    orientation_coordinates = tuple(
         replace(
             one,
             coordinates=tuple(kept.index(i) for i in one.coordinates),
             speeds=tuple(kept_speeds.index(i) for i in one.speeds if i in kept_speeds),
         )
-        for one in forest.charts
+        for one in forest.orientation_coordinates
     )
     q = tuple(every[i] for i in kept)
     rates: dict[int, Expression] = {}
-    for chart, one in zip(charts, forest.charts, strict=True):
+    for orientation, one in zip(orientation_coordinates, forest.orientation_coordinates, strict=True):
         spin = [graph.symbol(f"u:{forest.speeds[i].name}") for i in one.speeds]
-        parts = chart_rates(chart, [q[i] for i in chart.coordinates], [solved.get(speed, speed) for speed in spin])
-        rates.update(zip(chart.coordinates, (graph.convert(part) for part in parts), strict=True))
+        parts = orientation_rates(
+            orientation, [q[i] for i in orientation.coordinates], [solved.get(speed, speed) for speed in spin]
+        )
+        rates.update(zip(orientation.coordinates, (graph.convert(part) for part in parts), strict=True))
     own = [graph.symbol(f"u:{forest.coordinates[i].name}") for i in kept]
     return _Symbols(
         q,
@@ -140,7 +142,7 @@ def _left(mechanism: Mechanism, forest: Forest, solution: Solution, solved: Solu
         tuple(forest.coordinates[i] for i in kept),
         tuple(forest.speeds[i] for i in kept_speeds),
         tuple(rates[i] if i in rates else solved.get(speed, speed) for i, speed in enumerate(own)),
-        charts,
+        orientation_coordinates,
     )
 
 
@@ -152,13 +154,13 @@ def _moved(left: _Symbols, kinematics: Kinematics, lifted: Lifted) -> Movement:
         left.names,
         left.speed_names,
         left.rates,
-        left.charts,
+        left.orientation_coordinates,
         kinematics,
         lifted,
     )
 
 
-def motion_in_plane(mechanism: Mechanism, forest: Forest, shape_of: Mapping[int, BodyShape]) -> Motion:
+def motion_in_plane(mechanism: Mechanism, forest: SpanningForest, shape_of: Mapping[int, BodyShape]) -> Motion:
     """Return the motion of a mechanism on a line or in a plane.
 
     Parameters
@@ -178,7 +180,7 @@ def motion_in_plane(mechanism: Mechanism, forest: Forest, shape_of: Mapping[int,
         q, u, a, time = left.coordinates, left.speeds, left.accelerations, mechanism.time
         still = _substituted(placements, solution) if solution else placements
         lifting = _substituted(movable, solution) if solution else movable
-        kinematics = _with_grips(mechanism, differentiate(still, time, q, u, a), time, q, u, a)
+        kinematics = _with_joint_references(mechanism, differentiate(still, time, q, u, a), time, q, u, a)
         return _moved(
             left,
             kinematics,
@@ -188,7 +190,7 @@ def motion_in_plane(mechanism: Mechanism, forest: Forest, shape_of: Mapping[int,
     return Motion(every, placements, finish)
 
 
-def _with_grips(
+def _with_joint_references(
     mechanism: Mechanism,
     kinematics: Kinematics,
     time: Expression,
@@ -211,7 +213,7 @@ def _with_grips(
     )
 
 
-def motion_in_space(mechanism: Mechanism, forest: Forest, shape_of: Mapping[int, BodyShape]) -> Motion:
+def motion_in_space(mechanism: Mechanism, forest: SpanningForest, shape_of: Mapping[int, BodyShape]) -> Motion:
     """Return the motion of a mechanism in space.
 
     Parameters

@@ -20,9 +20,16 @@ from atwood.mechanics.kinematics.orientation import (
 )
 from atwood.model.values.rotation import IDENTITY, Axes, Rotation, Turn, compose, from_axes, to_axes
 from atwood.model.values.vector import Vector, cross, dot
-from atwood.topology.charts import Chart
+from atwood.topology.orientation_coordinates import OrientationCoordinates
 
-__all__ = ["BASES", "chart_axes", "chart_margin", "chart_quaternion", "chart_rates", "euler_spin"]
+__all__ = [
+    "BASES",
+    "euler_spin",
+    "orientation_axes",
+    "orientation_margin",
+    "orientation_quaternion",
+    "orientation_rates",
+]
 
 BASES: tuple[Axes, Axes] = (IDENTITY, (IDENTITY[1], IDENTITY[2], IDENTITY[0]))
 """Axes that Euler angles are measured from, in the world's."""
@@ -42,64 +49,66 @@ _TERMS = 16
 """Of the series for the rotation vector: exact to rounding up to one full turn."""
 
 
-def chart_axes(chart: Chart, values: Sequence[Expression]) -> Axes:
+def orientation_axes(orientation: OrientationCoordinates, values: Sequence[Expression]) -> Axes:
     """Return the axes of a body in the world's.
 
     Parameters
     ----------
-    chart
+    orientation
         The chart.
     values
         Its coordinates.
     """
-    if chart.kind == "quaternion":
+    if orientation.kind == "quaternion":
         return quaternion_axes(values)
-    if chart.kind.startswith("euler-"):
-        return compose(BASES[chart.base], _turns(chart, values).axes())
-    quaternion = chart_quaternion(chart, values)
-    if chart.kind == "rodrigues":
+    if orientation.kind.startswith("euler-"):
+        return compose(BASES[orientation.base], _turns(orientation, values).axes())
+    quaternion = orientation_quaternion(orientation, values)
+    if orientation.kind == "rodrigues":
         size = 1.0 + _square(values)
         return quaternion_axes(quaternion, size * size)
     return quaternion_axes(quaternion, 1.0)
 
 
-def chart_quaternion(chart: Chart, values: Sequence[Expression]) -> Quaternion:
+def orientation_quaternion(orientation: OrientationCoordinates, values: Sequence[Expression]) -> Quaternion:
     """Return the quaternion of a body, of any size, scalar part first.
 
     Parameters
     ----------
-    chart, values
-        See `chart_axes`.
+    orientation, values
+        See `orientation_axes`.
     """
-    if chart.kind == "quaternion":
+    if orientation.kind == "quaternion":
         w, x, y, z = values
         return w, x, y, z
-    if chart.kind.startswith("euler-"):
-        return quaternion_product(_BASE_QUATERNIONS[chart.base], rotation_quaternion(_turns(chart, values)))
+    if orientation.kind.startswith("euler-"):
+        return quaternion_product(_BASE_QUATERNIONS[orientation.base], rotation_quaternion(_turns(orientation, values)))
     x, y, z = values
-    if chart.kind == "rodrigues":
+    if orientation.kind == "rodrigues":
         return 1.0 - _square(values), 2.0 * x, 2.0 * y, 2.0 * z
     sine, rest, half = _half_angle(values)
     by = 0.5 * sine
     return sine - half * rest, by * x, by * y, by * z
 
 
-def chart_rates(chart: Chart, values: Sequence[Expression], spin: Sequence[Expression]) -> list[Scalar]:
+def orientation_rates(
+    orientation: OrientationCoordinates, values: Sequence[Expression], spin: Sequence[Expression]
+) -> list[Scalar]:
     """Return the derivatives of a chart's coordinates.
 
     Parameters
     ----------
-    chart, values
-        See `chart_axes`.
+    orientation, values
+        See `orientation_axes`.
     spin
         Angular velocity in the axes of the body, rad/s.
     """
-    if chart.kind == "quaternion":
+    if orientation.kind == "quaternion":
         return quaternion_rates(values, spin)
-    if chart.kind.startswith("euler-"):
-        return _euler_rates(chart, values, Vector(*spin))
+    if orientation.kind.startswith("euler-"):
+        return _euler_rates(orientation, values, Vector(*spin))
     place, omega = Vector(*values), Vector(*spin)
-    if chart.kind == "rodrigues":
+    if orientation.kind == "rodrigues":
         # 1/4 [(1 - p^2) omega + 2 p x omega + 2 p (p . omega)] (Schaub and Junkins, section 3.6)
         lean = 0.25 * (1.0 - _square(values))
         along = 0.5 * dot(place, omega)
@@ -110,22 +119,22 @@ def chart_rates(chart: Chart, values: Sequence[Expression], spin: Sequence[Expre
     return list(omega + across * 0.5 + cross(place, across) * (0.25 * rest / sine))
 
 
-def chart_margin(chart: Chart, values: Sequence[Expression]) -> Expression | None:
+def orientation_margin(orientation: OrientationCoordinates, values: Sequence[Expression]) -> Expression | None:
     """Return what rises through zero where a chart is to be left; None if it is regular everywhere.
 
     Parameters
     ----------
-    chart, values
-        See `chart_axes`.
+    orientation, values
+        See `orientation_axes`.
     """
-    if chart.is_homogeneous:
+    if orientation.is_homogeneous:
         return None
-    if chart.kind == "rodrigues":
+    if orientation.kind == "rodrigues":
         return _square(values) - FARTHEST_RODRIGUES
-    if chart.kind == "rotation-vector":
+    if orientation.kind == "rotation-vector":
         return _square(values) - FARTHEST_ROTATION**2
-    first, _, third = chart.turns
-    along = values[1].graph.convert(_turns(chart, values).axes()[third][first])
+    first, _, third = orientation.turns
+    along = values[1].graph.convert(_turns(orientation, values).axes()[third][first])
     return along * along - FARTHEST_COSINE**2
 
 
@@ -153,18 +162,18 @@ def _series(coefficients: Sequence[float], x: Expression) -> Expression:
     return total
 
 
-def _turns(chart: Chart, values: Sequence[Expression]) -> Rotation:
-    return Rotation(tuple(Turn(IDENTITY[axis], angle) for axis, angle in zip(chart.turns, values, strict=True)))
+def _turns(orientation: OrientationCoordinates, values: Sequence[Expression]) -> Rotation:
+    return Rotation(tuple(Turn(IDENTITY[axis], angle) for axis, angle in zip(orientation.turns, values, strict=True)))
 
 
-def _euler_rates(chart: Chart, values: Sequence[Expression], spin: Vector) -> list[Scalar]:
+def _euler_rates(orientation: OrientationCoordinates, values: Sequence[Expression], spin: Vector) -> list[Scalar]:
     """Return the rates of Euler angles: the angular velocity seen before the third turn is solved for them.
 
     There it is ``phi' a + theta' e_j + psi' e_k`` with a the first axis, seen from behind the second turn (Goldstein,
     section 4.9).
     """
-    first, second, third = chart.turns
-    turns = _turns(chart, values).turns
+    first, second, third = orientation.turns
+    turns = _turns(orientation, values).turns
     before = from_axes(turns[2].axes(), spin)
     axis = to_axes(turns[1].axes(), IDENTITY[first])
     across = 3 - second - third
@@ -172,17 +181,19 @@ def _euler_rates(chart: Chart, values: Sequence[Expression], spin: Vector) -> li
     return [phi_rate, before[second], before[third] - axis[third] * phi_rate]
 
 
-def euler_spin(chart: Chart, angles: Sequence[Expression], rates: Sequence[Expression]) -> list[Scalar]:
+def euler_spin(
+    orientation: OrientationCoordinates, angles: Sequence[Expression], rates: Sequence[Expression]
+) -> list[Scalar]:
     """Return the angular velocity in the axes of the body from the derivatives of Euler angles.
 
     Parameters
     ----------
-    chart
+    orientation
         The chart, of Euler angles.
     angles, rates
         The angles and their derivatives (Goldstein, section 4.9).
     """
-    first, second, third = chart.turns
-    turns = _turns(chart, angles).turns
+    first, second, third = orientation.turns
+    turns = _turns(orientation, angles).turns
     phi, theta, psi = (IDENTITY[axis] * rate for axis, rate in zip((first, second, third), rates, strict=True))
     return list(to_axes(turns[2].axes(), to_axes(turns[1].axes(), phi) + theta) + psi)

@@ -18,8 +18,8 @@ from atwood.model.values.rotation import Axes
 from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector
 from atwood.topology.bodies import Bodies, Body
-from atwood.topology.forest import Attachment, Forest
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
+from atwood.topology.spanning_forest import Attachment, SpanningForest
 
 __all__ = ["BodyShape", "Kinematics", "Placements", "differentiate", "lifted_accelerations", "place", "shapes"]
 
@@ -129,7 +129,7 @@ def place(
     graph: Graph,
     mechanism: MechanismGraph,
     bodies: Bodies,
-    forest: Forest,
+    forest: SpanningForest,
     shape_of: Mapping[int, BodyShape],
     locals_: Mapping[str, LocalPart],
     coordinates: Sequence[Expression],

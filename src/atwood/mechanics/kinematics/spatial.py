@@ -19,7 +19,7 @@ from atwood.mechanics.kinematics.orientation import (
     quaternion_product,
     rotation_quaternion,
 )
-from atwood.mechanics.kinematics.orientation_coordinates import chart_axes, chart_quaternion
+from atwood.mechanics.kinematics.orientation_coordinates import orientation_axes, orientation_quaternion
 from atwood.mechanics.kinematics.positions import BodyShape, Components, Kinematics, Placements
 from atwood.model.values.rotation import (
     IDENTITY,
@@ -36,8 +36,8 @@ from atwood.model.values.rotation import (
 )
 from atwood.model.values.vector import Vector, cross
 from atwood.topology.bodies import Bodies, Body
-from atwood.topology.forest import Attachment, Forest
 from atwood.topology.graph import WORLD, Joint
+from atwood.topology.spanning_forest import Attachment, SpanningForest
 
 __all__ = ["Course", "move_in_space"]
 
@@ -78,7 +78,7 @@ class Course:
 
 
 @dataclass(frozen=True)
-class _Turning:
+class _BodyRotation:
     """Axes of a body in world axes; its angular velocity and acceleration along them; its quaternion."""
 
     axes: Axes
@@ -118,14 +118,18 @@ class _Walk:
     """What is known while the forest is walked from the world outwards."""
 
     def __init__(
-        self, graph: Graph, bodies: Bodies, forest: Forest, shape_of: Mapping[int, BodyShape], course: Course
+        self, graph: Graph, bodies: Bodies, forest: SpanningForest, shape_of: Mapping[int, BodyShape], course: Course
     ) -> None:
         self.graph, self.bodies, self.forest, self.shape_of, self.course = graph, bodies, forest, shape_of, course
-        self.turnings: dict[int, _Turning] = {0: _Turning(IDENTITY, _STILL, _STILL, (1.0, 0.0, 0.0, 0.0))}
+        self.body_rotations: dict[int, _BodyRotation] = {
+            0: _BodyRotation(IDENTITY, _STILL, _STILL, (1.0, 0.0, 0.0, 0.0))
+        }
         self.nodes: dict[int, _State] = {}
         self.references: dict[int, _State] = {}
         self.known: dict[Expression, Expression] = {}
-        self.charts = {chart.coordinates: chart for chart in forest.charts}
+        self.orientation_coordinates = {
+            orientation.coordinates: orientation for orientation in forest.orientation_coordinates
+        }
 
     def spread(self, body: Body, node: int, state: _State) -> None:
         """Place all nodes of a body, and its reference point, from one of its nodes."""
@@ -140,10 +144,10 @@ class _Walk:
 
         With d the arm: ``R d``, ``R (d' + omega x d)``, ``R (d'' + 2 omega x d' + alpha x d + omega x (omega x d))``.
         """
-        turning = self.turnings.get(body)
-        if turning is None:
+        body_rotation = self.body_rotations.get(body)
+        if body_rotation is None:
             return arm, rate, second
-        w, alpha = turning.spin, turning.spin_rate
+        w, alpha = body_rotation.spin, body_rotation.spin_rate
         swing = Vector(
             arm.x * -(w.y * w.y + w.z * w.z) + arm.y * (w.x * w.y - alpha.z) + arm.z * (w.x * w.z + alpha.y),
             arm.x * (w.x * w.y + alpha.z) + arm.y * -(w.x * w.x + w.z * w.z) + arm.z * (w.y * w.z - alpha.x),
@@ -152,9 +156,9 @@ class _Walk:
         velocity = cross(w, arm) + rate
         acceleration = swing + second + cross(w, rate) * 2.0
         return (
-            self.in_world(turning.axes, arm),
-            self.in_world(turning.axes, velocity),
-            self.in_world(turning.axes, acceleration),
+            self.in_world(body_rotation.axes, arm),
+            self.in_world(body_rotation.axes, velocity),
+            self.in_world(body_rotation.axes, acceleration),
         )
 
     def in_world(self, axes: Axes, vector: Vector) -> Vector:
@@ -174,21 +178,21 @@ class _Walk:
     def turn(self, attachment: Attachment) -> None:
         """Work out how a body is turned, from its own chart or across its joint."""
         joint, child = attachment.joint, attachment.body
-        if attachment.chart:
-            chart = self.charts[attachment.chart]
-            values = [self.course.values[i] for i in chart.coordinates]
+        if attachment.orientation:
+            orientation = self.orientation_coordinates[attachment.orientation]
+            values = [self.course.values[i] for i in orientation.coordinates]
             spin = Vector(*(self.course.spins[i] for i in attachment.spin))
             spin_rate = Vector(*(self.course.spin_rates[i] for i in attachment.spin))
-            axes, quaternion = chart_axes(chart, values), chart_quaternion(chart, values)
-            self.turnings[child] = _Turning(axes, spin, spin_rate, quaternion)
+            axes, quaternion = orientation_axes(orientation, values), orientation_quaternion(orientation, values)
+            self.body_rotations[child] = _BodyRotation(axes, spin, spin_rate, quaternion)
         elif joint is not None and attachment.turns_with_joint:
             rotation = as_rotation(joint.local.placement.rotation)
             near, far = (joint.b, joint.a) if attachment.backwards else (joint.a, joint.b)
             rotation = rotation.inverse() if attachment.backwards else rotation
-            self.turnings[child] = self._across(rotation, near, far, child)
+            self.body_rotations[child] = self._across(rotation, near, far, child)
 
-    def _across(self, rotation: Rotation, near: int, far: int, child: int) -> _Turning:
-        parent = self.turnings[self.bodies.body_of[near]]
+    def _across(self, rotation: Rotation, near: int, far: int, child: int) -> _BodyRotation:
+        parent = self.body_rotations[self.bodies.body_of[near]]
         near_turn = self.shape_of[self.bodies.body_of[near]].turns[near]
         far_turn = self.shape_of[child].turns[far]
         assert isinstance(near_turn, tuple)
@@ -204,14 +208,14 @@ class _Walk:
             axes = compose(axes, turn.axes())
             spin_rate = spin_rate_through(turn, rate, second, spin, spin_rate)
             spin = spin_through(turn, rate, spin)
-        return _Turning(
+        return _BodyRotation(
             compose(axes, transposed(far_turn)),
             from_axes(far_turn, spin),
             from_axes(far_turn, spin_rate),
             self._quaternion_across(parent, near, Rotation(tuple(turns)), far),
         )
 
-    def _quaternion_across(self, parent: _Turning, near: int, rotation: Rotation, far: int) -> Quaternion:
+    def _quaternion_across(self, parent: _BodyRotation, near: int, rotation: Rotation, far: int) -> Quaternion:
         near_body, far_body = (self.bodies.bodies[self.bodies.body_of[node]] for node in (near, far))
         w, x, y, z = node_quaternions(far_body)[far]
         at_near = quaternion_product(parent.quaternion, node_quaternions(near_body)[near])
@@ -232,10 +236,12 @@ class _Walk:
     def turned_at(self, node: int) -> Turned:
         """Return how the frame of a node is turned and goes on turning, in world axes."""
         body = self.bodies.body_of[node]
-        turning, turn = self.turnings[body], self.shape_of[body].turns[node]
+        body_rotation, turn = self.body_rotations[body], self.shape_of[body].turns[node]
         assert isinstance(turn, tuple)
-        spin, spin_rate = (self.in_world(turning.axes, one) for one in (turning.spin, turning.spin_rate))
-        return compose(turning.axes, turn), spin, spin_rate
+        spin, spin_rate = (
+            self.in_world(body_rotation.axes, one) for one in (body_rotation.spin, body_rotation.spin_rate)
+        )
+        return compose(body_rotation.axes, turn), spin, spin_rate
 
     def across_joint(self, attachment: Attachment, joint: Joint) -> _State:
         """Return the state of the child's node from that of the parent's."""
@@ -262,7 +268,7 @@ class _Walk:
 def move_in_space(
     graph: Graph,
     bodies: Bodies,
-    forest: Forest,
+    forest: SpanningForest,
     shape_of: Mapping[int, BodyShape],
     course: Course,
     pull: Vector,
@@ -329,15 +335,15 @@ def _gathered(walk: _Walk) -> tuple[Kinematics, tuple[dict[int, Components], dic
         {},
         all_of(walk.references, "position"),
         walk.known,
-        {i: axes_of(one.axes) for i, one in walk.turnings.items()},
-        {i: tuple(convert(c) for c in one.quaternion) for i, one in walk.turnings.items()},
+        {i: axes_of(one.axes) for i, one in walk.body_rotations.items()},
+        {i: tuple(convert(c) for c in one.quaternion) for i, one in walk.body_rotations.items()},
     )
     kinematics = Kinematics(
         placements,
         all_of(walk.nodes, "velocity"),
         all_of(walk.nodes, "acceleration"),
-        {i: components(one.spin) for i, one in walk.turnings.items()},
-        {i: components(one.spin_rate) for i, one in walk.turnings.items()},
+        {i: components(one.spin) for i, one in walk.body_rotations.items()},
+        {i: components(one.spin_rate) for i, one in walk.body_rotations.items()},
         all_of(walk.references, "velocity"),
         all_of(walk.references, "acceleration"),
         dict(zip(walk.known, joint_rates, strict=True)),

@@ -16,11 +16,11 @@ from atwood.model.declare.component import bind
 from atwood.model.declare.laws import Law
 from atwood.model.returned import call_law, one_scalar
 
-__all__ = ["Watch", "list_watches"]
+__all__ = ["EventFunction", "list_event_functions"]
 
 
 @dataclass(frozen=True)
-class Watch:
+class EventFunction:
     """A zero crossing that is watched in the present mode.
 
     Attributes
@@ -51,9 +51,9 @@ class Watch:
     impact: bool
 
 
-def list_watches(
+def list_event_functions(
     mechanism: Mechanism, equations: Equations, reactions: Sequence[Reaction], modes: Mapping[str, str]
-) -> tuple[Watch, ...]:
+) -> tuple[EventFunction, ...]:
     """Return what is watched in the present modes; what is constant can never cross zero and is left out."""
     found = []
     graph = mechanism.table.graph
@@ -74,7 +74,9 @@ def list_watches(
             if target not in (*component.modes, "stop"):  # then it is the choice that says which
                 target = local.part.values.get(target, target)
             found.append(
-                Watch(path, law.name, value, options.direction, target, options.message, options.unit, options.impact)
+                EventFunction(
+                    path, law.name, value, options.direction, target, options.message, options.unit, options.impact
+                )
             )
     return tuple(found)
 

@@ -20,20 +20,20 @@ from atwood.model.values.vector import Vector, cross
 from atwood.topology.bodies import Body
 from atwood.topology.graph import Joint
 
-__all__ = ["Release", "release_program"]
+__all__ = ["InternalReactions", "internal_reaction_program"]
 
 
 @dataclass(frozen=True)
-class Release:
+class InternalReactions:
     """Program of (t, q, u, a, multipliers) with reactions inside bodies, and the row of each by its path."""
 
     program: Program
     rows: Mapping[str, int]
 
 
-def release_program(
+def internal_reaction_program(
     mechanism: Mechanism, equations: Equations, reactions: Sequence[Reaction], parameters: Collection[Expression]
-) -> Release | None:
+) -> InternalReactions | None:
     """Return the program of all reactions inside bodies; None if no component reports one.
 
     Parameters
@@ -70,7 +70,7 @@ def release_program(
         InputGroup("multipliers", equations.multipliers),
     )
     program = Program("reactions inside bodies", groups, tuple(parameters), (OutputGroup("r", tuple(expressions)),))
-    return Release(program, rows)
+    return InternalReactions(program, rows)
 
 
 def _counted(torque_W: Vector, axis: int, space: Space) -> Scalar:

@@ -9,7 +9,7 @@ from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
-from atwood.mechanics.kinematics.body_points import arm_of
+from atwood.mechanics.kinematics.body_points import body_point_of
 
 __all__ = ["MovingMass", "moving_masses"]
 
@@ -54,7 +54,7 @@ def moving_masses(mechanism: Mechanism, equations: Equations) -> list[MovingMass
         for body in local.body_inertias:
             node = site.node(path, body.frame.name)
             index, turn = site.bodies.body_of[node], site.node_turns[node]
-            arm = arm_of(kinematics, index, turn, body.center_of_mass, mechanism.space)
+            arm = body_point_of(kinematics, index, turn, body.center_of_mass, mechanism.space)
             for k in axes:
                 add(path, k, [kinematics.velocities[node][k] + arm.velocity[k]], [[body.mass]])
             spin = kinematics.angular_velocities.get(index, ())

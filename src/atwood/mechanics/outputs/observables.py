@@ -12,7 +12,7 @@ from atwood.mechanics.dynamics.carried_inertia import CarriedInertia
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map, rate_symbol
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
-from atwood.mechanics.kinematics.body_points import arm_of
+from atwood.mechanics.kinematics.body_points import body_point_of
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world
 from atwood.mechanics.kinematics.positions import Kinematics
 from atwood.model.declare.component import Binding
@@ -179,7 +179,7 @@ def make_binding(
     mapping = local_map(site, local, kinematics) if local.borrowed else {}
     for name, one in local.part.component.connectors().items():
         if isinstance(one, JointCoordinate):
-            motions[name] = _grip_in_place(local, kinematics, local.binding.motions.get(name), mapping)
+            motions[name] = _joint_reference_in_place(local, kinematics, local.binding.motions.get(name), mapping)
             continue
         node = site.node(path, name)
         body = site.bodies.body_of[node]
@@ -201,20 +201,20 @@ def make_binding(
         time=mechanism.time,
         space=space.name,
         line=space.line,
-        sides=local.binding.sides,
+        line_signs=local.binding.line_signs,
         known=known,
         reactions=reactions,
         energies=energies,
     )
 
 
-def _grip_in_place(
-    local: LocalPart, kinematics: Kinematics, grip: Motion | None, mapping: Mapping[Expression, Expression]
+def _joint_reference_in_place(
+    local: LocalPart, kinematics: Kinematics, joint_reference: Motion | None, mapping: Mapping[Expression, Expression]
 ) -> Motion:
     """Return a joint coordinate that a part takes hold of, in terms of the state; nothing at the joint itself."""
-    if grip is None:
+    if joint_reference is None:
         return Motion()
-    found = [grip.value, *(() if grip.rate is None else (grip.rate,))]
+    found = [joint_reference.value, *(() if joint_reference.rate is None else (joint_reference.rate,))]
     value, *rate = substitute(in_joint_coordinates(local, kinematics, found)[0], mapping)
     return Motion(value=value, rate=rate[0] if rate else None)
 
@@ -264,7 +264,7 @@ def part_energies(
         node = site.node(path, body.frame.name)
         index = site.bodies.body_of[node]
         turn = site.node_turns[node]
-        arm = arm_of(kinematics, index, turn, body.center_of_mass, space)
+        arm = body_point_of(kinematics, index, turn, body.center_of_mass, space)
         for k, g in enumerate(pull):
             v = kinematics.velocities[node][k] + arm.velocity[k]
             kinetic = kinetic + 0.5 * (body.mass * (v * v))

@@ -23,16 +23,16 @@ from atwood.model.compose.connection_rules import (
 )
 from atwood.model.compose.differences import (
     Snapshot,
-    apply_edits,
+    apply_differences,
     check_connections,
     check_pairs,
     copy_parts,
-    find_edits,
+    find_differences,
     take_over,
     take_snapshot,
 )
 from atwood.model.declare.component import Component
-from atwood.model.declare.parameter_expressions import Deferred
+from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.showing import count_of, field_text, fitted, html_table, listed
 
 PATH = Kind("a dotted path, such as 'left.rod'", NAME.read)
@@ -377,11 +377,11 @@ class Model(_State, Component):
 
     def _is_open(self) -> bool:
         """Return whether it builds from parameters that depend on a model that is only declared so far."""
-        return self._builds() and any(isinstance(self._value(name), Deferred) for name in self._settings)
+        return self._builds() and any(isinstance(self._value(name), ParameterExpression) for name in self._settings)
 
     def _is_built_from_around(self) -> bool:
         """Return whether it builds from parameters of the model around it."""
-        return self._builds() and any(isinstance(value, Deferred) for value in self._settings.values())
+        return self._builds() and any(isinstance(value, ParameterExpression) for value in self._settings.values())
 
     def _settle(self) -> None:
         if self._is_built_from_around():
@@ -402,7 +402,7 @@ class Model(_State, Component):
         object.__setattr__(fresh, "_given", self._given)
         object.__setattr__(fresh, "_token", self._token)
         fresh._assemble()
-        apply_edits(fresh, find_edits(self))
+        apply_differences(fresh, find_differences(self))
         check_connections(self._parent, self._name, fresh)
         take_over(self, fresh)
 

@@ -2,7 +2,7 @@
 
 A model is what its class declares and builds, and what was changed afterwards: parameters of its parts, parts put in
 the place of others, parts and connections added, start values. A `Snapshot` is taken when the class has done its
-work; `find_edits` compares with it.
+work; `find_differences` compares with it.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "REMOVED",
-    "Edits",
+    "Differences",
     "Snapshot",
-    "apply_edits",
+    "apply_differences",
     "check_connections",
     "check_pairs",
     "copy_parts",
-    "find_edits",
+    "find_differences",
     "take_over",
     "take_snapshot",
 ]
@@ -56,7 +56,7 @@ class Snapshot:
 
 
 @dataclass
-class Edits:
+class Differences:
     """What was changed on a model; all by path from that model.
 
     Attributes
@@ -104,51 +104,51 @@ def _join(path: str, name: str) -> str:
     return f"{path}.{name}" if path else name
 
 
-def find_edits(model: Model) -> Edits:
+def find_differences(model: Model) -> Differences:
     """Return what was changed on a model since its class made it; added and replaced parts are the ones there."""
-    edits = Edits()
-    _compare(model, "", model._baseline, "", edits)
-    return edits
+    differences = Differences()
+    _compare(model, "", model._baseline, "", differences)
+    return differences
 
 
-def _compare(model: Model, path: str, base: Snapshot, base_path: str, edits: Edits) -> None:
+def _compare(model: Model, path: str, base: Snapshot, base_path: str, differences: Differences) -> None:
     """Compare a model with a snapshot, in which it is found at another path."""
     before = set(base.joined.get(base_path, ()))
     joined = [pair for pair in model._connections if pair not in before]
     if joined:
-        edits.joined[path] = joined
-    _compare_starts(model, path, base.starts.get(base_path, {}), edits)
+        differences.joined[path] = joined
+    _compare_starts(model, path, base.starts.get(base_path, {}), differences)
     for name, given in model._attached.items():
         named = list(named_parts({name: given}))
         if all(_join(base_path, full) not in base.parts for full, _ in named):
-            edits.added[_join(path, name)] = given
+            differences.added[_join(path, name)] = given
             continue
         for full, part in named:
             own, own_base = _join(path, full), _join(base_path, full)
             token, settings, snapshot = base.parts[own_base]
             if part._token is not token:
-                edits.replaced[own] = part
+                differences.replaced[own] = part
                 continue
             changed = {
                 key: value for key, value in part._settings.items() if key not in settings or settings[key] != value
             }
             if changed:
-                edits.settings[own] = changed
+                differences.settings[own] = changed
             if hasattr(part, "_connections"):
                 model_part: Any = part
                 if model_part._baseline is snapshot:
-                    _compare(model_part, own, base, own_base, edits)
+                    _compare(model_part, own, base, own_base, differences)
                 else:  # made anew since, from other parameters
-                    _compare(model_part, own, model_part._baseline, "", edits)
+                    _compare(model_part, own, model_part._baseline, "", differences)
 
 
-def _compare_starts(model: Model, path: str, before: Mapping[str, Mapping[str, Any]], edits: Edits) -> None:
+def _compare_starts(model: Model, path: str, before: Mapping[str, Mapping[str, Any]], differences: Differences) -> None:
     for name, values in model._start_values().items():
         old = before.get(name, {})
         changed = {key: value for key, value in values.items() if key not in old or old[key] != value}
         changed.update({key: REMOVED for key in old if key not in values})
         if changed:
-            edits.starts.setdefault(path, {})[name] = changed
+            differences.starts.setdefault(path, {})[name] = changed
 
 
 def copy_parts(parts: Parts) -> Any:
@@ -156,7 +156,7 @@ def copy_parts(parts: Parts) -> Any:
     return [one.copy() for one in parts] if isinstance(parts, list) else parts.copy()
 
 
-def apply_edits(model: Model, edits: Edits) -> None:
+def apply_differences(model: Model, differences: Differences) -> None:
     """Repeat changes on a model; what is there already, or whose part is gone, is left out.
 
     Raises
@@ -164,20 +164,20 @@ def apply_edits(model: Model, edits: Edits) -> None:
     ConnectError
         If a connection would lose one of its ends.
     """
-    for path, values in edits.settings.items():  # outer parts come first, so that the inner ones are there
+    for path, values in differences.settings.items():  # outer parts come first, so that the inner ones are there
         part = _part_at(model, path)
         if part is not None:
             for name, value in values.items():
                 setattr(part, name, value)
-    for path, replacement in edits.replaced.items():
+    for path, replacement in differences.replaced.items():
         owner, name = _owner_of(model, path)
         if owner is not None and name in owner.parts:
             owner.replace(name, replacement)
-    for path, parts in edits.added.items():
+    for path, parts in differences.added.items():
         owner, name = _owner_of(model, path)
         if owner is not None and name not in owner._attached:
             owner.add(name, copy_parts(parts))
-    for path, joined in edits.joined.items():
+    for path, joined in differences.joined.items():
         owner = _part_at(model, path)
         present = set(owner._connections) if owner is not None else set()
         for a, b in joined if owner is not None else ():
@@ -185,7 +185,7 @@ def apply_edits(model: Model, edits: Edits) -> None:
                 check_end(owner, a, b)
                 check_end(owner, b, a)
                 owner.connect(find_end(owner, a), find_end(owner, b))
-    for path, starts in edits.starts.items():
+    for path, starts in differences.starts.items():
         owner = _part_at(model, path)
         for name, changed in starts.items() if owner is not None else ():
             target = owner._start_values()[name]

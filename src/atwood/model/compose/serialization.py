@@ -21,10 +21,10 @@ from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.files import check_readable, write_atomically
 from atwood.model.compose.composite import Model
 from atwood.model.compose.connection_rules import Parts, find_end
-from atwood.model.compose.differences import REMOVED, Edits, find_edits
+from atwood.model.compose.differences import REMOVED, Differences, find_differences
 from atwood.model.declare.component import Component
 from atwood.model.declare.fields import FieldReference
-from atwood.model.declare.parameter_expressions import OPERATIONS, Deferred
+from atwood.model.declare.parameter_expressions import OPERATIONS, ParameterExpression
 from atwood.model.declare.time_functions import StoredFunction, write_function
 
 __all__ = ["FORMAT", "VERSION", "from_data", "load_scene", "save_scene", "to_data"]
@@ -154,7 +154,7 @@ def _write(component: Component, path: str) -> dict[str, Any]:
         parts = {name: _write_parts(part, _join(path, name)) for name, part in component._given.items()}
         if parts:
             written["parts"] = parts
-        changes = _write_edits(find_edits(component), path)
+        changes = _write_differences(find_differences(component), path)
         if changes:
             written["changes"] = changes
     return written
@@ -166,21 +166,21 @@ def _write_parts(parts: Parts, path: str) -> Any:
     return _write(parts, path)
 
 
-def _write_edits(edits: Edits, path: str) -> dict[str, Any]:
+def _write_differences(differences: Differences, path: str) -> dict[str, Any]:
     changes = {
         "settings": {
             part: {name: _write_value(value, _join(path, f"{part}.{name}")) for name, value in values.items()}
-            for part, values in edits.settings.items()
+            for part, values in differences.settings.items()
         },
-        "replaced": {name: _write_parts(part, _join(path, name)) for name, part in edits.replaced.items()},
-        "added": {name: _write_parts(parts, _join(path, name)) for name, parts in edits.added.items()},
-        "connections": {part: [list(pair) for pair in joined] for part, joined in edits.joined.items()},
+        "replaced": {name: _write_parts(part, _join(path, name)) for name, part in differences.replaced.items()},
+        "added": {name: _write_parts(parts, _join(path, name)) for name, parts in differences.added.items()},
+        "connections": {part: [list(pair) for pair in joined] for part, joined in differences.joined.items()},
         "starts": {
             part: {
                 kind: {key: _write_value(value, key) for key, value in values.items()}
                 for kind, values in starts.items()
             }
-            for part, starts in edits.starts.items()
+            for part, starts in differences.starts.items()
         },
     }
     return {name: change for name, change in changes.items() if change}
@@ -189,7 +189,7 @@ def _write_edits(edits: Edits, path: str) -> dict[str, Any]:
 def _write_value(value: Any, where: str) -> Any:
     if isinstance(value, FieldReference):
         return {"bound": value.name}
-    if isinstance(value, Deferred):
+    if isinstance(value, ParameterExpression):
         return {"bound": [value.operation, *(_write_operand(one) for one in value.arguments)]}
     if isinstance(value, tuple):
         return list(value)
@@ -201,7 +201,7 @@ def _write_value(value: Any, where: str) -> Any:
 def _write_operand(operand: Any) -> Any:
     if isinstance(operand, FieldReference):
         return operand.name
-    if isinstance(operand, Deferred):
+    if isinstance(operand, ParameterExpression):
         return [operand.operation, *(_write_operand(one) for one in operand.arguments)]
     return float(operand)
 
@@ -294,7 +294,9 @@ def _depends_on_around(part: Component) -> bool:
 
     Its own parts may not be there before; so its changes are read when it has its place.
     """
-    return isinstance(part, Model) and any(isinstance(part._value(name), Deferred) for name in part._settings)
+    return isinstance(part, Model) and any(
+        isinstance(part._value(name), ParameterExpression) for name in part._settings
+    )
 
 
 def _place(part: Component, data: Any, where: str, put: Callable[[Component], Component]) -> None:
@@ -416,4 +418,4 @@ def _read_bound(written: Any, where: str) -> Any:
     operands = tuple(_read_bound(one, where) for one in written[1:])
     if len(operands) != (1 if operation == "neg" else 2):
         raise UsageError(f"the bound value {str(written)[:60]!r} has a wrong number of operands", where=where)
-    return Deferred(operation, operands, None)
+    return ParameterExpression(operation, operands, None)

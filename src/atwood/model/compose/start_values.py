@@ -8,7 +8,7 @@ from typing import Any
 from atwood.arguments import show
 from atwood.errors import AtwoodError, StartError
 from atwood.model.declare.fields import ParameterSpec
-from atwood.model.declare.parameter_expressions import Deferred
+from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.values.units import parse_unit, split_quantity
 from atwood.showing import fitted
 
@@ -67,7 +67,7 @@ def _checked(path: Any, value: Any, where: str) -> Any:
     if not isinstance(path, str) or not path.strip():
         raise StartError(f"{show(path)} is no path", where=where, advice="Write paths like 'rod.angle'.")
     full = f"{where}.{path}" if where else path
-    if isinstance(value, Deferred):
+    if isinstance(value, ParameterExpression):
         return value
     if isinstance(value, (list, tuple)):
         advice = f"Give its components, {path}.x and so on, each with a number."

@@ -30,7 +30,7 @@ class Binding:
         ``"line"``, ``"plane"`` or ``"space"``.
     line
         Unit vector of the line, for a scene on a line.
-    sides
+    line_signs
         On a line: +1 or -1 for a pair of connector names, the sign of the second's position minus the first's.
         None while the signs are not known yet.
     known
@@ -46,7 +46,7 @@ class Binding:
     time: Scalar = 0.0
     space: str = "plane"
     line: Vector | None = None
-    sides: Mapping[tuple[str, str], float] | None = None
+    line_signs: Mapping[tuple[str, str], float] | None = None
     known: Mapping[str, Any] = field(default_factory=dict)
     reactions: Mapping[str, Any] = field(default_factory=dict)
     energies: Mapping[str, Any] = field(default_factory=dict)

@@ -12,7 +12,7 @@ from atwood.expr import Scalar
 from atwood.model.declare.binding import Binding
 from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
 from atwood.model.declare.declaring import check_field_name, merge_inherited, with_checked_default
-from atwood.model.declare.fields import MISSING, Deferred, Field, ParameterSpec, SignalSpec
+from atwood.model.declare.fields import MISSING, Field, ParameterExpression, ParameterSpec, SignalSpec
 from atwood.model.declare.laws import Kind, Law
 from atwood.model.declare.quantities import Quantity
 from atwood.model.values.outline import Outline
@@ -198,10 +198,10 @@ class Component:
         default
             What to return if the start does not tell; None to refuse.
         """
-        sides = self._binding().sides
-        if sides is None:
+        line_signs = self._binding().line_signs
+        if line_signs is None:
             return 1.0
-        known = sides.get((a.name, b.name), default)
+        known = line_signs.get((a.name, b.name), default)
         if known is None:
             raise DeclarationError(
                 f"it is not known on which side of {a.name} the end {b.name} starts",
@@ -294,7 +294,7 @@ class Component:
         given = name in self._settings
         value = self._settings[name] if given else spec.default
         scope = self._parent if given else self
-        if not isinstance(value, Deferred) or scope is None:
+        if not isinstance(value, ParameterExpression) or scope is None:
             return value
         where = f"{self.path or type(self).__name__}.{name}"
         try:

@@ -15,14 +15,23 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from atwood.arguments import ANYTHING, DOC, FLAG, NAME, TEXT, each, number, optional, real, show, takes, whole
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, near_matches, suggestion
-from atwood.model.declare.parameter_expressions import Deferred
+from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.time_functions import check_function
 from atwood.model.values.units import Unit, parse_quantity, parse_si_unit
 
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
 
-__all__ = ["MISSING", "Deferred", "Field", "FieldReference", "ParameterSpec", "SignalSpec", "parameter", "signal"]
+__all__ = [
+    "MISSING",
+    "Field",
+    "FieldReference",
+    "ParameterExpression",
+    "ParameterSpec",
+    "SignalSpec",
+    "parameter",
+    "signal",
+]
 
 
 class _Missing:
@@ -34,7 +43,7 @@ MISSING: Any = _Missing()
 """The default of a parameter that has none."""
 
 
-class FieldReference(Deferred):
+class FieldReference(ParameterExpression):
     """The value of a parameter or an input of the model that encloses a part, by name.
 
     Parameters
@@ -89,7 +98,7 @@ class Field(FieldReference):
         """Return a value in its own type and SI unit, or refuse it."""
         raise NotImplementedError
 
-    def _check_deferred(self, value: Deferred, where: str) -> Deferred:
+    def _check_expression(self, value: ParameterExpression, where: str) -> ParameterExpression:
         if value.unit is not None and not value.unit.has_dimension_of(self.unit):
             raise ParameterError(
                 f"it is bound to {value!r}, which is in {value.unit.text} and not in {self.unit.text}", where=where
@@ -156,10 +165,10 @@ class ParameterSpec(Field):
         ParameterError
             If it is not finite, of the wrong type or dimension, or out of bounds.
         """
-        if isinstance(value, Deferred):
+        if isinstance(value, ParameterExpression):
             if value.operation == "signal":
                 raise ParameterError(f"a parameter cannot follow the input {value!r}", where=where)
-            return self._check_deferred(value, where)
+            return self._check_expression(value, where)
         if value is None and self.default is None:
             return None
         if self.choices:
@@ -247,8 +256,8 @@ class SignalSpec(Field):
         ParameterError
             If it is no finite number in the right unit, or a function that cannot be evaluated on an expression.
         """
-        if isinstance(value, Deferred):
-            return self._check_deferred(value, where)
+        if isinstance(value, ParameterExpression):
+            return self._check_expression(value, where)
         if callable(value):
             check_function(value, where)
             return value

@@ -14,7 +14,7 @@ from atwood.model.values.units import Exponents, Unit, unit_of
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
 
-__all__ = ["OPERATIONS", "Deferred"]
+__all__ = ["OPERATIONS", "ParameterExpression"]
 
 OPERATIONS: Mapping[str, Callable[..., Any]] = {
     "add": operator.add,
@@ -27,7 +27,7 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
 """What a deferred value can be made with."""
 
 
-class Deferred:
+class ParameterExpression:
     """A value that is worked out from the parameters of the model that encloses a part.
 
     Parameters
@@ -47,7 +47,7 @@ class Deferred:
 
     def value_in(self, model: Component) -> Any:
         """Return the value within an enclosing model; deferred again if that is only declared so far."""
-        values = [one.value_in(model) if isinstance(one, Deferred) else one for one in self.arguments]
+        values = [one.value_in(model) if isinstance(one, ParameterExpression) else one for one in self.arguments]
         return OPERATIONS[self.operation](*values)
 
     def __repr__(self) -> str:
@@ -59,41 +59,41 @@ class Deferred:
             advice="Only + - * / and ** work there; work the rest out in a method build(self).",
         )
 
-    def __add__(self, other: Any) -> Deferred:
+    def __add__(self, other: Any) -> ParameterExpression:
         return combine("add", self, other)
 
-    def __radd__(self, other: Any) -> Deferred:
+    def __radd__(self, other: Any) -> ParameterExpression:
         return combine("add", other, self)
 
-    def __sub__(self, other: Any) -> Deferred:
+    def __sub__(self, other: Any) -> ParameterExpression:
         return combine("sub", self, other)
 
-    def __rsub__(self, other: Any) -> Deferred:
+    def __rsub__(self, other: Any) -> ParameterExpression:
         return combine("sub", other, self)
 
-    def __mul__(self, other: Any) -> Deferred:
+    def __mul__(self, other: Any) -> ParameterExpression:
         return combine("mul", self, other)
 
-    def __rmul__(self, other: Any) -> Deferred:
+    def __rmul__(self, other: Any) -> ParameterExpression:
         return combine("mul", other, self)
 
-    def __truediv__(self, other: Any) -> Deferred:
+    def __truediv__(self, other: Any) -> ParameterExpression:
         return combine("div", self, other)
 
-    def __rtruediv__(self, other: Any) -> Deferred:
+    def __rtruediv__(self, other: Any) -> ParameterExpression:
         return combine("div", other, self)
 
-    def __pow__(self, other: Any) -> Deferred:
+    def __pow__(self, other: Any) -> ParameterExpression:
         return combine("pow", self, other)
 
-    def __rpow__(self, other: Any) -> Deferred:
+    def __rpow__(self, other: Any) -> ParameterExpression:
         return combine("pow", other, self)
 
-    def __neg__(self) -> Deferred:
+    def __neg__(self) -> ParameterExpression:
         return combine("neg", self)
 
 
-def combine(operation: str, *operands: Any) -> Deferred:
+def combine(operation: str, *operands: Any) -> ParameterExpression:
     """Return an operation on deferred values and numbers.
 
     Raises
@@ -102,16 +102,16 @@ def combine(operation: str, *operands: Any) -> Deferred:
         If an operand is neither, or the units do not go together.
     """
     for operand in operands:
-        if isinstance(operand, Deferred):
+        if isinstance(operand, ParameterExpression):
             _check_is_number(operand)
         elif isinstance(operand, bool) or not isinstance(operand, numbers.Real) or not math.isfinite(operand):
             raise DeclarationError(
                 f"{operand!r} cannot be combined with a parameter in a class body", advice="Use a plain finite number."
             )
-    return Deferred(operation, tuple(operands), _result_unit(operation, operands))
+    return ParameterExpression(operation, tuple(operands), _result_unit(operation, operands))
 
 
-def _check_is_number(operand: Deferred) -> None:
+def _check_is_number(operand: ParameterExpression) -> None:
     vector, word = getattr(operand, "size", None), getattr(operand, "choices", None)
     if vector is not None or word or operand.operation == "signal":
         raise DeclarationError(
@@ -122,8 +122,8 @@ def _check_is_number(operand: Deferred) -> None:
 
 def _result_unit(operation: str, operands: tuple[Any, ...]) -> Unit | None:
     """Return the unit of a result; a plain number takes the unit it needs in a sum, and has none in a product."""
-    units = [one.unit if isinstance(one, Deferred) else None for one in operands]
-    if any(isinstance(one, Deferred) and (one.unit is None or one.unit.text == "any") for one in operands):
+    units = [one.unit if isinstance(one, ParameterExpression) else None for one in operands]
+    if any(isinstance(one, ParameterExpression) and (one.unit is None or one.unit.text == "any") for one in operands):
         return None
     if operation == "neg":
         return units[0]
@@ -147,7 +147,7 @@ def _power_unit(base: Exponents, power_unit: Exponents, power: Any) -> Unit | No
         raise DeclarationError(f"the power {power!r} has a unit")
     if not any(base):
         return unit_of(base)
-    if isinstance(power, Deferred):
+    if isinstance(power, ParameterExpression):
         return None
     m, l, t, i = (exponent * power for exponent in base)
     if any(exponent != int(exponent) for exponent in (m, l, t, i)):

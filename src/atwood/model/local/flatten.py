@@ -13,7 +13,7 @@ from atwood.model.compose.connection_rules import find_end
 from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import InputRef, OutputRef
-from atwood.model.declare.fields import LARGEST_ANGLE, Deferred, FieldReference, too_large_an_angle
+from atwood.model.declare.fields import LARGEST_ANGLE, FieldReference, ParameterExpression, too_large_an_angle
 from atwood.model.values.units import Unit, parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
 
 __all__ = ["FlatScene", "Part", "flatten", "unit_at"]
@@ -152,7 +152,7 @@ def _number(value: Any, model: Model, key: str, prefix: str) -> float:
     """Return a start value in SI units; text must be in a unit of what it is for, where that is known."""
     path = prefix + key
     wanted = unit_at(model, key)
-    if isinstance(value, Deferred):
+    if isinstance(value, ParameterExpression):
         if wanted is not None and value.unit is not None and not value.unit.has_dimension_of(wanted):
             raise StartError(
                 f"it is bound to {value!r}, which is in {value.unit.text} and not in {wanted.text}", where=path

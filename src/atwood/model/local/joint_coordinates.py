@@ -11,17 +11,17 @@ from atwood.late import dataclass
 from atwood.model.declare.component import bind
 from atwood.model.declare.laws import ConstraintOptions, Law
 from atwood.model.local.flatten import Part
-from atwood.model.local.joint_references import Held
+from atwood.model.local.joint_references import JointCoordinateUse
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
 
-__all__ = ["Grip", "counting_constraints", "find_grips", "formulas_of", "turns_read"]
+__all__ = ["JointReference", "counting_constraints", "find_joint_references", "formulas_of", "turns_read"]
 
 Formulas = Mapping[Expression, tuple[Expression, Expression | None]]
 """For symbols of joint coordinates: the coordinate and its rate as functions of the joint's frames."""
 
 
 @dataclass(frozen=True)
-class Grip:
+class JointReference:
     """A joint's coordinate that a part takes hold of.
 
     Attributes
@@ -46,7 +46,7 @@ class Grip:
     borrowed: Mapping[str, tuple[str, str]]
 
 
-def find_grips(taken: Sequence[tuple[Held, LocalPart]], graph: Graph) -> list[Grip]:
+def find_joint_references(taken: Sequence[tuple[JointCoordinateUse, LocalPart]], graph: Graph) -> list[JointReference]:
     """Return what a part takes hold of.
 
     Parameters
@@ -62,15 +62,15 @@ def find_grips(taken: Sequence[tuple[Held, LocalPart]], graph: Graph) -> list[Gr
         If what a joint offers is no coordinate of it.
     """
     found = []
-    for held, joint in taken:
-        symbol = graph.symbol(f"{held.joint}.{held.coordinate}")
+    for used, joint in taken:
+        symbol = graph.symbol(f"{used.joint}.{used.coordinate}")
         if not any(symbol in one.coordinates for one in joint.joints):
-            raise DeclarationError(f"it offers {held.coordinate!r}, which is no coordinate of it", where=held.joint)
+            raise DeclarationError(f"it offers {used.coordinate!r}, which is no coordinate of it", where=used.joint)
         bound = bind(joint.part.component, joint.binding)
         value, rate = formulas_of(joint.part, bound, [symbol], graph)[symbol]
-        connectors = {f"{held.joint}.{name}": one for name, one in joint.connectors.items()}
-        borrowed = {f"{held.joint}.{name}": (held.joint, name) for name in joint.connectors}
-        found.append(Grip(held.connector, symbol, value, rate, connectors, borrowed))
+        connectors = {f"{used.joint}.{name}": one for name, one in joint.connectors.items()}
+        borrowed = {f"{used.joint}.{name}": (used.joint, name) for name in joint.connectors}
+        found.append(JointReference(used.connector, symbol, value, rate, connectors, borrowed))
     return found
 
 

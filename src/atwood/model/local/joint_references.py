@@ -13,11 +13,11 @@ from atwood.late import dataclass
 from atwood.model.declare.connectors import JointCoordinate
 from atwood.model.local.flatten import FlatScene
 
-__all__ = ["Held", "find_held"]
+__all__ = ["JointCoordinateUse", "find_joint_coordinate_uses"]
 
 
 @dataclass(frozen=True)
-class Held:
+class JointCoordinateUse:
     """A joint's coordinate that a part takes hold of.
 
     Attributes
@@ -35,7 +35,7 @@ class Held:
     coordinate: str
 
 
-def find_held(flat: FlatScene) -> dict[str, tuple[Held, ...]]:
+def find_joint_coordinate_uses(flat: FlatScene) -> dict[str, tuple[JointCoordinateUse, ...]]:
     """Return, for each part that takes hold of joints, what it takes hold of.
 
     Parameters
@@ -65,7 +65,7 @@ def find_held(flat: FlatScene) -> dict[str, tuple[Held, ...]]:
     for a, b in flat.connections:
         beside.setdefault(a, []).append(b)
         beside.setdefault(b, []).append(a)
-    found: dict[str, list[Held]] = {path: [] for path, _ in wanted.values()}
+    found: dict[str, list[JointCoordinateUse]] = {path: [] for path, _ in wanted.values()}
     for full, (path, name) in wanted.items():
         joint, coordinate = _joint_at(full, beside, offered)
         laws = {law.name: law for law in flat.parts[joint].component.laws("observable")}
@@ -80,10 +80,10 @@ def find_held(flat: FlatScene) -> dict[str, tuple[Held, ...]]:
             raise UnsupportedError(f"{where} the joint {joint} has no {coordinate}", where=full)
         if joint in found:
             raise DeclarationError("a part that takes hold of joints cannot be one", where=joint)
-        found[path].append(Held(name, joint, coordinate))
+        found[path].append(JointCoordinateUse(name, joint, coordinate))
     for full in offered:
         _joint_at(full, beside, offered)
-    return {path: tuple(held) for path, held in found.items()}
+    return {path: tuple(used) for path, used in found.items()}
 
 
 def _joint_at(full: str, beside: Mapping[str, list[str]], offered: Mapping[str, tuple[str, str]]) -> tuple[str, str]:

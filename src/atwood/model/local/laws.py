@@ -22,8 +22,14 @@ from atwood.model.declare.contributions import BodyInertia, Load, Placement, Poi
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import FlatScene, Part
-from atwood.model.local.joint_coordinates import Grip, counting_constraints, find_grips, formulas_of, turns_read
-from atwood.model.local.joint_references import Held, find_held
+from atwood.model.local.joint_coordinates import (
+    JointReference,
+    counting_constraints,
+    find_joint_references,
+    formulas_of,
+    turns_read,
+)
+from atwood.model.local.joint_references import JointCoordinateUse, find_joint_coordinate_uses
 from atwood.model.local.moving_mass import check_lagrangians, find_varying
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart, multiplier_symbol
 from atwood.model.returned import call_law, listed, one_scalar
@@ -56,7 +62,7 @@ def localize(
     time: Expression,
     table: ParameterTable,
     modes: Mapping[str, str],
-    sides: Mapping[tuple[str, str, str], float] | None,
+    line_signs: Mapping[tuple[str, str, str], float] | None,
     carried: Mapping[tuple[str, str], Carried] | None = None,
 ) -> dict[str, LocalPart]:
     """Evaluate the laws of every part on its local symbols.
@@ -73,7 +79,7 @@ def localize(
         Takes up the parameters.
     modes
         Mode of each part that has modes.
-    sides
+    line_signs
         On a line: for (part, connector, connector) the sign of the second's position minus the first's; None while
         they are not known yet.
     carried
@@ -87,15 +93,15 @@ def localize(
     """
     for path, part in flat.parts.items():
         _check_space(path, part, space.name)
-    held = find_held(flat)
+    used = find_joint_coordinate_uses(flat)
     counted: dict[str, set[str]] = {}
-    for one in (one for several in held.values() for one in several):
+    for one in (one for several in used.values() for one in several):
         counted.setdefault(one.joint, set()).add(one.coordinate)
     found: dict[str, LocalPart] = {}
-    for path in sorted(flat.parts, key=lambda path: path in held):  # joints before what takes hold of them
-        taken = [(one, found[one.joint]) for one in held.get(path, ())]
+    for path in sorted(flat.parts, key=lambda path: path in used):  # joints before what takes hold of them
+        taken = [(one, found[one.joint]) for one in used.get(path, ())]
         part, own = flat.parts[path], counted.get(path, ())
-        found[path] = _localize_part(part, flat, space, time, table, modes, sides, taken, own, carried or {})
+        found[path] = _localize_part(part, flat, space, time, table, modes, line_signs, taken, own, carried or {})
     return {path: found[path] for path in flat.parts}
 
 
@@ -121,7 +127,7 @@ class _Bound:
     binding: Binding
     connectors: dict[str, LocalConnector]
     signal_symbols: dict[str, Expression]
-    grips: Sequence[Grip]
+    joint_references: Sequence[JointReference]
 
 
 @dataclass(frozen=True)
@@ -154,8 +160,8 @@ def _bind_part(
     space: Space,
     time: Expression,
     table: ParameterTable,
-    sides: Mapping[tuple[str, str, str], float] | None,
-    taken: Sequence[tuple[Held, LocalPart]],
+    line_signs: Mapping[tuple[str, str, str], float] | None,
+    taken: Sequence[tuple[JointCoordinateUse, LocalPart]],
 ) -> _Bound:
     """Return the symbols of a part, and the numbers of its parameters."""
     graph, component = table.graph, part.component
@@ -168,14 +174,18 @@ def _bind_part(
         for name, one in component.connectors().items()
         if not isinstance(one, JointCoordinate)
     }
-    grips = find_grips(taken, graph)
+    joint_references = find_joint_references(taken, graph)
     motions = {name: local_motion(symbols, space) for name, symbols in connectors.items()}
-    motions.update({one.connector: Motion(value=one.value, rate=one.rate) for one in grips})
-    own_sides = None if sides is None else {(a, b): s for (path, a, b), s in sides.items() if path == part.path}
-    binding = Binding(values=values, motions=motions, time=time, space=space.name, line=space.line, sides=own_sides)
-    for one in grips:
+    motions.update({one.connector: Motion(value=one.value, rate=one.rate) for one in joint_references})
+    own_line_signs = (
+        None if line_signs is None else {(a, b): s for (path, a, b), s in line_signs.items() if path == part.path}
+    )
+    binding = Binding(
+        values=values, motions=motions, time=time, space=space.name, line=space.line, line_signs=own_line_signs
+    )
+    for one in joint_references:
         connectors.update(one.connectors)
-    return _Bound(binding, connectors, signal_symbols, grips)
+    return _Bound(binding, connectors, signal_symbols, joint_references)
 
 
 def _localize_part(
@@ -185,13 +195,13 @@ def _localize_part(
     time: Expression,
     table: ParameterTable,
     modes: Mapping[str, str],
-    sides: Mapping[tuple[str, str, str], float] | None,
-    taken: Sequence[tuple[Held, LocalPart]],
+    line_signs: Mapping[tuple[str, str, str], float] | None,
+    taken: Sequence[tuple[JointCoordinateUse, LocalPart]],
     counted: Collection[str],
     carried: Mapping[tuple[str, str], Carried],
 ) -> LocalPart:
     graph, component = table.graph, part.component
-    symbols = _bind_part(part, flat, space, time, table, sides, taken)
+    symbols = _bind_part(part, flat, space, time, table, line_signs, taken)
     binding, connectors = symbols.binding, symbols.connectors
     bound = bind(component, binding)  # inertia and joints say what bodies there are, and may not ask what these have
     known = {
@@ -231,8 +241,8 @@ def _localize_part(
         loads=tuple(loads),
         constraints=(*constraints, *counting_constraints(part, counted, formulas, graph)),
         signal_symbols=symbols.signal_symbols,
-        formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in symbols.grips}},
-        borrowed={full: end for one in symbols.grips for full, end in one.borrowed.items()},
+        formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in symbols.joint_references}},
+        borrowed={full: end for one in symbols.joint_references for full, end in one.borrowed.items()},
         switched=switched,
         turns=turns,
         lagrangians=lagrangians,

@@ -175,5 +175,5 @@ def _draw_energy(axes: Axes, result: Result) -> None:
 def _mark(axes: Axes, result: Result | SavedResult) -> None:
     """Mark the times at which something happened."""
     if isinstance(result, Result):
-        for one in result.happenings:
+        for one in result.events:
             axes.axvline(one.time, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))

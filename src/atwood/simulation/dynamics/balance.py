@@ -22,7 +22,7 @@ from atwood.linalg.matrices import (
     scaled,
 )
 from atwood.simulation.dynamics.columns import mass_at
-from atwood.simulation.dynamics.kinematic_map import Turning, turning_of
+from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
 from atwood.simulation.dynamics.rank import least_norm, row_scales
 from atwood.simulation.dynamics.rounding import RowErrors
 
@@ -36,24 +36,42 @@ __all__ = [
 
 @dataclass(frozen=True)
 class BalanceValues:
-    """The balance ``M a + bias = G^T lambda``, ``G a + gamma = 0`` at one state, along the speeds."""
+    """The balance ``M a + bias = G^T lambda``, ``G a + gamma = 0`` at one state, along the speeds.
+
+    Attributes
+    ----------
+    mass
+        Mass matrix M, shape (speeds, speeds).
+    bias
+        Forces that do not depend on accelerations, with the sign of inertia, shape (speeds,).
+    value
+        Constraints on positions g, shape (constraints,); 0 for those on velocities alone.
+    rate
+        Constraints on velocities ``G u + g_t``, shape (constraints,).
+    gamma
+        What the second derivative of the constraints has besides ``G a``, shape (constraints,).
+    jacobian
+        Constraint Jacobian G along the speeds, shape (constraints, speeds).
+    explicit_rate
+        Explicit time part g_t of the velocity constraints, shape (constraints,).
+    """
 
     mass: Matrix
     bias: FloatArray
     value: FloatArray
     rate: FloatArray
     gamma: FloatArray
-    slope: Matrix
-    drift: FloatArray
+    jacobian: Matrix
+    explicit_rate: FloatArray
 
 
 @dataclass(frozen=True)
-class HeldValues:
-    """The constraints at one state: values, slopes along the speeds, and explicit time derivatives of their rates."""
+class ConstraintValues:
+    """The constraints at one state: values g, Jacobian G along the speeds, and explicit time part g_t of the rates."""
 
     value: FloatArray
-    slope: Matrix
-    drift: FloatArray
+    jacobian: Matrix
+    explicit_rate: FloatArray
 
 
 class Balance:
@@ -63,12 +81,12 @@ class Balance:
     ----------
     program
         The program.
-    kernel, held_kernel
+    kernel, constraint_kernel
         The same, and the constraints alone, ready to run on one state.
-    turning
+    kinematic_map
         How the coordinates move with the speeds.
     errors
-        How far rounding can take the constraints' slopes.
+        How far rounding can take the constraint Jacobian.
     mass
         Gives the mass matrix where the program does not.
     """
@@ -77,14 +95,15 @@ class Balance:
         self,
         program: BalanceProgram,
         kernel: BoundKernel,
-        held_kernel: Callable[[], BoundKernel],
-        turning: Turning,
+        constraint_kernel: Callable[[], BoundKernel],
+        kinematic_map: KinematicMap,
         errors: RowErrors,
         mass: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
     ) -> None:
-        self.program, self.kernel, self.turning, self.errors, self._mass = program, kernel, turning, errors, mass
+        self.program, self.kernel, self.kinematic_map = program, kernel, kinematic_map
+        self.errors, self._mass = errors, mass
         self._all = len(program.holonomic) == program.constraints
-        self._held_kernel = held_kernel
+        self._constraint_kernel = constraint_kernel
         self.holonomic = np.asarray(program.holonomic, dtype=np.intp)
 
     @property
@@ -95,24 +114,24 @@ class Balance:
     def at(self, t: float, q: FloatArray, u: FloatArray) -> BalanceValues:
         """Return the balance at a state."""
         p = self.program
-        mass, bias, value, rate, gamma, slope, drift = self.kernel([t], q, u)
+        mass, bias, value, rate, gamma, entries, explicit_rate = self.kernel([t], q, u)
         full = self._mass is not None or is_best_full((p.speeds, p.speeds), len(mass))
         if self._mass is not None:
             matrix = self._mass(t, q, u)
         else:
             matrix = from_entries(p.mass_rows, p.mass_columns, mass, (p.speeds, p.speeds), full)
-        jacobian = from_entries(p.slope_rows, p.slope_columns, slope, (p.constraints, p.speeds), full)
+        jacobian = from_entries(p.jacobian_rows, p.jacobian_columns, entries, (p.constraints, p.speeds), full)
         parts = (np.asarray(x, dtype=float) for x in (bias, value, rate, gamma))
         b, v, r, g = parts
-        return BalanceValues(matrix, b, v, r, g, jacobian, np.asarray(drift, dtype=float))
+        return BalanceValues(matrix, b, v, r, g, jacobian, np.asarray(explicit_rate, dtype=float))
 
-    def held(self, t: float, q: FloatArray, u: FloatArray) -> HeldValues:
+    def constraints_at(self, t: float, q: FloatArray, u: FloatArray) -> ConstraintValues:
         """Return the constraints at a state."""
         p = self.program
-        value, slope, drift = self._held_kernel()([t], q, u)
+        value, entries, explicit_rate = self._constraint_kernel()([t], q, u)
         full = self._mass is not None or is_best_full((p.speeds, p.speeds), len(p.mass_rows))
-        matrix = from_entries(p.slope_rows, p.slope_columns, slope, (p.constraints, p.speeds), full)
-        return HeldValues(np.asarray(value, dtype=float), matrix, np.asarray(drift, dtype=float))
+        matrix = from_entries(p.jacobian_rows, p.jacobian_columns, entries, (p.constraints, p.speeds), full)
+        return ConstraintValues(np.asarray(value, dtype=float), matrix, np.asarray(explicit_rate, dtype=float))
 
     def accelerate(
         self, t: float, q: FloatArray, u: FloatArray, kept: NDArray[np.intp] | None = None
@@ -149,7 +168,7 @@ class Balance:
         iterations
             The largest number of Newton steps.
         """
-        q = self.turning.normalized(q)
+        q = self.kinematic_map.normalized(q)
         if not self.constraints:
             return q, u
         still = np.zeros_like(u)
@@ -157,29 +176,31 @@ class Balance:
         errors = self.errors.near(t, q, scales)
         on_positions = errors if self._all else errors[self.holonomic]
         for _ in range(iterations if len(self.holonomic) else 0):
-            slope, value = self.on_positions(self.held(t, q, still))
-            rows = row_scales(slope, scales, on_positions)
+            jacobian, value = self.on_positions(self.constraints_at(t, q, still))
+            rows = row_scales(jacobian, scales, on_positions)
             miss = float(np.max(np.abs(value / rows)))
             if miss == 0.0 or (miss < 1e-11 and miss >= 0.5 * last):
                 break
             last = miss
-            q = self.turning.moved(t, q, -scales * least_norm(scaled(slope, scales, rows), value / rows))
-        now = self.held(t, q, u)
-        rows = row_scales(now.slope, scales, errors)
+            q = self.kinematic_map.moved(t, q, -scales * least_norm(scaled(jacobian, scales, rows), value / rows))
+        now = self.constraints_at(t, q, u)
+        rows = row_scales(now.jacobian, scales, errors)
         for _ in range(2):  # the second pass takes out the rounding of the first
-            rate = now.slope @ u + now.drift
-            u = u - scales * least_norm(scaled(now.slope, scales, rows), rate / rows)
+            rate = now.jacobian @ u + now.explicit_rate
+            u = u - scales * least_norm(scaled(now.jacobian, scales, rows), rate / rows)
         return q, u
 
-    def on_positions(self, now: HeldValues) -> tuple[FloatArray, FloatArray]:
-        """Return slopes and values of the constraints that hold positions."""
+    def on_positions(self, now: ConstraintValues) -> tuple[FloatArray, FloatArray]:
+        """Return Jacobian and values of the constraints on positions."""
         if self._all:
-            return now.slope, now.value
-        return now.slope[self.holonomic], now.value[self.holonomic]
+            return now.jacobian, now.value
+        return now.jacobian[self.holonomic], now.value[self.holonomic]
 
-    def row_scales(self, now: BalanceValues | HeldValues, t: float, q: FloatArray, scales: FloatArray) -> FloatArray:
+    def row_scales(
+        self, now: BalanceValues | ConstraintValues, t: float, q: FloatArray, scales: FloatArray
+    ) -> FloatArray:
         """Return the size of each constraint at a place; see `atwood.simulation.dynamics.rank.row_scales`."""
-        return row_scales(now.slope, scales, self.errors.near(t, q, scales))
+        return row_scales(now.jacobian, scales, self.errors.near(t, q, scales))
 
     def holding(self, chosen: Sequence[int]) -> list[int]:
         """Return which of some constraints hold positions."""
@@ -189,8 +210,8 @@ class Balance:
         """Return by how much a state misses the constraints on position and on velocity, relative to the scales."""
         if not self.constraints:
             return 0.0, 0.0
-        now = self.held(t, q, u)
-        rows, rate = self.row_scales(now, t, q, scales), now.slope @ u + now.drift
+        now = self.constraints_at(t, q, u)
+        rows, rate = self.row_scales(now, t, q, scales), now.jacobian @ u + now.explicit_rate
         return float(np.max(np.abs(now.value / rows))), float(np.max(np.abs(rate / rows)))
 
 
@@ -199,29 +220,29 @@ def balance_of(assembly: Assembly, form: FormName) -> Balance:
     program = assembly.balance(form)
     mass = None if program.mass_product is None else partial(mass_at, assembly, form)
     held = partial(assembly.kernel, program.constraints_alone)
-    places, turning = (program.slope_rows, program.slope_columns), turning_of(assembly, form)
+    places, kinematic_map = (program.jacobian_rows, program.jacobian_columns), kinematic_map_of(assembly, form)
     laws = [one.key[:2] for one in assembly.in_coordinates(form).constraints]
-    errors = RowErrors(assembly, program.constraints_alone, ("value", "slope"), laws, places, turning)
-    return Balance(program, assembly.kernel(program.program), held, turning, errors, mass)
+    errors = RowErrors(assembly, program.constraints_alone, ("value", "jacobian"), laws, places, kinematic_map)
+    return Balance(program, assembly.kernel(program.program), held, kinematic_map, errors, mass)
 
 
 def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -> tuple[FloatArray, FloatArray]:
     """Return accelerations and multipliers of a balance; see `Balance.accelerate`."""
     n = len(now.bias)
-    slope = now.slope if kept is None else now.slope[kept]
+    jacobian = now.jacobian if kept is None else now.jacobian[kept]
     gamma = now.gamma if kept is None else now.gamma[kept]
     m = len(gamma)
     if not is_full(now.mass):
         from atwood.linalg.sparse import solve_bordered
 
-        solved = solve_bordered(now.mass, slope, now.bias, gamma)
+        solved = solve_bordered(now.mass, jacobian, now.bias, gamma)
         if solved is None:
             raise _undetermined(t)
         return solved
     matrix = np.zeros((n + m, n + m))
     matrix[:n, :n] = now.mass
-    matrix[:n, n:] = -slope.T
-    matrix[n:, :n] = slope
+    matrix[:n, n:] = -jacobian.T
+    matrix[n:, :n] = jacobian
     right = np.concatenate([-now.bias, -gamma])
     # Scaling to rows and columns of like size, so that singular means singular.
     size = np.sqrt(np.maximum(np.max(np.abs(matrix), axis=1), np.max(np.abs(matrix), axis=0))) if n + m else right

@@ -19,10 +19,10 @@ from atwood.forms.assembly import Assembly, Coordinates
 from atwood.forms.program import RatesProgram
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["Turning", "resting_place", "roughly_turned", "turning_of"]
+__all__ = ["KinematicMap", "best_rough_orientation", "kinematic_map_of", "reference_coordinates"]
 
 
-class Turning:
+class KinematicMap:
     """How the coordinates of one form move: ``q' = B u + b``.
 
     Parameters
@@ -35,10 +35,14 @@ class Turning:
 
     def __init__(self, program: RatesProgram, kernel: Callable[[Program, bool], BoundKernel]) -> None:
         self.program, self._kernel = program, kernel
-        homogeneous = [chart for chart in program.charts if chart.is_homogeneous]
-        self._charts = [np.asarray(chart.coordinates, dtype=np.intp) for chart in homogeneous]
-        self._kinds = [chart.kind for chart in homogeneous]
-        vectors = [chart.coordinates for chart in program.charts if chart.kind == "rotation-vector"]
+        homogeneous = [orientation for orientation in program.orientation_coordinates if orientation.is_homogeneous]
+        self._homogeneous = [np.asarray(orientation.coordinates, dtype=np.intp) for orientation in homogeneous]
+        self._kinds = [orientation.kind for orientation in homogeneous]
+        vectors = [
+            orientation.coordinates
+            for orientation in program.orientation_coordinates
+            if orientation.kind == "rotation-vector"
+        ]
         self._vectors = [np.asarray(one, dtype=np.intp) for one in vectors]
 
     @property
@@ -47,14 +51,14 @@ class Turning:
         return self.program.program is None
 
     @property
-    def can_stray(self) -> bool:
+    def has_homogeneous(self) -> bool:
         """Whether there are coordinates whose size means nothing."""
-        return bool(self._charts)
+        return bool(self._homogeneous)
 
     @property
-    def can_be_left(self) -> bool:
+    def has_singular_coordinates(self) -> bool:
         """Whether there are charts that are singular somewhere, and are left before."""
-        return not all(chart.is_homogeneous for chart in self.program.charts)
+        return not all(orientation.is_homogeneous for orientation in self.program.orientation_coordinates)
 
     def rates(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return the derivatives of the coordinates."""
@@ -66,7 +70,7 @@ class Turning:
         program = self.program.program
         return u if program is None else np.asarray(self._kernel(program, True)(t[None, :], q, u)[0])
 
-    def tangent(self, t: float, q: FloatArray) -> FloatArray:
+    def matrix(self, t: float, q: FloatArray) -> FloatArray:
         """Return B, of shape (coordinates, speeds)."""
         made = self.program
         if made.program is None:
@@ -79,7 +83,7 @@ class Turning:
         """Return coordinates after a small displacement along the speeds; exact to its first order."""
         if self.is_plain:
             return q + displacement
-        return self.normalized(q + self.tangent(t, q) @ displacement)
+        return self.normalized(q + self.matrix(t, q) @ displacement)
 
     def moved_each(self, t: FloatArray, q: FloatArray, displacements: FloatArray) -> FloatArray:
         """Do the same for many states, of shape (states,) and (number, states)."""
@@ -96,42 +100,44 @@ class Turning:
         if self.is_plain:
             return other - q
         target = other.copy()
-        for chart, kind in zip(self._charts, self._kinds, strict=True):
-            target[chart] *= float(np.linalg.norm(q[chart])) / float(np.linalg.norm(other[chart]))
-            if kind == "quaternion" and q[chart] @ other[chart] < 0.0:  # either sign is the same orientation
-                target[chart] *= -1.0
-        return np.asarray(np.linalg.lstsq(self.tangent(t, q), target - q, rcond=None)[0], dtype=float)
+        for orientation, kind in zip(self._homogeneous, self._kinds, strict=True):
+            target[orientation] *= float(np.linalg.norm(q[orientation])) / float(np.linalg.norm(other[orientation]))
+            if (
+                kind == "quaternion" and q[orientation] @ other[orientation] < 0.0
+            ):  # either sign is the same orientation
+                target[orientation] *= -1.0
+        return np.asarray(np.linalg.lstsq(self.matrix(t, q), target - q, rcond=None)[0], dtype=float)
 
     def normalized(self, q: FloatArray) -> FloatArray:
         """Return coordinates with orientations of size one: one state, or many of shape (coordinates, samples).
 
         Rotation vectors of more than three quarters of a turn go the other way round.
         """
-        if not self._charts and not self._vectors:
+        if not self._homogeneous and not self._vectors:
             return q
         q = np.array(q, dtype=float)
-        for chart in self._charts:
-            q[chart] /= np.sqrt(np.sum(q[chart] ** 2, axis=0))
-        for chart in self._vectors:
-            size = np.sqrt(np.sum(q[chart] ** 2, axis=0))
+        for orientation in self._homogeneous:
+            q[orientation] /= np.sqrt(np.sum(q[orientation] ** 2, axis=0))
+        for orientation in self._vectors:
+            size = np.sqrt(np.sum(q[orientation] ** 2, axis=0))
             turns = np.where(size > 1.5 * np.pi, np.round(size / (2.0 * np.pi)), 0.0)
-            q[chart] *= 1.0 - 2.0 * np.pi * turns / np.where(turns > 0.0, size, 1.0)
+            q[orientation] *= 1.0 - 2.0 * np.pi * turns / np.where(turns > 0.0, size, 1.0)
         return q
 
-    def strays(self, q: FloatArray) -> bool:
+    def needs_normalization(self, q: FloatArray) -> bool:
         """Return whether the size of an orientation has gone far from one, where tolerances mean something else."""
-        return any(not 0.25 < float(q[chart] @ q[chart]) < 4.0 for chart in self._charts)
+        return any(not 0.25 < float(q[orientation] @ q[orientation]) < 4.0 for orientation in self._homogeneous)
 
 
-def resting_place(equations: Equations) -> FloatArray:
+def reference_coordinates(equations: Equations) -> FloatArray:
     """Return coordinates of zero, with orientations that are not turned."""
     q = np.zeros(len(equations.coordinates))
-    for chart in equations.charts:
-        q[list(chart.coordinates)] = chart.reference
+    for orientation in equations.orientation_coordinates:
+        q[list(orientation.coordinates)] = orientation.reference
     return q
 
 
-def roughly_turned(equations: Equations, far_off: Callable[[FloatArray], float], q: FloatArray) -> FloatArray:
+def best_rough_orientation(equations: Equations, far_off: Callable[[FloatArray], float], q: FloatArray) -> FloatArray:
     """Return coordinates with each orientation the best of some that cover all of them evenly.
 
     Parameters
@@ -144,13 +150,13 @@ def roughly_turned(equations: Equations, far_off: Callable[[FloatArray], float],
         Where to begin; what is not an orientation stays.
     """
     best, least = q, far_off(q)
-    for chart in equations.charts:
-        if chart.kind != "quaternion" or least == 0.0:
+    for orientation in equations.orientation_coordinates:
+        if orientation.kind != "quaternion" or least == 0.0:
             continue
         start = best
         for candidate in _orientations():
             trial = start.copy()
-            trial[list(chart.coordinates)] = candidate
+            trial[list(orientation.coordinates)] = candidate
             size = far_off(trial)
             if size < 0.999 * least:
                 best, least = trial, size
@@ -185,6 +191,6 @@ def _orientations() -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(float(value) for value in row) for row in (*cube, *turned))
 
 
-def turning_of(assembly: Assembly, form: Coordinates) -> Turning:
+def kinematic_map_of(assembly: Assembly, form: Coordinates) -> KinematicMap:
     """Return how the coordinates of a scene move."""
-    return Turning(assembly.rates(form), assembly.kernel)
+    return KinematicMap(assembly.rates(form), assembly.kernel)

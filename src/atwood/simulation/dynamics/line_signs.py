@@ -5,12 +5,12 @@ from __future__ import annotations
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 
-__all__ = ["actual_sides", "sides_differ"]
+__all__ = ["actual_line_signs", "line_signs_differ"]
 
-Sides = dict[tuple[str, str, str], float]
+LineSigns = dict[tuple[str, str, str], float]
 
 
-def actual_sides(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, form: str) -> Sides:
+def actual_line_signs(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, form: str) -> LineSigns:
     """Return, for pairs of connectors of each part, the sign of the second's position minus the first's.
 
     Parameters
@@ -32,7 +32,7 @@ def actual_sides(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, for
         lambda: assembly.coordinate_program("places", equations, [positions[node][0] for node in nodes]),
     )
     places = dict(zip(nodes, assembly.kernel(program)([t], q, u)[0], strict=True))
-    found: Sides = {}
+    found: LineSigns = {}
     for path, local in assembly.mechanism.locals_.items():
         for a in local.connectors:
             for b in local.connectors:
@@ -42,10 +42,10 @@ def actual_sides(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, for
     return found
 
 
-def sides_differ(assembly: Assembly, actual: Sides) -> bool:
+def line_signs_differ(assembly: Assembly, actual: LineSigns) -> bool:
     """Return whether the signs that lengths were given differ from where things are."""
     for (path, a, b), sign in actual.items():
-        given = assembly.mechanism.locals_[path].binding.sides or {}
+        given = assembly.mechanism.locals_[path].binding.line_signs or {}
         order = list(assembly.mechanism.locals_[path].connectors)
         usual = 1.0 if order.index(a) < order.index(b) else -1.0  # what laws take where the start does not tell
         if given.get((a, b), usual) != sign:

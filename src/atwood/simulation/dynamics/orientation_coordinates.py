@@ -20,26 +20,26 @@ from atwood.mechanics.kinematics.orientation_coordinates import (
     FARTHEST_COSINE,
     FARTHEST_RODRIGUES,
     FARTHEST_ROTATION,
-    chart_margin,
+    orientation_margin,
 )
-from atwood.mechanics.outputs.event_functions import Watch
-from atwood.topology.charts import Chart, Orientation
+from atwood.mechanics.outputs.event_functions import EventFunction
+from atwood.topology.orientation_coordinates import Orientation, OrientationCoordinates
 
 __all__ = [
-    "CHART",
-    "Restated",
-    "chart_watches",
-    "enter_charts",
+    "COORDINATE_SWITCH",
+    "CoordinateSwitch",
     "from_regular",
     "longest_step",
     "own_names",
-    "restated",
+    "switch_coordinates",
+    "switch_functions",
+    "switched",
     "to_regular",
 ]
 
 Reassemble = Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float], Orientation], Assembly]
 
-CHART = "chart"
+COORDINATE_SWITCH = "coordinate switch"
 """Target of the event that a chart is to be left."""
 
 _NEARLY = 0.95
@@ -50,7 +50,7 @@ _FARTHEST_STEP = 2.0
 
 
 @dataclass(frozen=True)
-class Restated:
+class CoordinateSwitch:
     """A change of the coordinates of an orientation.
 
     Attributes
@@ -65,14 +65,16 @@ class Restated:
     body: str
 
 
-def chart_watches(equations: Equations) -> tuple[Watch, ...]:
+def switch_functions(equations: Equations) -> tuple[EventFunction, ...]:
     """Return what tells that a chart is to be left."""
     found = []
-    for chart in equations.charts:
-        margin = chart_margin(chart, [equations.coordinates[i] for i in chart.coordinates])
+    for body_orientation in equations.orientation_coordinates:
+        margin = orientation_margin(body_orientation, [equations.coordinates[i] for i in body_orientation.coordinates])
         if margin is not None:
             says = "its orientation goes on in other coordinates"
-            found.append(Watch(chart.body, "orientation", margin, 1, CHART, says, "1", False))
+            found.append(
+                EventFunction(body_orientation.body, "orientation", margin, 1, COORDINATE_SWITCH, says, "1", False)
+            )
     return tuple(found)
 
 
@@ -108,7 +110,7 @@ def _carried(assembly: Assembly, before: Equations, after: Equations, q: FloatAr
     for i, one in enumerate(after.names):
         if one.name in number:
             found[i] = q[number[one.name]]
-    for old, new in zip(before.charts, after.charts, strict=True):
+    for old, new in zip(before.orientation_coordinates, after.orientation_coordinates, strict=True):
         found[list(new.coordinates)] = _coordinates(new, _quaternion(old, q[list(old.coordinates)]))
     return found
 
@@ -127,7 +129,7 @@ def own_names(assembly: Assembly, names: Sequence[str]) -> tuple[str, ...]:
     if regular is reduced:
         return tuple(names)
     stands: dict[str, list[str]] = {}
-    for old, new in zip(regular.charts, reduced.charts, strict=True):
+    for old, new in zip(regular.orientation_coordinates, reduced.orientation_coordinates, strict=True):
         own = [reduced.names[i].name for i in new.coordinates]
         stands |= {regular.names[i].name: own for i in old.coordinates}
     return tuple(dict.fromkeys(one for name in names for one in stands.get(name, [name])))
@@ -146,18 +148,22 @@ def longest_step(equations: Equations, u: FloatArray) -> float:
     u
         Speeds.
     """
-    own = [list(chart.speeds) for chart in equations.charts if not chart.is_homogeneous]
+    own = [
+        list(body_orientation.speeds)
+        for body_orientation in equations.orientation_coordinates
+        if not body_orientation.is_homogeneous
+    ]
     fastest = max((float(np.linalg.norm(u[one])) for one in own), default=0.0)
     return _FARTHEST_STEP / fastest if fastest > 0.0 else np.inf
 
 
 def _plain(equations: Equations) -> list[str]:
     """Return the names of coordinates that are not of orientations."""
-    turned = {i for chart in equations.charts for i in chart.coordinates}
+    turned = {i for body_orientation in equations.orientation_coordinates for i in body_orientation.coordinates}
     return [one.name for i, one in enumerate(equations.names) if i not in turned]
 
 
-def restated(assembly: Assembly, q: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+def switched(assembly: Assembly, q: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Return the same place with long rotations the other way round, which fulfil the same equations.
 
     Parameters
@@ -175,20 +181,20 @@ def restated(assembly: Assembly, q: FloatArray) -> tuple[FloatArray, tuple[str, 
         Which orientations have changed; none of those that are Euler angles.
     """
     q, bodies = q.copy(), []
-    for chart in assembly.equations.charts:
-        own = list(chart.coordinates)
+    for body_orientation in assembly.equations.orientation_coordinates:
+        own = list(body_orientation.coordinates)
         size = float(np.linalg.norm(q[own]))
-        if chart.kind == "rodrigues" and size * size > _NEARLY * FARTHEST_RODRIGUES:
+        if body_orientation.kind == "rodrigues" and size * size > _NEARLY * FARTHEST_RODRIGUES:
             q[own] /= -(size * size)
-        elif chart.kind == "rotation-vector" and size > _NEARLY * FARTHEST_ROTATION:
+        elif body_orientation.kind == "rotation-vector" and size > _NEARLY * FARTHEST_ROTATION:
             q[own] *= 1.0 - 2.0 * np.pi * max(1.0, round(size / (2.0 * np.pi))) / size
         else:
             continue
-        bodies.append(chart.body)
+        bodies.append(body_orientation.body)
     return q, tuple(bodies)
 
 
-def enter_charts(assembly: Assembly, q: FloatArray, reassemble: Reassemble) -> tuple[Assembly, FloatArray]:
+def switch_coordinates(assembly: Assembly, q: FloatArray, reassemble: Reassemble) -> tuple[Assembly, FloatArray]:
     """Return a scene in charts that are far from singular, and its coordinates there.
 
     Parameters
@@ -204,14 +210,16 @@ def enter_charts(assembly: Assembly, q: FloatArray, reassemble: Reassemble) -> t
     if not orientation.kind.startswith("euler-"):
         return assembly, from_regular(assembly, q)
     turned = set(orientation.turned)
-    for chart, regular in zip(assembly.reduced.charts, assembly.regular.charts, strict=True):
-        first, _, third = chart.turns
-        along = _matrix(chart.base, q[list(regular.coordinates)])[first, third]
+    for body_orientation, regular in zip(
+        assembly.reduced.orientation_coordinates, assembly.regular.orientation_coordinates, strict=True
+    ):
+        first, _, third = body_orientation.turns
+        along = _matrix(body_orientation.base, q[list(regular.coordinates)])[first, third]
         if abs(along) > _NEARLY * FARTHEST_COSINE:
-            turned ^= {chart.body}
+            turned ^= {body_orientation.body}
     if turned != orientation.turned:
         other = Orientation(orientation.kind, frozenset(turned))
-        assembly = reassemble(assembly.modes, assembly.mechanism.sides or {}, other)
+        assembly = reassemble(assembly.modes, assembly.mechanism.line_signs or {}, other)
     return assembly, from_regular(assembly, q)
 
 
@@ -228,20 +236,20 @@ def _matrix(base: int, quaternion: FloatArray) -> FloatArray:
     return matrix if base == 0 else matrix[[1, 2, 0]]
 
 
-def _quaternion(chart: Chart, values: FloatArray) -> FloatArray:
+def _quaternion(body_orientation: OrientationCoordinates, values: FloatArray) -> FloatArray:
     """Return unit quaternions from coordinates of a chart."""
-    if chart.is_homogeneous:
+    if body_orientation.is_homogeneous:
         return np.asarray(values / np.sqrt(np.sum(values**2, axis=0)))
-    if chart.kind.startswith("euler-"):
-        found = np.array([1.0, 0.0, 0.0, 0.0] if chart.base == 0 else [0.5, 0.5, 0.5, 0.5])
+    if body_orientation.kind.startswith("euler-"):
+        found = np.array([1.0, 0.0, 0.0, 0.0] if body_orientation.base == 0 else [0.5, 0.5, 0.5, 0.5])
         found = found.reshape(4, *[1] * (values.ndim - 1)) * np.ones(values.shape[1:])
-        for axis, angle in zip(chart.turns, values, strict=True):
+        for axis, angle in zip(body_orientation.turns, values, strict=True):
             turn = np.zeros_like(found)
             turn[0], turn[1 + axis] = np.cos(0.5 * angle), np.sin(0.5 * angle)
             found = _product(found, turn)
         return found
     square = np.sum(values**2, axis=0)
-    if chart.kind == "rodrigues":
+    if body_orientation.kind == "rodrigues":
         return np.asarray(np.concatenate([[1.0 - square], 2.0 * values]) / (1.0 + square))
     size = np.sqrt(square)
     return np.concatenate([[np.cos(0.5 * size)], 0.5 * values * np.sinc(0.5 * size / np.pi)])
@@ -258,14 +266,14 @@ def _product(p: FloatArray, q: FloatArray) -> FloatArray:
     )
 
 
-def _coordinates(chart: Chart, quaternion: FloatArray) -> FloatArray:
+def _coordinates(body_orientation: OrientationCoordinates, quaternion: FloatArray) -> FloatArray:
     """Return coordinates of a chart from unit quaternions."""
-    if chart.is_homogeneous:
+    if body_orientation.is_homogeneous:
         return quaternion
-    if chart.kind.startswith("euler-"):
-        return _euler_angles(chart.turns, _matrix(chart.base, quaternion))
+    if body_orientation.kind.startswith("euler-"):
+        return _euler_angles(body_orientation.turns, _matrix(body_orientation.base, quaternion))
     short = np.where(quaternion[0] < 0.0, -1.0, 1.0) * quaternion
-    if chart.kind == "rodrigues":
+    if body_orientation.kind == "rodrigues":
         return np.asarray(short[1:] / (1.0 + short[0]))
     sine = np.sqrt(np.sum(short[1:] ** 2, axis=0))
     half = np.arctan2(sine, short[0])

@@ -11,7 +11,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 
-__all__ = ["POOR", "choose_dependent", "review_choice"]
+__all__ = ["POOR", "choose_dependent_coordinates", "review_partitioning"]
 
 
 POOR = 1.5
@@ -25,20 +25,20 @@ _SETTLED = 1.01
 """Exchanges go on until no entry is larger."""
 
 
-def choose_dependent(slope: FloatArray, scales: FloatArray) -> tuple[int, ...]:
+def choose_dependent_coordinates(jacobian: FloatArray, scales: FloatArray) -> tuple[int, ...]:
     """Return the coordinates that the constraints determine best: in turn, the column of which most is left.
 
     Parameters
     ----------
-    slope
+    jacobian
         Derivatives of independent constraints.
     scales
         Size of each coordinate.
     """
-    count = slope.shape[0]
-    rows = np.max(np.abs(slope * scales), axis=1, initial=0.0)
+    count = jacobian.shape[0]
+    rows = np.max(np.abs(jacobian * scales), axis=1, initial=0.0)
     rows[rows == 0.0] = 1.0
-    left = slope * scales / rows[:, None]
+    left = jacobian * scales / rows[:, None]
     chosen: list[int] = []
     for _ in range(count):
         sizes = np.einsum("ij,ij->j", left, left)
@@ -52,19 +52,19 @@ def choose_dependent(slope: FloatArray, scales: FloatArray) -> tuple[int, ...]:
     return tuple(sorted(chosen))
 
 
-def review_choice(slope: FloatArray, scales: FloatArray, dependent: tuple[int, ...]) -> tuple[int, ...]:
+def review_partitioning(jacobian: FloatArray, scales: FloatArray, dependent: tuple[int, ...]) -> tuple[int, ...]:
     """Return a better choice of dependent coordinates if a choice has become poor, else the same one.
 
     Parameters
     ----------
-    slope
+    jacobian
         Derivatives of independent constraints.
     scales
         Size of each coordinate.
     dependent
         The choice.
     """
-    scaled = slope * scales
+    scaled = jacobian * scales
     chosen = list(dependent)
     bound = POOR
     for _ in range(10 * len(chosen)):
@@ -73,7 +73,7 @@ def review_choice(slope: FloatArray, scales: FloatArray, dependent: tuple[int, .
             break
         weights = _weights(scaled, chosen, free)
         if weights is None:
-            better = choose_dependent(slope, scales)
+            better = choose_dependent_coordinates(jacobian, scales)
             if better == tuple(sorted(chosen)):
                 break
             chosen, bound = list(better), _SETTLED

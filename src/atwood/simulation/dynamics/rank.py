@@ -83,28 +83,28 @@ _LOOK = 1e-4
 """While more than this share of the largest row is left, errors of the chosen rows cannot matter."""
 
 
-def row_sizes(slope: Matrix, scales: FloatArray) -> FloatArray:
+def row_sizes(jacobian: Matrix, scales: FloatArray) -> FloatArray:
     """Return the largest entry of each row after its columns are scaled, shape (rows,)."""
-    if is_full(slope):
-        return np.asarray(np.max(np.abs(slope * scales), axis=1, initial=0.0))
+    if is_full(jacobian):
+        return np.asarray(np.max(np.abs(jacobian * scales), axis=1, initial=0.0))
     from atwood.linalg.sparse import csr_row_sizes
 
-    return csr_row_sizes(slope, scales)
+    return csr_row_sizes(jacobian, scales)
 
 
-def row_scales(slope: Matrix, scales: FloatArray, errors: FloatArray) -> FloatArray:
+def row_scales(jacobian: Matrix, scales: FloatArray, errors: FloatArray) -> FloatArray:
     """Return the size of each row: how much it changes when a coordinate changes by its scale, if that is known.
 
     Parameters
     ----------
-    slope
+    jacobian
         The rows.
     scales
         Size of each coordinate.
     errors
         How far rounding can take each row, in the same scales.
     """
-    return trusted_sizes(row_sizes(slope, scales), errors)
+    return trusted_sizes(row_sizes(jacobian, scales), errors)
 
 
 def trusted_sizes(sizes: FloatArray, errors: FloatArray) -> FloatArray:
@@ -226,26 +226,26 @@ def _made_of(kept: Matrix, others: Matrix) -> FloatArray:
     return csr_made_of(kept, others)
 
 
-def least_size(slope: FloatArray, kept: NDArray[np.intp], multipliers: FloatArray) -> FloatArray:
+def least_size(jacobian: FloatArray, kept: NDArray[np.intp], multipliers: FloatArray) -> FloatArray:
     """Return the multipliers of all rows of least size that have the force of some of the independent ones.
 
     What other rows are made of, ``G_r = W G_k``, gives all that exert no force: no small number has to be called zero.
 
     Parameters
     ----------
-    slope
+    jacobian
         The rows at some states, shape (states, rows, columns).
     kept
         Which rows are independent, all others following from them.
     multipliers
         Of the independent rows, shape (states, kept).
     """
-    others = np.setdiff1d(np.arange(slope.shape[1]), kept)
-    found = np.zeros(slope.shape[:2])
+    others = np.setdiff1d(np.arange(jacobian.shape[1]), kept)
+    found = np.zeros(jacobian.shape[:2])
     if not len(kept):
         return found
-    columns = np.max(np.abs(slope[:, kept]), axis=1)
-    even = slope / np.where(columns > 0.0, columns, 1.0)[:, None, :]
+    columns = np.max(np.abs(jacobian[:, kept]), axis=1)
+    even = jacobian / np.where(columns > 0.0, columns, 1.0)[:, None, :]
     rows = np.max(np.abs(even[:, kept]), axis=2)[:, :, None]
     weights = even[:, others] @ np.linalg.pinv(even[:, kept] / rows) / np.swapaxes(rows, 1, 2)
     found[:, kept] = multipliers

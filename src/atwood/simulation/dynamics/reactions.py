@@ -18,10 +18,10 @@ from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.places import to_maximal
 from atwood.forms.program import BalanceProgram
 from atwood.linalg.matrices import is_best_full
-from atwood.mechanics.outputs.internal_reactions import release_program
+from atwood.mechanics.outputs.internal_reactions import internal_reaction_program
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.columns import masses_at
-from atwood.simulation.dynamics.kinematic_map import turning_of
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rank import least_size
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank, kept_along
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, multiplier_sizes, scene_length
@@ -39,7 +39,7 @@ def maximal_state(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArra
     if assembly.form == "dae":
         return q, u
     big_q, big_u = assembly.kernel(to_maximal(assembly), vectorized=True)(t[None, :], q, u)
-    return turning_of(assembly, "dae").normalized(big_q), big_u
+    return kinematic_map_of(assembly, "dae").normalized(big_q), big_u
 
 
 def accelerations_and_multipliers(
@@ -58,7 +58,7 @@ def accelerations_and_multipliers(
 
     Returns
     -------
-    accelerations, multipliers, drift
+    accelerations, multipliers, explicit_rate
         Of shape (number, samples); drift is the constraints' explicit time derivative. With redundant constraints the
         multipliers are those of least size, moments divided by the extent of the scene.
     """
@@ -88,14 +88,17 @@ def _is_full(program: BalanceProgram) -> bool:
 
 
 def _of_least_size(
-    assembly: Assembly, form: FormName, kept: NDArray[np.intp], slope: FloatArray, multipliers: FloatArray
+    assembly: Assembly, form: FormName, kept: NDArray[np.intp], jacobian: FloatArray, multipliers: FloatArray
 ) -> FloatArray:
     """Return the multipliers of all constraints from those of the independent ones, shape (constraints, samples)."""
-    program, samples = assembly.balance(form), slope.shape[1]
+    program, samples = assembly.balance(form), jacobian.shape[1]
     # Forces, and moments divided by a length, along displacements and rotations times a length.
     sizes = multiplier_sizes(assembly, form)[:, None]
     columns = motion_scales(assembly.in_coordinates(form), scene_length(assembly))[:, None]
-    even, forces = slope * sizes[program.slope_rows] * columns[program.slope_columns], multipliers / sizes[kept]
+    even, forces = (
+        jacobian * sizes[program.jacobian_rows] * columns[program.jacobian_columns],
+        multipliers / sizes[kept],
+    )
     if not _is_full(program):
         return _states(assembly, form, kept).least_size(even, forces) * sizes
     found = np.full((program.constraints, samples), np.nan)
@@ -104,7 +107,7 @@ def _of_least_size(
     for first in range(0, len(known), step):
         part = known[first : first + step]
         full = np.zeros((len(part), program.constraints, program.speeds))
-        full[:, program.slope_rows, program.slope_columns] = even[:, part].T
+        full[:, program.jacobian_rows, program.jacobian_columns] = even[:, part].T
         found[:, part] = least_size(full, kept, forces[:, part].T).T
     return found * sizes
 
@@ -119,9 +122,9 @@ def _solved(
     """Return accelerations and the multipliers of the independent constraints."""
     program, (t, q, u) = assembly.balance(form), state
     n, m, samples = program.speeds, program.constraints, len(t)
-    mass, bias, _, _, gamma, slope, _ = values
+    mass, bias, _, _, gamma, jacobian, _ = values
     if not _is_full(program):
-        return _states(assembly, form, kept).solve(t, (mass, bias, gamma, slope))
+        return _states(assembly, form, kept).solve(t, (mass, bias, gamma, jacobian))
     found_a, found_l = np.zeros((n, samples)), np.zeros((len(kept), samples))
     size = n + len(kept)
     step = max(1, _CHUNK // max(1, size * size))
@@ -133,12 +136,12 @@ def _solved(
         else:
             full_mass = np.zeros((count, n, n))
             full_mass[:, program.mass_rows, program.mass_columns] = mass[:, part].T
-        full_slope = np.zeros((count, m, n))
-        full_slope[:, program.slope_rows, program.slope_columns] = slope[:, part].T
+        full_jacobian = np.zeros((count, m, n))
+        full_jacobian[:, program.jacobian_rows, program.jacobian_columns] = jacobian[:, part].T
         matrix = np.zeros((count, size, size))
         matrix[:, :n, :n] = full_mass
-        matrix[:, :n, n:] = -np.swapaxes(full_slope[:, kept], 1, 2)
-        matrix[:, n:, :n] = full_slope[:, kept]
+        matrix[:, :n, n:] = -np.swapaxes(full_jacobian[:, kept], 1, 2)
+        matrix[:, n:, :n] = full_jacobian[:, kept]
         right = -np.concatenate([bias[:, part].T, gamma[kept][:, part].T], axis=1)
         scale = np.sqrt(np.maximum(np.abs(matrix).max(axis=1), np.abs(matrix).max(axis=2))) if size else right
         scale[scale == 0.0] = 1.0
@@ -173,9 +176,11 @@ class ReactionSolver:
         sizes = motion_scales(assembly.maximal, self._length)
         self.finding = find_rank(balance_of(assembly, "dae"), t, big_q[:, 0], sizes)
         self._of_constraint = {one.key: i for i, one in enumerate(assembly.maximal.constraints)}
-        self._release = assembly.shared.get(
-            "release",
-            lambda: release_program(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.parameters),
+        self._internal_reactions = assembly.shared.get(
+            "internal reactions",
+            lambda: internal_reaction_program(
+                assembly.mechanism, assembly.maximal, assembly.reactions, assembly.parameters
+            ),
         )
 
     def for_rows(self, rows: FloatArray) -> ReactionSolver:
@@ -198,20 +203,20 @@ class ReactionSolver:
             accelerations_and_multipliers(assembly, "dae", t[part], big_q[:, part], big_u[:, part], kept)
             for part, kept in self._kept_along(self.finding, "dae", t, big_q)
         ]
-        a, multipliers, drift = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
+        a, multipliers, explicit_rate = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
         values = np.zeros((len(assembly.reactions), len(t)))
-        released = None
-        if self._release is not None:
-            kernel = assembly.kernel(self._release.program, vectorized=True)
-            (released,) = kernel(t[None, :], big_q, big_u, a, multipliers)
+        internal = None
+        if self._internal_reactions is not None:
+            kernel = assembly.kernel(self._internal_reactions.program, vectorized=True)
+            (internal,) = kernel(t[None, :], big_q, big_u, a, multipliers)
         for i, reaction in enumerate(assembly.reactions):
             if reaction.axis >= 0:
-                rows = {} if self._release is None else self._release.rows
+                rows = {} if self._internal_reactions is None else self._internal_reactions.rows
                 # Where another rigid connection shares the load, no share is known.
-                values[i] = released[rows[reaction.path]] if released is not None and reaction.path in rows else np.nan
+                values[i] = internal[rows[reaction.path]] if internal is not None and reaction.path in rows else np.nan
             elif reaction.key in self._of_constraint:
                 values[i] = reaction.sign * multipliers[self._of_constraint[reaction.key]]
-        power = -np.sum(multipliers * drift, axis=0) if len(multipliers) else np.zeros(len(t))
+        power = -np.sum(multipliers * explicit_rate, axis=0) if len(multipliers) else np.zeros(len(t))
         return values, power
 
     def _kept_along(

@@ -71,13 +71,13 @@ class RankFinding:
 class _Place:
     """The constraints' slopes at a place, columns scaled, with their errors, and the rows that are independent."""
 
-    slope: FloatArray
+    jacobian: FloatArray
     errors: FloatArray
     kept: list[int]
 
     def smallest(self, kept: list[int], units: FloatArray) -> FloatArray:
         """Return the singular values of some rows in given units."""
-        return np.asarray(np.linalg.svd(self.slope[kept] / units[kept, None], compute_uv=False))
+        return np.asarray(np.linalg.svd(self.jacobian[kept] / units[kept, None], compute_uv=False))
 
 
 def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> RankFinding:
@@ -96,7 +96,7 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     if count == 0:
         return RankFinding((), (), 0, 0)
     here = _look(balance, t, q, scales)
-    sizes = row_sizes(here.slope, np.ones(len(scales)))
+    sizes = row_sizes(here.jacobian, np.ones(len(scales)))
     everything = list(range(count))
     if len(here.kept) == count and here.smallest(everything, sizes)[-1] > CLEAR:
         return RankFinding(tuple(everything), (), count, count)
@@ -126,8 +126,8 @@ def review_kept(finding: RankFinding, balance: Balance, t: float, q: FloatArray,
     """
     if not finding.redundant or not finding.kept:
         return finding
-    slope = scaled(balance.held(t, q, np.zeros_like(scales)).slope, scales)
-    kept = tuple(review_rows(slope, finding.errors, finding.kept))
+    jacobian = scaled(balance.constraints_at(t, q, np.zeros_like(scales)).jacobian, scales)
+    kept = tuple(review_rows(jacobian, finding.errors, finding.kept))
     if kept == finding.kept or len(kept) < len(finding.kept):  # at a singular position no choice is a good one
         return finding
     redundant = tuple(i for i in range(balance.constraints) if i not in set(kept))
@@ -166,17 +166,17 @@ def kept_along(
 
 
 def _look(balance: Balance, t: float, q: FloatArray, scales: FloatArray, miss: float = 0.0) -> _Place:
-    slope = scaled(balance.held(t, q, np.zeros_like(scales)).slope, scales)
-    errors = balance.errors.of_slopes(t, q, scales, miss)
-    kept = independent_rows(slope, errors)
-    return _Place(to_array(slope), errors, kept)
+    jacobian = scaled(balance.constraints_at(t, q, np.zeros_like(scales)).jacobian, scales)
+    errors = balance.errors.of_jacobian(t, q, scales, miss)
+    kept = independent_rows(jacobian, errors)
+    return _Place(to_array(jacobian), errors, kept)
 
 
 def _nearby(balance: Balance, t: float, q: FloatArray, scales: FloatArray, here: _Place) -> tuple[list[_Place], bool]:
     """Return admissible places near by, and whether there seem to be any."""
     # Constraints on velocities alone keep nothing from being reached.
     holding = [i for i in here.kept if i in set(balance.holonomic.tolist())]
-    admissible = open_directions(here.slope[holding], CLEAR)
+    admissible = open_directions(here.jacobian[holding], CLEAR)
     still, found = np.zeros_like(scales), []
     for attempt, step in enumerate(_STEPS, 1):
         if not len(admissible):
@@ -188,7 +188,7 @@ def _nearby(balance: Balance, t: float, q: FloatArray, scales: FloatArray, here:
         held = np.where(np.arange(len(scales)) == np.argmax(np.abs(along)), 0.0, scales)
         for free, iterations in ((scales, 12), (held, 30)):
             try:
-                nearby, _ = balance.project(t, balance.turning.moved(t, q, way), still, free, iterations)
+                nearby, _ = balance.project(t, balance.kinematic_map.moved(t, q, way), still, free, iterations)
                 miss = balance.misses(t, nearby, still, scales)[0]
                 if miss <= _ADMISSIBLE:
                     found.append(_look(balance, t, nearby, scales, miss))
@@ -202,11 +202,11 @@ def _lost(here: _Place, nearby: list[_Place], kept: list[int]) -> tuple[int, ...
     """Return which independent constraints follow from the others at the start, or all but follow."""
     if not nearby or not kept:
         return ()
-    ones = np.ones(here.slope.shape[1])
-    units = np.max([row_sizes(place.slope, ones) for place in (here, *nearby)], axis=0)
+    ones = np.ones(here.jacobian.shape[1])
+    units = np.max([row_sizes(place.jacobian, ones) for place in (here, *nearby)], axis=0)
     away = max(float(place.smallest(kept, units)[-1]) for place in nearby)
     missing = int(np.sum(here.smallest(kept, units) < SINGULAR * away))
     if not missing:
         return ()
-    left = independent_rows(here.slope[kept], here.errors[kept], len(kept) - missing)
+    left = independent_rows(here.jacobian[kept], here.errors[kept], len(kept) - missing)
     return tuple(one for i, one in enumerate(kept) if i not in set(left))

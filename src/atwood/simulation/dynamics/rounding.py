@@ -16,7 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
-from atwood.simulation.dynamics.kinematic_map import Turning
+from atwood.simulation.dynamics.kinematic_map import KinematicMap
 
 __all__ = ["RowErrors"]
 
@@ -45,7 +45,7 @@ class RowErrors:
         could be any: each is as uncertain as the most uncertain one.
     places
         The row and the column of each entry.
-    turning
+    kinematic_map
         How the coordinates move with the speeds.
     of_coordinates
         Whether the entries are derivatives by coordinates, and not along the speeds.
@@ -58,14 +58,14 @@ class RowErrors:
         groups: tuple[str, str],
         laws: Sequence[Hashable],
         places: tuple[Any, Any],
-        turning: Turning,
+        kinematic_map: KinematicMap,
         of_coordinates: bool = False,
     ) -> None:
-        self._assembly, self._program, self._groups, self._turning = assembly, program, groups, turning
+        self._assembly, self._program, self._groups, self._kinematic_map = assembly, program, groups, kinematic_map
         self._rows, self._columns = (np.asarray(one, dtype=np.intp) for one in places)
         number = {law: i for i, law in enumerate(dict.fromkeys(laws))}
         self._laws = np.array([number[law] for law in laws], dtype=np.intp)
-        self._of_coordinates = of_coordinates and not turning.is_plain
+        self._of_coordinates = of_coordinates and not kinematic_map.is_plain
         self._first: float | None = None
         self._reach = self._passed = 0.0
         self._values = self._entries = self._tangent = np.zeros(0)
@@ -87,7 +87,7 @@ class RowErrors:
             self._first = t if self._first is None else self._first
             self._reach, self._passed = max(reach, self._reach, 1.0), max(passed, self._passed)
             aside = _ASIDE * scales * np.sin(_GOLDEN * np.arange(1.0, len(scales) + 1.0))
-            self._learn(t, self._turning.moved(t, q, aside), scales)
+            self._learn(t, self._kinematic_map.moved(t, q, aside), scales)
             self._known = None
         if self._known is None or self._known[0] is not scales:
             found = self._shared(np.maximum(self._values, self._of_rows(self._entries, self._tangent, scales)))
@@ -101,13 +101,13 @@ class RowErrors:
 
     def _learn(self, t: float, q: FloatArray, scales: FloatArray) -> None:
         values, entries = (_spread(one) for one in self._rough(t, q, scales, 1.0))
-        tangent = self._tangent_at(t, q)
+        tangent = self._kinematic_matrix(t, q)
         if len(self._entries):
             values, entries = np.maximum(values, self._values), np.maximum(entries, self._entries)
             tangent = np.maximum(tangent, self._tangent)
         self._values, self._entries, self._tangent = values, entries, tangent
 
-    def of_slopes(self, t: float, q: FloatArray, scales: FloatArray, miss: float = 0.0) -> FloatArray:
+    def of_jacobian(self, t: float, q: FloatArray, scales: FloatArray, miss: float = 0.0) -> FloatArray:
         """Return how far rounding can take slopes at a place that is known no better than the values, shape (rows,).
 
         Parameters
@@ -117,7 +117,7 @@ class RowErrors:
         miss
             By how much the place misses what it was to meet, relative to the scales.
         """
-        tangent = self._tangent_at(t, q)
+        tangent = self._kinematic_matrix(t, q)
         values, found = self._rough(t, q, scales, 1.0)
         errors = self._of_rows(_spread(found), tangent, scales)
         sizes = np.maximum(self._of_rows(np.max(np.abs(found), axis=1), tangent, scales), errors / ROUGHNESS)
@@ -139,7 +139,7 @@ class RowErrors:
         speeds = np.zeros(len(self._program.inputs[2].symbols))
         places = q[:, None] * roughly(len(q))
         steps = off * scales[:, None] * (roughly(len(scales), len(q)) - 1.0)
-        places = places + (steps if self._turning.is_plain else self._turning.tangent(t, q) @ steps)
+        places = places + (steps if self._kinematic_map.is_plain else self._kinematic_map.matrix(t, q) @ steps)
         found = rough(self._assembly.parameter_values, t * roughly(1), places, speeds)
         found = np.where(np.all(np.isfinite(found), axis=1, keepdims=True), found, 0.0)  # others say that it has none
         return found[:count], found[count:]
@@ -150,8 +150,8 @@ class RowErrors:
         values, entries = (by_name[name] for name in self._groups)
         return self._program, RoughProgram(self._program, (*values, *entries))
 
-    def _tangent_at(self, t: float, q: FloatArray) -> FloatArray:
-        return np.abs(self._turning.tangent(t, q)) if self._of_coordinates else np.zeros(0)
+    def _kinematic_matrix(self, t: float, q: FloatArray) -> FloatArray:
+        return np.abs(self._kinematic_map.matrix(t, q)) if self._of_coordinates else np.zeros(0)
 
     def _of_rows(self, entries: FloatArray, tangent: FloatArray, scales: FloatArray) -> FloatArray:
         """Return the sizes of rows from those of their entries."""

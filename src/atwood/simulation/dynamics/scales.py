@@ -56,9 +56,9 @@ def scene_length(assembly: Assembly) -> float:
 def coordinate_scales(equations: Equations, length: float) -> FloatArray:
     """Return the size of each coordinate: the extent for a length, one radian for an angle, else one."""
     sizes = np.array([length if one.unit == "m" else 1.0 for one in equations.names])
-    for chart in equations.charts:
-        if chart.kind == "rodrigues":
-            sizes[list(chart.coordinates)] = 0.25  # the tangent of a quarter of an angle
+    for orientation in equations.orientation_coordinates:
+        if orientation.kind == "rodrigues":
+            sizes[list(orientation.coordinates)] = 0.25  # the tangent of a quarter of an angle
     return sizes
 
 

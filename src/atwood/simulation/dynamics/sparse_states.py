@@ -32,11 +32,11 @@ class States:
         self._program, self._kept = program, np.asarray(kept, dtype=np.intp)
         n, m = program.speeds, program.constraints
         mass = Pattern(program.mass_rows, program.mass_columns, (n, n))
-        slope = Pattern(program.slope_rows, program.slope_columns, (m, n))
-        held, self._which = slope.chosen(kept)
+        jacobian = Pattern(program.jacobian_rows, program.jacobian_columns, (m, n))
+        held, self._which = jacobian.chosen(kept)
         self._borders = Borders(mass, held)
         self._augmented: Augmented | None = None
-        self._normal = Normal(slope, kept) if len(kept) < m else None
+        self._normal = Normal(jacobian, kept) if len(kept) < m else None
 
     def solve(
         self, t: FloatArray, values: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
@@ -55,15 +55,15 @@ class States:
         SolveError
             If the forces do not determine the accelerations at a state.
         """
-        mass, bias, gamma, slope = values
+        mass, bias, gamma, jacobian = values
         program, kept = self._program, self._kept
         found_a, found_l = np.zeros((program.speeds, len(t))), np.zeros((len(kept), len(t)))
         good = np.zeros(len(t), dtype=bool)
-        step = max(1, _CHUNK // (8 * (len(mass) + len(slope)) + 1))
+        step = max(1, _CHUNK // (8 * (len(mass) + len(jacobian)) + 1))
         for first in range(0, len(t), step):
             part = slice(first, first + step)
             found_a[:, part], found_l[:, part], good[part] = self._borders.solve(
-                mass[:, part], slope[self._which, part], bias[:, part], gamma[kept, part]
+                mass[:, part], jacobian[self._which, part], bias[:, part], gamma[kept, part]
             )
         bad = np.flatnonzero(~good)
         if len(bad):
@@ -73,8 +73,8 @@ class States:
 
             n, m = program.speeds, program.constraints
             full_mass = csr_of(program.mass_rows, program.mass_columns, mass[:, i], (n, n))
-            full_slope = csr_of(program.slope_rows, program.slope_columns, slope[:, i], (m, n))
-            solved = solve_bordered(full_mass, full_slope[kept], bias[:, i], gamma[kept, i])
+            full_jacobian = csr_of(program.jacobian_rows, program.jacobian_columns, jacobian[:, i], (m, n))
+            solved = solve_bordered(full_mass, full_jacobian[kept], bias[:, i], gamma[kept, i])
             if solved is None:
                 raise SolveError(
                     f"at t = {t[i]:.6g} the forces do not determine the accelerations",
@@ -91,38 +91,41 @@ class States:
     ) -> None:
         """Solve for some states where something has no mass of its own."""
         if self._augmented is None:
-            self._augmented = Augmented(self._borders.mass, self._borders.slope)
-        mass, bias, gamma, slope = (one[:, which] for one in values)
+            self._augmented = Augmented(self._borders.mass, self._borders.jacobian)
+        mass, bias, gamma, jacobian = (one[:, which] for one in values)
         a, multipliers, good = found
         a[:, which], multipliers[:, which], good[which] = self._augmented.solve(
-            mass, slope[self._which], bias, gamma[self._kept]
+            mass, jacobian[self._which], bias, gamma[self._kept]
         )
 
-    def least_size(self, slope: FloatArray, multipliers: FloatArray) -> FloatArray:
+    def least_size(self, jacobian: FloatArray, multipliers: FloatArray) -> FloatArray:
         """Return the multipliers of all constraints of least size with the force of some of the independent ones.
 
         Parameters
         ----------
-        slope
+        jacobian
             Entries of the slopes, shape (entries, states).
         multipliers
             Of the independent constraints, shape (number, states).
         """
         if self._normal is None:
             return multipliers
-        m, states = self._program.constraints, slope.shape[1]
+        m, states = self._program.constraints, jacobian.shape[1]
         found = np.empty((m, states))
         step = max(1, _CHUNK // (self._normal.volume + (m - len(self._kept)) * (m + 2 * len(self._kept))))
         for first in range(0, states, step):
             part = slice(first, first + step)
-            found[:, part] = self._normal.least_size(slope[:, part], multipliers[:, part])
+            found[:, part] = self._normal.least_size(jacobian[:, part], multipliers[:, part])
         bad = np.flatnonzero(~np.all(np.isfinite(found), axis=0))
         if len(bad):
             from atwood.linalg.sparse import csr_least_norm, csr_of
 
             for i in bad:
                 full = csr_of(
-                    self._program.slope_rows, self._program.slope_columns, slope[:, i], (m, self._program.speeds)
+                    self._program.jacobian_rows,
+                    self._program.jacobian_columns,
+                    jacobian[:, i],
+                    (m, self._program.speeds),
                 )
                 found[:, i] = csr_least_norm(full.T, full[self._kept].T @ multipliers[:, i])
         return found

@@ -23,14 +23,14 @@ from atwood.model.declare.contributions import Load
 from atwood.model.declare.laws import scalars
 from atwood.model.local.laws import LocalPart
 
-__all__ = ["Missing", "find_missing", "missing_at", "states_ahead"]
+__all__ = ["UndefinedValue", "find_undefined_value", "states_ahead", "undefined_value_at"]
 
 _FARTHEST = 1e-4
 """So much of a run is looked ahead: where steps get too small, what stops them is near."""
 
 
 @dataclass(frozen=True)
-class Missing:
+class UndefinedValue:
     """Something that has no value.
 
     Attributes
@@ -86,7 +86,7 @@ def states_ahead(
         return t + h, q + h * q_rate + bent, u + h * a
 
 
-def find_missing(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> Missing | None:
+def find_undefined_value(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> UndefinedValue | None:
     """Return the first law or input of a component that has no value at the first of some states where one has none.
 
     Parameters
@@ -108,12 +108,12 @@ def find_missing(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray
     i = int(places[0])
     row = int(np.argmax(missing[:, i]))
     reason = quantities[row].why or _reason(assembly, program, row, (float(t[i]), q[:, i], u[:, i]))
-    return Missing(float(t[i]), quantities[row].part, quantities[row].words, reason)
+    return UndefinedValue(float(t[i]), quantities[row].part, quantities[row].words, reason)
 
 
-def missing_at(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Missing | None:
+def undefined_value_at(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> UndefinedValue | None:
     """Return the same for one state."""
-    return find_missing(assembly, np.array([t]), q[:, None], u[:, None])
+    return find_undefined_value(assembly, np.array([t]), q[:, None], u[:, None])
 
 
 def _law_values(assembly: Assembly) -> tuple[list[_Quantity], Program]:
@@ -175,7 +175,7 @@ def _slopes(local: LocalPart, values: list[Expression], of_velocities: bool) -> 
         angle = one.angular_speed if of_velocities else one.angle
         wanted += [angle] if angle is not None else []
     one_each = values[0].graph.constant(1.0)
-    return [slope for value in values for slope in vjp([value], [one_each], wanted)]
+    return [constraint_jacobian for value in values for constraint_jacobian in vjp([value], [one_each], wanted)]
 
 
 def _reason(assembly: Assembly, program: Program, row: int, state: tuple[float, FloatArray, FloatArray]) -> str:

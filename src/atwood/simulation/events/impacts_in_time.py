@@ -19,7 +19,7 @@ from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_o
 from atwood.simulation.dynamics.rank import RANK
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
-from atwood.simulation.events.modes import Happening, generalized_speeds, plastic_impact
+from atwood.simulation.events.modes import EventRecord, generalized_speeds, plastic_impact
 
 __all__ = ["pass_time_event"]
 
@@ -36,7 +36,7 @@ _HOLDS = 1e-6
 
 def pass_time_event(
     before: Assembly, after: Assembly, t: float, q: FloatArray, u: FloatArray, length: float
-) -> tuple[FloatArray, FloatArray, tuple[Happening, ...]]:
+) -> tuple[FloatArray, FloatArray, tuple[EventRecord, ...]]:
     """Return the state just after a time event, and the impacts, one for each part whose motion jumps in speed.
 
     Parameters
@@ -64,7 +64,10 @@ def pass_time_event(
     if after.form == "dae":  # a jump as small as rounding allows leaves nothing that would have to be caught up with
         q, u = balance.project(t, big_q, big_u, sizes)
         big_q = q
-    fastest = max(float(np.max(np.abs(x), initial=0.0)) for x in (big_u / sizes, was.drift / rows, now.drift / rows))
+    fastest = max(
+        float(np.max(np.abs(x), initial=0.0))
+        for x in (big_u / sizes, was.explicit_rate / rows, now.explicit_rate / rows)
+    )
     jumps = np.abs(now.rate - was.rate) / rows
     constraints = after.maximal.constraints
     faster = [constraints[i].key for i in np.flatnonzero(jumps > _SAME_SPEED * fastest)]
@@ -72,9 +75,9 @@ def pass_time_event(
         return q, u, ()
     laws = {part: law for part, law, _ in reversed(faster)}
     message = "the speed of the prescribed motion jumps: an impact"
-    impacts = tuple(Happening(t, part, law, message, "", True) for part, law in reversed(laws.items()))
+    impacts = tuple(EventRecord(t, part, law, message, "", True) for part, law in reversed(laws.items()))
     big_u = plastic_impact(after, balance, impacts[0], (t, big_q, big_u), sizes)
-    left = np.abs(now.slope @ big_u + now.drift) / rows
+    left = np.abs(now.jacobian @ big_u + now.explicit_rate) / rows
     if np.max(left) > _HOLDS * fastest:
         raise SolveError(
             f"at t = {t:.9g} prescribed motions jump in speed, and no velocities meet them all",
@@ -110,8 +113,8 @@ def _check_places(
     if moved[worst] > _IN_PLACE:
         by = _in_words(after, constraints[worst], float(now.value[worst] - was.value[worst]))
     else:  # by half a turn, at which the sine of an angle is zero again, the constraint is turned over
-        slopes = [to_array(scaled(one.slope, sizes, rows)) for one in sides]
-        over = np.flatnonzero(np.sum(slopes[0] * slopes[1], axis=1) < -RANK)
+        jacobians = [to_array(scaled(one.jacobian, sizes, rows)) for one in sides]
+        over = np.flatnonzero(np.sum(jacobians[0] * jacobians[1], axis=1) < -RANK)
         if not len(over):
             return
         worst, by = int(over[0]), " by more than a quarter turn"

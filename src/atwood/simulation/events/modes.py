@@ -19,11 +19,16 @@ from atwood.forms.places import to_maximal
 from atwood.late import dataclass
 from atwood.linalg.matrices import is_full, scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
-from atwood.mechanics.outputs.event_functions import Watch, list_watches
+from atwood.mechanics.outputs.event_functions import EventFunction, list_event_functions
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
-from atwood.simulation.dynamics.kinematic_map import resting_place, turning_of
-from atwood.simulation.dynamics.line_signs import actual_sides
-from atwood.simulation.dynamics.orientation_coordinates import CHART, Reassemble, chart_watches, enter_charts
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
+from atwood.simulation.dynamics.line_signs import actual_line_signs
+from atwood.simulation.dynamics.orientation_coordinates import (
+    COORDINATE_SWITCH,
+    Reassemble,
+    switch_coordinates,
+    switch_functions,
+)
 from atwood.simulation.dynamics.rank import least_norm
 from atwood.simulation.dynamics.reactions import ReactionSolver, maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
@@ -32,11 +37,11 @@ from atwood.simulation.problem.problem import Plan
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode, EventData
 
-__all__ = ["EventProbe", "Happening", "enter_mode", "find_watches", "generalized_speeds", "plastic_impact"]
+__all__ = ["EventProbe", "EventRecord", "enter_mode", "find_event_functions", "generalized_speeds", "plastic_impact"]
 
 
 @dataclass(frozen=True)
-class Happening:
+class EventRecord:
     """An event that has happened.
 
     Attributes
@@ -65,13 +70,13 @@ class Happening:
         return f"at t = {self.time:.9g} s, {self.part}: {self.message}"
 
 
-def find_watches(assembly: Assembly) -> tuple[Watch, ...]:
+def find_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
     """Return what is watched in the modes of an assembly."""
     return assembly.shared.get(
-        "watches",
+        "event_functions",
         lambda: (
-            *list_watches(assembly.mechanism, assembly.equations, assembly.reactions, assembly.modes),
-            *chart_watches(assembly.equations),  # last: of what happens at the same time, the others come first
+            *list_event_functions(assembly.mechanism, assembly.equations, assembly.reactions, assembly.modes),
+            *switch_functions(assembly.equations),  # last: of what happens at the same time, the others come first
         ),
     )
 
@@ -84,11 +89,11 @@ class _Needs:
     accelerations: bool
 
 
-def _find_needs(assembly: Assembly, watches: Sequence[Watch]) -> _Needs:
+def _find_needs(assembly: Assembly, event_functions: Sequence[EventFunction]) -> _Needs:
     symbols, accelerations = [one.symbol for one in assembly.reactions], assembly.equations.accelerations
     return _Needs(
-        any(depends_on(one.value, symbols) for one in watches),
-        any(depends_on(one.value, accelerations) for one in watches),
+        any(depends_on(one.value, symbols) for one in event_functions),
+        any(depends_on(one.value, accelerations) for one in event_functions),
     )
 
 
@@ -109,35 +114,37 @@ class EventProbe:
     def __init__(self, plan: Plan, t: float, q: FloatArray, u: FloatArray, tolerance: float) -> None:
         self.plan = plan
         self.assembly = assembly = plan.assembly
-        self.watches = find_watches(assembly)
-        self.needs = assembly.shared.get("watched needs", lambda: _find_needs(assembly, self.watches))
+        self.event_functions = find_event_functions(assembly)
+        self.needs = assembly.shared.get("watched needs", lambda: _find_needs(assembly, self.event_functions))
         self.reactions = ReactionSolver(assembly, t, q, u) if self.needs.reactions else None
         self.kernel = (
-            assembly.kernel(assembly.known_program("events", "events", lambda: [one.value for one in self.watches]))
-            if self.watches
+            assembly.kernel(
+                assembly.known_program("events", "events", lambda: [one.value for one in self.event_functions])
+            )
+            if self.event_functions
             else None
         )
         scales = plan.scales
         sizes = {"m": scales.length, "N": scales.force, "m/s": scales.length / scales.time}
-        small = [10.0 * tolerance * sizes.get(one.unit, 1.0) for one in self.watches]
+        small = [10.0 * tolerance * sizes.get(one.unit, 1.0) for one in self.event_functions]
         self._shift = np.zeros(len(small))
-        values = np.asarray(self.values(t, q, u)) if self.watches else np.zeros(0)
+        values = np.asarray(self.values(t, q, u)) if self.event_functions else np.zeros(0)
         self.broken = next(
-            (one for one, v, s in zip(self.watches, values, small, strict=True) if one.direction * v > s), None
+            (one for one, v, s in zip(self.event_functions, values, small, strict=True) if one.direction * v > s), None
         )
-        for i, (one, value) in enumerate(zip(self.watches, values, strict=True)):
+        for i, (one, value) in enumerate(zip(self.event_functions, values, strict=True)):
             if abs(value) <= small[i]:
                 self._shift[i] = -one.direction * small[i]
 
     @property
     def directions(self) -> tuple[int, ...]:
         """Direction of each event."""
-        return tuple(one.direction for one in self.watches)
+        return tuple(one.direction for one in self.event_functions)
 
     @property
     def rough(self) -> tuple[int, ...]:
         """Numbers of the events whose exact time does not matter."""
-        return tuple(i for i, one in enumerate(self.watches) if one.target == CHART)
+        return tuple(i for i, one in enumerate(self.event_functions) if one.target == COORDINATE_SWITCH)
 
     def values(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return the value of each event at a state, shifted where it starts at zero."""
@@ -160,12 +167,12 @@ class EventProbe:
         for_ida
             Whether SUNDIALS is to call it.
         """
-        if not self.watches or not len(self.assembly.equations.coordinates):
+        if not self.event_functions or not len(self.assembly.equations.coordinates):
             return None
         kept, maximal = self.plan.finding.kept, () if self.reactions is None else self.reactions.finding.kept
 
         def make() -> EventCode | None:
-            program = event_program(self.assembly, [one.value for one in self.watches], kept, maximal)
+            program = event_program(self.assembly, [one.value for one in self.event_functions], kept, maximal)
             if program is None or any(node.operation == "external" for node in program.nodes):
                 return None
             try:
@@ -179,26 +186,26 @@ class EventProbe:
 
     def function(self) -> Callable[[float, FloatArray, FloatArray], FloatArray] | None:
         """Return the events as a function of the solver's vector; None if nothing is watched."""
-        if not self.watches:
+        if not self.event_functions:
             return None
         n, m = len(self.assembly.equations.coordinates), len(self.assembly.equations.speeds)
         return lambda t, y, yp: self.values(t, y[:n], y[n : n + m])
 
-    def broken_at_start(self, t: float) -> Happening | None:
+    def broken_at_start(self, t: float) -> EventRecord | None:
         """Return the first event whose one-sided bound does not hold from the outset."""
-        return None if self.broken is None else self._happening(t, self.broken)
+        return None if self.broken is None else self._record(t, self.broken)
 
-    def between(self, start: float, end: float) -> Happening | None:
+    def between(self, start: float, end: float) -> EventRecord | None:
         """Return the first event between two times in which nothing is free to move; None if there is none."""
-        if not self.watches:
+        if not self.event_functions:
             return None
         nothing = np.zeros(0)
         before, after = self.values(start, nothing, nothing), self.values(end, nothing, nothing)
-        found: list[tuple[float, Watch]] = []
-        for i, watch in enumerate(self.watches):
+        found: list[tuple[float, EventFunction]] = []
+        for i, function in enumerate(self.event_functions):
             if before[i] == 0.0 or np.sign(before[i]) == np.sign(after[i]):
                 continue
-            if watch.direction and np.sign(after[i] - before[i]) != watch.direction:
+            if function.direction and np.sign(after[i] - before[i]) != function.direction:
                 continue
             low, high = start, end
             while high - low > 4e-16 * max(abs(low), abs(high), end - start):
@@ -207,22 +214,22 @@ class EventProbe:
                     break
                 same = np.sign(self.values(middle, nothing, nothing)[i]) == np.sign(before[i])
                 low, high = (middle, high) if same else (low, middle)
-            found.append((high, watch))
-        return self._happening(*min(found, key=lambda one: one[0])) if found else None
+            found.append((high, function))
+        return self._record(*min(found, key=lambda one: one[0])) if found else None
 
-    def name(self, t: float, events: Sequence[int]) -> Happening:
+    def name(self, t: float, events: Sequence[int]) -> EventRecord:
         """Return what happened when the driver reports an event."""
-        watch = next(one for one, sign in zip(self.watches, events, strict=True) if sign)
-        return self._happening(t, watch)
+        function = next(one for one, sign in zip(self.event_functions, events, strict=True) if sign)
+        return self._record(t, function)
 
-    def _happening(self, t: float, watch: Watch) -> Happening:
-        return Happening(t, watch.part, watch.law, watch.message, watch.target, watch.impact)
+    def _record(self, t: float, function: EventFunction) -> EventRecord:
+        return EventRecord(t, function.part, function.law, function.message, function.target, function.impact)
 
 
 def enter_mode(
     state: tuple[float, FloatArray, FloatArray],
     assembly: Assembly,
-    happening: Happening,
+    event: EventRecord,
     reassemble: Reassemble,
     length: float,
 ) -> tuple[Assembly, FloatArray, FloatArray]:
@@ -234,7 +241,7 @@ def enter_mode(
         Time, coordinates and speeds just before the event.
     assembly
         The scene before the event.
-    happening
+    event
         The event.
     reassemble
         Gives the scene in other modes and charts.
@@ -243,33 +250,33 @@ def enter_mode(
     """
     t, q, u = state
     big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
-    sides = actual_sides(assembly, t, q, u, assembly.form)
-    after = reassemble({**assembly.modes, happening.part: happening.target}, sides, assembly.orientation)
+    line_signs = actual_line_signs(assembly, t, q, u, assembly.form)
+    after = reassemble({**assembly.modes, event.part: event.target}, line_signs, assembly.orientation)
     sizes = motion_scales(after.maximal, length)
     balance = balance_of(after, "dae")
-    if happening.impact:
+    if event.impact:
         met, _ = balance.project(t, big_q, big_u, sizes)
-        _check_in_place(happening, balance.turning.difference(t, big_q, met) / sizes)
-        big_u = plastic_impact(after, balance, happening, (t, met, big_u), sizes)
+        _check_in_place(event, balance.kinematic_map.difference(t, big_q, met) / sizes)
+        big_u = plastic_impact(after, balance, event, (t, met, big_u), sizes)
         big_q = met
     if after.form == "dae":
         return after, big_q, big_u
-    q, u = _to_reduced(assembly, after, t, (q, u), (big_q, big_u), length, happening)
-    return *enter_charts(after, q, reassemble), u
+    q, u = _to_reduced(assembly, after, t, (q, u), (big_q, big_u), length, event)
+    return *switch_coordinates(after, q, reassemble), u
 
 
 _IN_PLACE = 1e-5
 """Relative to the scene's sizes: how far a change of mode may move anything."""
 
 
-def _check_in_place(happening: Happening, moved: FloatArray) -> None:
+def _check_in_place(event: EventRecord, moved: FloatArray) -> None:
     """Refuse a change of mode that would move bodies."""
     farthest = float(np.max(np.abs(moved), initial=0.0))
     if not farthest <= _IN_PLACE:
         raise SolveError(
-            f"at t = {happening.time:.6g} a change of mode ({happening.message}) would move something at once by "
+            f"at t = {event.time:.6g} a change of mode ({event.message}) would move something at once by "
             f"{farthest:.3g} of the scene's size",
-            where=happening.part,
+            where=event.part,
             advice="The position does not belong to the mode: change the start, or when the mode is entered.",
         )
 
@@ -277,7 +284,7 @@ def _check_in_place(happening: Happening, moved: FloatArray) -> None:
 def plastic_impact(
     after: Assembly,
     balance: Balance,
-    happening: Happening,
+    event: EventRecord,
     state: tuple[float, FloatArray, FloatArray],
     sizes: FloatArray,
 ) -> FloatArray:
@@ -290,7 +297,7 @@ def plastic_impact(
     ----------
     after, balance
         The scene after the impact, and its balance of forces in maximal coordinates.
-    happening
+    event
         What the impact is told as.
     state
         Time, coordinates and speeds just before it, in maximal coordinates.
@@ -304,7 +311,7 @@ def plastic_impact(
     for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
         if abs(impulse) > 1e-9 * size and _is_refused(after, one, state, one.sign * impulse):
             raise SolveError(
-                f"at t = {t:.6g} the impact ({happening.message}, {happening.part}) needs an impulse of the sign that "
+                f"at t = {t:.6g} the impact ({event.message}, {event.part}) needs an impulse of the sign that "
                 "this one-sided constraint does not bear: a rope would have to push",
                 where=one.key[0],
                 advice="Several ropes that jerk at once, of which some go slack, cannot be solved yet.",
@@ -324,8 +331,10 @@ def _is_refused(
     A limit in both directions, or one that is not zero, makes no constraint one-sided.
     """
     part, own = constraint.key[0], [one.symbol for one in after.reactions if one.key == constraint.key]
-    watches = [one for one in _watches_of_reactions(after) if one.part == part and depends_on(one.value, own)]
-    if not watches:
+    event_functions = [
+        one for one in _reaction_event_functions(after) if one.part == part and depends_on(one.value, own)
+    ]
+    if not event_functions:
         return False
     t, q, u = state
     equations = after.maximal
@@ -335,19 +344,19 @@ def _is_refused(
     known |= dict.fromkeys((one.symbol for one in after.reactions), 0.0)
 
     def lets_go(reaction: float) -> bool:
-        values = evaluate([one.value for one in watches], {**known, **dict.fromkeys(own, reaction)})
-        return any(one.direction * value > 0.0 for one, value in zip(watches, values, strict=True))
+        values = evaluate([one.value for one in event_functions], {**known, **dict.fromkeys(own, reaction)})
+        return any(one.direction * value > 0.0 for one, value in zip(event_functions, values, strict=True))
 
     refused, other = (all(lets_go(sign * size * impulse) for size in _SIZES) for sign in (1.0, -1.0))
     return refused and not other
 
 
-def _watches_of_reactions(assembly: Assembly) -> tuple[Watch, ...]:
+def _reaction_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
     """Return the events that read reactions, in maximal coordinates."""
     symbols = [one.symbol for one in assembly.reactions]
 
-    def make() -> tuple[Watch, ...]:
-        every = list_watches(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.modes)
+    def make() -> tuple[EventFunction, ...]:
+        every = list_event_functions(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.modes)
         return tuple(one for one in every if depends_on(one.value, symbols))
 
     return assembly.shared.get("watches of reactions", make)
@@ -364,14 +373,14 @@ def _solve_impact(
     if not is_full(now.mass):
         from atwood.linalg.sparse import solve_bordered
 
-        solved = solve_bordered(now.mass, now.slope, -(now.mass @ u), now.drift)
+        solved = solve_bordered(now.mass, now.jacobian, -(now.mass @ u), now.explicit_rate)
         if solved is not None:
             return solved[0], solved[1] * rows
     m, n = len(now.gamma), len(u)
-    mass, slope = sizes[:, None] * to_array(now.mass) * sizes, to_array(scaled(now.slope, sizes, rows))
+    mass, slope = sizes[:, None] * to_array(now.mass) * sizes, to_array(scaled(now.jacobian, sizes, rows))
     mass = mass / (np.max(np.abs(mass), initial=0.0) or 1.0)
     matrix = np.block([[mass, -slope.T], [slope, np.zeros((m, m))]])
-    found = np.linalg.lstsq(matrix, np.concatenate([mass @ (u / sizes), -now.drift / rows]), rcond=1e-12)[0]
+    found = np.linalg.lstsq(matrix, np.concatenate([mass @ (u / sizes), -now.explicit_rate / rows]), rcond=1e-12)[0]
     return found[:n] * sizes, found[n:]
 
 
@@ -382,38 +391,38 @@ def _to_reduced(
     own: tuple[FloatArray, FloatArray],
     maximal: tuple[FloatArray, FloatArray],
     length: float,
-    happening: Happening,
+    event: EventRecord,
 ) -> tuple[FloatArray, FloatArray]:
     """Find the generalized coordinates, with quaternions, that give the same maximal coordinates and speeds."""
     equations = after.regular
-    own_turning, turning = turning_of(after, "regular"), turning_of(after, "dae")
+    reduced_map, maximal_map = kinematic_map_of(after, "regular"), kinematic_map_of(after, "dae")
     program, rows, columns = after.shared.get("change of mode", lambda: _maximal_places(after))
     kernel = after.kernel(program)
     names = tuple(c.name for c in equations.names)
     known = [name for name in names if name in before.observables]
-    q, still = resting_place(equations), np.zeros(len(equations.speeds))
+    q, still = reference_coordinates(equations), np.zeros(len(equations.speeds))
     if known:
         read = before.kernel(before.observer(tuple(known)))
         idle = [0.0] * len(before.reactions)
         values = read([t], *own, np.zeros_like(own[1]), idle)[0]
         for name, value in zip(known, values, strict=True):
             q[names.index(name)] = value
-    turned = {chart.body: list(chart.coordinates) for chart in after.maximal.charts}
-    for chart in equations.charts:
-        if chart.body in turned:
-            q[list(chart.coordinates)] = maximal[0][turned[chart.body]]
-    q = own_turning.normalized(q)
+    turned = {orientation.body: list(orientation.coordinates) for orientation in after.maximal.orientation_coordinates}
+    for orientation in equations.orientation_coordinates:
+        if orientation.body in turned:
+            q[list(orientation.coordinates)] = maximal[0][turned[orientation.body]]
+    q = reduced_map.normalized(q)
     scales = motion_scales(after.maximal, length)
     matrix = np.zeros((len(scales), len(still)))
     for _ in range(30):
         now, _, entries = kernel([t], q, still)
         matrix[rows, columns] = entries
-        miss = turning.difference(t, turning.normalized(np.asarray(now)), maximal[0]) / scales
+        miss = maximal_map.difference(t, maximal_map.normalized(np.asarray(now)), maximal[0]) / scales
         step = least_norm(matrix / scales[:, None], miss)
-        q = own_turning.moved(t, q, step)
+        q = reduced_map.moved(t, q, step)
         if float(np.max(np.abs(step), initial=0.0)) < 1e-14 * max(1.0, float(np.max(np.abs(q), initial=0.0))):
             break
-    _check_in_place(happening, miss)
+    _check_in_place(event, miss)
     return q, generalized_speeds(after, t, q, maximal[1], scales)
 
 
@@ -432,8 +441,8 @@ def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatAr
     program, rows, columns = after.shared.get("change of mode", lambda: _maximal_places(after))
     still = np.zeros(len(after.regular.speeds))
     matrix = np.zeros((len(sizes), len(still)))
-    _, drift, matrix[rows, columns] = after.kernel(program)([t], q, still)
-    return least_norm(matrix / sizes[:, None], (speeds - np.asarray(drift)) / sizes)
+    _, explicit_rate, matrix[rows, columns] = after.kernel(program)([t], q, still)
+    return least_norm(matrix / sizes[:, None], (speeds - np.asarray(explicit_rate)) / sizes)
 
 
 def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
@@ -444,6 +453,6 @@ def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[in
     equations = after.regular
     placing = to_maximal(after, "regular")
     slope = jacobian(list(placing.outputs[1].expressions), list(equations.speeds))
-    outputs = (*placing.outputs, OutputGroup("slopes", tuple(slope.entries)))
+    outputs = (*placing.outputs, OutputGroup("jacobian", tuple(slope.entries)))
     program = Program(f"{after.flat.name} change of mode", placing.inputs, after.parameters, outputs)
     return program, slope.rows, slope.columns

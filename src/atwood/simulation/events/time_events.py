@@ -231,7 +231,7 @@ class _Search:
     def _isolated(self, boxes: _Boxes) -> _Boxes:
         """Return intervals in which the function may change its sign, once at most as far as rounding tells."""
         key = ("rate of relation", self._number)
-        (slope,) = self._assembly.shared.get(key, lambda: jvp([self._difference], {self._time: 1.0}))
+        (derivative,) = self._assembly.shared.get(key, lambda: jvp([self._difference], {self._time: 1.0}))
         found: list[_Boxes] = []
         doubtful: list[_Boxes] = []
         while len(boxes.low):
@@ -243,7 +243,7 @@ class _Search:
                 )
             low, high = self._bounds(self._difference, boxes)
             boxes, low, high = boxes.chosen(kept := (low <= 0.0) & (high >= 0.0)), low[kept], high[kept]
-            least, most = self._bounds(slope, boxes)
+            least, most = self._bounds(derivative, boxes)
             single = (least > 0.0) | (most < 0.0)
             found.append(boxes.chosen(single))
             middle = boxes.middle

@@ -32,9 +32,9 @@ def wrongly_turned(assembly: Assembly, equations: Equations, t: float, q: FloatA
     t, q
         Time and coordinates that fulfil the constraints.
     """
-    if assembly.mechanism.space.name != "space" or not equations.forest.cuts:
+    if assembly.mechanism.space.name != "space" or not equations.forest.loop_joints:
         return []
-    parts, program = assembly.shared.get("facing", lambda: _facing(assembly, equations))
+    parts, program = assembly.shared.get("facing", lambda: _branch_tests(assembly, equations))
     if not parts:
         return []
     try:
@@ -45,9 +45,9 @@ def wrongly_turned(assembly: Assembly, equations: Equations, t: float, q: FloatA
     return [part for part, trace in zip(parts, traces, strict=True) if trace < 2.0]
 
 
-def _facing(assembly: Assembly, equations: Equations) -> tuple[tuple[str, ...], Program]:
+def _branch_tests(assembly: Assembly, equations: Equations) -> tuple[tuple[str, ...], Program]:
     found = {}
-    for joint in equations.forest.cuts:
+    for joint in equations.forest.loop_joints:
         if joint.says_rotation:
             trace = _trace(equations, joint)
             if trace is not None:

@@ -15,7 +15,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.model.local.laws import LocalConnector, LocalConstraint, LocalPart
 
-__all__ = ["Gap", "find_gaps"]
+__all__ = ["ClosureError", "find_closure_errors"]
 
 
 _NOTHING = 1e-9
@@ -23,7 +23,7 @@ _NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
-class Gap:
+class ClosureError:
     """What a joint lacks.
 
     The least displacement of one of its connectors with which it would close, the other staying where it is; and the
@@ -57,7 +57,9 @@ class Gap:
         return float(np.hypot(self.distance / length, self.angle))
 
 
-def find_gaps(assembly: Assembly, equations: Equations, t: float, q: FloatArray, length: float) -> list[Gap]:
+def find_closure_errors(
+    assembly: Assembly, equations: Equations, t: float, q: FloatArray, length: float
+) -> list[ClosureError]:
     """Return the gaps of all joints that close loops, and of ties, in the order of declaration.
 
     Parameters
@@ -87,7 +89,7 @@ def find_gaps(assembly: Assembly, equations: Equations, t: float, q: FloatArray,
         lengths = [c.value for c in constraints if c.law.options.unit == "N"]
         turns = [c.value for c in constraints if c.law.options.unit != "N"]
         distance = _least(lengths, local, known, _shifted, length)
-        found.append(Gap(path, distance, _least(turns, local, known, _rotated, 1.0)))
+        found.append(ClosureError(path, distance, _least(turns, local, known, _rotated, 1.0)))
     return found
 
 
@@ -149,9 +151,9 @@ def _least(values: Sequence[Expression], local: LocalPart, known: Numbers, moved
             now = at(by)
             if float(np.linalg.norm(now)) <= 1e-13 * max(own, unit):
                 break
-            slope = np.array([(at(by + h * e) - at(by - h * e)) / (2.0 * h) for e in np.eye(n)]).T
+            derivative = np.array([(at(by + h * e) - at(by - h * e)) / (2.0 * h) for e in np.eye(n)]).T
             # Of all movements that would do to first order the least one: not only the least change of this one.
-            by = np.linalg.lstsq(slope, slope @ by - now, rcond=1e-9)[0]
+            by = np.linalg.lstsq(derivative, derivative @ by - now, rcond=1e-9)[0]
         if float(np.linalg.norm(at(by))) <= 1e-9 * max(own, unit) and np.all(np.isfinite(by)):
             return float(np.linalg.norm(by))
     return own

@@ -14,7 +14,7 @@ from atwood.late import dataclass
 from atwood.linalg.matrices import scaled
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.rank import independent_rows
-from atwood.simulation.initialization.closure_error import Gap, find_gaps
+from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors
 from atwood.simulation.initialization.loop_closure import Nearest, closest, closest_of_all, units_of_rows
 from atwood.simulation.initialization.system import MET, System
 from atwood.simulation.initialization.targets import Level, Target, as_said
@@ -51,7 +51,7 @@ class Failed:
         Where bodies were placed by what is said of them.
     nearest
         Where Newton's method came to rest.
-    missing
+    residual
         What each condition misses there, scaled.
     """
 
@@ -63,7 +63,7 @@ class Failed:
     time: float
     rough: FloatArray
     nearest: FloatArray
-    missing: FloatArray
+    residual: FloatArray
 
 
 def explain_positions(failed: Failed) -> StartError:
@@ -75,7 +75,7 @@ def explain_positions(failed: Failed) -> StartError:
         The start that was not found.
     """
     fixed = failed.level.fixed
-    own = failed.missing[len(failed.missing) - len(fixed) :]
+    own = failed.residual[len(failed.residual) - len(fixed) :]
     held = _missed_most(failed)
     if not any(one.value is not None for one in failed.equations.constraints):
         return contradiction(fixed, own, _freedom(failed), _as_near_as_it_gets(failed), held)
@@ -90,7 +90,7 @@ def explain_positions(failed: Failed) -> StartError:
 def _missed_most(failed: Failed) -> str:
     """Return the label of the constraint on positions that is missed most; empty if there is none."""
     labels = [one.label for one in failed.equations.constraints if one.value is not None]
-    missed = np.abs(failed.missing[: len(labels)])
+    missed = np.abs(failed.residual[: len(labels)])
     return labels[int(np.argmax(missed))] if len(labels) and np.any(missed > 0.0) else ""
 
 
@@ -104,7 +104,7 @@ def _as_near_as_it_gets(failed: Failed) -> str:
         return ""
     off = [
         f"{target.path} = {target.value + miss:.4g}"
-        for target, miss, unit in zip(fixed, best.missing, units, strict=True)
+        for target, miss, unit in zip(fixed, best.residual, units, strict=True)
         if abs(miss) > 1e-6 * unit
     ]
     more = "" if len(off) <= _SHOWN else ", ..."
@@ -122,9 +122,9 @@ def _what_stays_open(failed: Failed) -> str:
     best = closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
     if best is None:
         return ""
-    if np.any(np.abs(best.missing[system.constraints :]) > 1e-6 / _HELD * units[system.constraints :]):
+    if np.any(np.abs(best.residual[system.constraints :]) > 1e-6 / _HELD * units[system.constraints :]):
         return ""
-    worst = _largest(_gaps(failed, best.coordinates), failed.length)
+    worst = _largest(_closure_errors(failed, best.coordinates), failed.length)
     by = worst.describe(failed.length)
     ways = _other_ways_to_start(failed.assembly, worst.part)
     return f"; with {'it' if len(fixed) == 1 else 'them'}, {worst.part} stays open by {by} at least{ways}"
@@ -139,20 +139,22 @@ def _other_ways_to_start(assembly: Assembly, path: str) -> str:
     return f" (it can also start {' or '.join(others)}: {component.mode_parameter}={others[0]!r})"
 
 
-def _gaps(failed: Failed, q: FloatArray) -> list[Gap]:
-    return find_gaps(failed.assembly, failed.equations, failed.time, q, failed.length)
+def _closure_errors(failed: Failed, q: FloatArray) -> list[ClosureError]:
+    return find_closure_errors(failed.assembly, failed.equations, failed.time, q, failed.length)
 
 
-def _largest(gaps: Sequence[Gap], length: float) -> Gap:
-    return max(gaps, key=lambda gap: gap.size(length))
+def _largest(closure_errors: Sequence[ClosureError], length: float) -> ClosureError:
+    return max(closure_errors, key=lambda closure_error: closure_error.size(length))
 
 
 def _open_loop(failed: Failed, system: System, best: Nearest) -> StartError:
     """Return the error that names the loop that cannot close."""
     best = _in_one_joint(failed, system, best)
-    gaps = _gaps(failed, best.coordinates)
-    worst = _largest(gaps, failed.length)
-    others = [one for one in gaps if one is not worst and one.size(failed.length) > 0.01 * worst.size(failed.length)]
+    closure_errors = _closure_errors(failed, best.coordinates)
+    worst = _largest(closure_errors, failed.length)
+    others = [
+        one for one in closure_errors if one is not worst and one.size(failed.length) > 0.01 * worst.size(failed.length)
+    ]
     loop = _loop_through(failed.assembly, worst.part)
     text = f"the loop cannot close here: the nearest position found misses by {worst.describe(failed.length)}"
     if others:
@@ -173,8 +175,8 @@ def _in_one_joint(failed: Failed, system: System, best: Nearest) -> Nearest:
     """
     equations = failed.equations
     holding = [one for one in equations.constraints if one.value is not None]
-    gaps = _gaps(failed, best.coordinates)
-    worst = _largest(gaps, failed.length).part
+    closure_errors = _closure_errors(failed, best.coordinates)
+    worst = _largest(closure_errors, failed.length).part
     others = np.array([one.key[0] != worst for one in holding])
     if not np.any(others):
         return best
@@ -183,9 +185,9 @@ def _in_one_joint(failed: Failed, system: System, best: Nearest) -> Nearest:
         found = closest(system, np.where(others, _HELD * units, units), failed.scales, failed.time, best.coordinates)
     except (KernelEvaluationError, np.linalg.LinAlgError):
         return best
-    is_closed = np.all(np.abs(found.missing / units)[others] <= 1e-6 * max(best.size, _CLOSED))
-    alone = float(np.linalg.norm((found.missing / units)[~others]))
-    return Nearest(found.coordinates, found.missing, alone) if is_closed else best
+    is_closed = np.all(np.abs(found.residual / units)[others] <= 1e-6 * max(best.size, _CLOSED))
+    alone = float(np.linalg.norm((found.residual / units)[~others]))
+    return Nearest(found.coordinates, found.residual, alone) if is_closed else best
 
 
 def _lengths_that_close(failed: Failed, system: System, best: Nearest) -> list[str]:
@@ -193,7 +195,7 @@ def _lengths_that_close(failed: Failed, system: System, best: Nearest) -> list[s
     assembly, shown = failed.assembly, 3
     units = units_of_rows(assembly, failed.equations, system, failed.length)
     program, values = system.program, assembly.parameter_values
-    missing = best.missing / units
+    residual = best.residual / units
     found = []
     for j, symbol in enumerate(assembly.parameters):
         path, _, name = symbol.name.rpartition(".")
@@ -209,9 +211,9 @@ def _lengths_that_close(failed: Failed, system: System, best: Nearest) -> list[s
         after = assembly.compiled(program).bind(changed)(
             [failed.time], best.coordinates, np.zeros(len(failed.equations.speeds))
         )[0]
-        slope = float((np.asarray(after) / units - missing) @ missing) / (h * best.size)
-        if abs(slope) * failed.length > 0.3:
-            found.append((abs(slope), symbol.name, values[j], values[j] - best.size / slope))
+        derivative = float((np.asarray(after) / units - residual) @ residual) / (h * best.size)
+        if abs(derivative) * failed.length > 0.3:
+            found.append((abs(derivative), symbol.name, values[j], values[j] - best.size / derivative))
     found.sort(key=lambda one: -round(one[0] * failed.length, 6))  # in the order of declaration where they do alike
     good = [one for one in found if np.sign(one[2]) == np.sign(one[3])]
     return [f"{name} = {new:.4g} m (it is {old:.4g} m)" for _, name, old, new in good[:shown]]
@@ -235,8 +237,8 @@ def far_from_guess(failed: Failed, found: FloatArray, wrong: Sequence[str]) -> S
     elsewhere = f"guess near to {', '.join(places[:_SHOWN])}{', ...' if len(places) > _SHOWN else ''}."
     if wrong:
         return wrong_way_round(failed, wrong[0], f"It closes the right way elsewhere; {elsewhere}")
-    gaps = _gaps(failed, failed.nearest)
-    open_ones = [gap for gap in gaps if gap.size(failed.length) > _CLOSED]
+    closure_errors = _closure_errors(failed, failed.nearest)
+    open_ones = [closure_error for closure_error in closure_errors if closure_error.size(failed.length) > _CLOSED]
     if not open_ones:
         text, where = "what is fixed cannot hold near the guess", (failed.level.fixed or guessed)[0].where
         return StartError(text, where=where, advice=f"It holds elsewhere; {elsewhere}")
@@ -315,24 +317,24 @@ def freedom_at(assembly: Assembly, equations: Equations, scales: FloatArray, t: 
         return len(scales)
     system = System(assembly, equations, [], True, of_speeds=True)
     matrix = scaled(system.at(t, q, np.zeros_like(scales))[1], scales)
-    return len(scales) - len(independent_rows(matrix, system.errors.of_slopes(t, q, scales)))
+    return len(scales) - len(independent_rows(matrix, system.errors.of_jacobian(t, q, scales)))
 
 
-def contradicted(equations: Equations, missing: FloatArray) -> str:
+def contradicted(equations: Equations, residual: FloatArray) -> str:
     """Return the label of the constraint that is missed most; empty if there is none.
 
     Parameters
     ----------
     equations
         With the constraints.
-    missing
+    residual
         What each misses, scaled.
     """
-    return equations.constraints[int(np.argmax(np.abs(missing)))].label if len(missing) else ""
+    return equations.constraints[int(np.argmax(np.abs(residual)))].label if len(residual) else ""
 
 
 def contradiction(
-    fixed: Sequence[Target], missing: FloatArray, freedom: int, remark: str = "", held: str = ""
+    fixed: Sequence[Target], residual: FloatArray, freedom: int, remark: str = "", held: str = ""
 ) -> StartError:
     """Return the error that says which fixed values cannot all hold.
 
@@ -340,7 +342,7 @@ def contradiction(
     ----------
     fixed
         What is fixed.
-    missing
+    residual
         What each value misses, scaled.
     freedom
         How many coordinates are free.
@@ -355,7 +357,7 @@ def contradiction(
             where=held,
             advice="Drives or lengths demand what joints do not allow here; let one of them go.",
         )
-    failing = [target for target, miss in zip(fixed, missing, strict=True) if not abs(miss) <= MET]
+    failing = [target for target, miss in zip(fixed, residual, strict=True) if not abs(miss) <= MET]
     names = as_said(failing or fixed)
     count = f"The mechanism has {freedom} free coordinate{'s' if freedom != 1 else ''}"
     return StartError(

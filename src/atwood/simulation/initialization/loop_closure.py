@@ -36,14 +36,14 @@ class Nearest:
     ----------
     coordinates
         The place.
-    missing
+    residual
         What is missed there, in the units of each row.
     size
         Root of the sum of squares, each over its unit.
     """
 
     coordinates: FloatArray
-    missing: FloatArray
+    residual: FloatArray
     size: float
 
 
@@ -97,34 +97,34 @@ def closest(
     KernelEvaluationError
         If something has no value where it begins.
     """
-    assert system.turning is not None
+    assert system.kinematic_map is not None
     still = np.zeros_like(scales)
 
     def look(place: FloatArray) -> tuple[FloatArray, FloatArray]:
-        missing, matrix = system.at(t, place, still)
-        return missing / units, to_array(scaled(matrix, scales, units))
+        residual, matrix = system.at(t, place, still)
+        return residual / units, to_array(scaled(matrix, scales, units))
 
-    missing, slopes = look(q)
-    cost = float(missing @ missing)
-    damping, growth = 1e-3 * max(float(np.max(np.sum(slopes**2, axis=0), initial=0.0)), 1e-12), 2.0
+    residual, jacobian = look(q)
+    cost = float(residual @ residual)
+    damping, growth = 1e-3 * max(float(np.max(np.sum(jacobian**2, axis=0), initial=0.0)), 1e-12), 2.0
     for _ in range(iterations):
-        gradient = slopes.T @ missing
+        gradient = jacobian.T @ residual
         if float(np.max(np.abs(gradient), initial=0.0)) <= 1e-14 * max(1.0, cost) or cost < 1e-30:
             break
-        step = -np.linalg.solve(slopes.T @ slopes + damping * np.eye(len(scales)), gradient)
+        step = -np.linalg.solve(jacobian.T @ jacobian + damping * np.eye(len(scales)), gradient)
         longest = float(np.max(np.abs(step)))
         step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
-        expected = -float(step @ gradient) - 0.5 * float(np.sum((slopes @ step) ** 2))
-        trial = system.turning.moved(t, q, scales * step)
+        expected = -float(step @ gradient) - 0.5 * float(np.sum((jacobian @ step) ** 2))
+        trial = system.kinematic_map.moved(t, q, scales * step)
         try:
-            new_missing, new_slopes = look(trial)
-            new_cost = float(new_missing @ new_missing)
+            new_residual, new_jacobian = look(trial)
+            new_cost = float(new_residual @ new_residual)
         except KernelEvaluationError:
             new_cost = np.inf
         gain = 0.5 * (cost - new_cost) / expected if expected > 0.0 else -1.0
         if new_cost < cost:
             is_done = longest < 1e-10 and cost - new_cost <= 1e-15 * cost
-            q, missing, slopes, cost = trial, new_missing, new_slopes, new_cost
+            q, residual, jacobian, cost = trial, new_residual, new_jacobian, new_cost
             damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3)
             growth = 2.0
             if is_done:
@@ -133,7 +133,7 @@ def closest(
             if longest < 1e-12:
                 break
             damping, growth = damping * growth, 2.0 * growth
-    return Nearest(q, missing * units, cost**0.5)
+    return Nearest(q, residual * units, cost**0.5)
 
 
 def places_around(
@@ -148,13 +148,13 @@ def places_around(
     hangs
         Whether the first of the others has free points lower, each more than the one before.
     """
-    assert system.turning is not None
+    assert system.kinematic_map is not None
     random = np.random.default_rng(20)
     yield q
     if hangs:
-        yield system.turning.moved(t, q, _lowered(system, scales))
+        yield system.kinematic_map.moved(t, q, _lowered(system, scales))
     for size in _SHIFTS if len(scales) <= LARGEST_FULL else ():
-        yield system.turning.moved(t, q, size * scales * random.uniform(-1.0, 1.0, len(scales)))
+        yield system.kinematic_map.moved(t, q, size * scales * random.uniform(-1.0, 1.0, len(scales)))
 
 
 def _lowered(system: System, scales: FloatArray) -> FloatArray:

@@ -67,23 +67,23 @@ def meet_speeds(
     matrix = np.zeros((runs, count, n))
 
     def look() -> FloatArray:
-        values, slopes = kernel(np.array([[t]]), q.T, u.T)
-        matrix[:, conditions.rows, conditions.columns] = slopes.T
-        missing: FloatArray = (values - wanted).T
-        return missing
+        values, jacobian = kernel(np.array([[t]]), q.T, u.T)
+        matrix[:, conditions.rows, conditions.columns] = jacobian.T
+        residual: FloatArray = (values - wanted).T
+        return residual
 
-    missing = look()
+    residual = look()
     for _ in range(3):  # linear: the second pass takes out rounding
-        moving = np.any(missing != 0.0, axis=1) & np.all(np.isfinite(matrix), axis=(1, 2))
+        moving = np.any(residual != 0.0, axis=1) & np.all(np.isfinite(matrix), axis=(1, 2))
         if not np.any(moving):
             break
         rows = np.max(np.abs(matrix[moving] * sizes[moving, None, :]), axis=2)
         rows[rows == 0.0] = 1.0
         scaled = matrix[moving] * sizes[moving, None, :] / rows[:, :, None]
-        step = np.linalg.pinv(scaled, rcond=_RANK) @ (missing[moving] / rows)[:, :, None]
+        step = np.linalg.pinv(scaled, rcond=_RANK) @ (residual[moving] / rows)[:, :, None]
         u[moving] -= sizes[moving] * step[:, :, 0]
-        missing = look()
+        residual = look()
     own = np.einsum("rij,rj->ri", np.abs(matrix), np.abs(u)) + np.abs(wanted).T
-    share = np.abs(missing) / np.where(own > 0.0, own, 1.0)
+    share = np.abs(residual) / np.where(own > 0.0, own, 1.0)
     met: NDArray[np.bool_] = np.all(share <= 1e-8, axis=1)
     return met

@@ -11,17 +11,17 @@ from atwood.linalg.matrices import Matrix, is_full, scaled
 from atwood.simulation.dynamics.rank import open_directions
 from atwood.simulation.dynamics.scales import motion_names
 
-__all__ = ["check_inertia"]
+__all__ = ["check_massless_directions"]
 
 
-def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatArray) -> None:
+def check_massless_directions(assembly: Assembly, mass: Matrix, jacobian: Matrix, sizes: FloatArray) -> None:
     """Refuse a direction in which something can move without inertia.
 
     Parameters
     ----------
     assembly
         The scene.
-    mass, slope
+    mass, jacobian
         The mass matrix, and the derivatives of the independent constraints, along the speeds.
     sizes
         Size of a displacement along each speed.
@@ -36,17 +36,17 @@ def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatA
         return
     sizes = _sizes_of_inertia(mass, sizes)
     if not is_full(mass):
-        from atwood.linalg.sparse import without_inertia
+        from atwood.linalg.sparse import massless_directions
 
-        moving = without_inertia(mass, slope, sizes)
+        moving = massless_directions(mass, jacobian, sizes)
         if moving is not None:
-            raise _without_inertia(assembly, moving)
+            raise _massless_directions(assembly, moving)
         return
     weighed = mass * sizes[:, None] * sizes[None, :]
     if _is_clearly_positive(weighed):
         return
-    if slope.shape[0]:
-        free = open_directions(scaled(slope, sizes))
+    if jacobian.shape[0]:
+        free = open_directions(scaled(jacobian, sizes))
     else:
         free = np.eye(n)
     if not len(free):
@@ -54,7 +54,7 @@ def check_inertia(assembly: Assembly, mass: Matrix, slope: Matrix, sizes: FloatA
     values, vectors = np.linalg.eigh(free @ weighed @ free.T)
     if values[0] > 1e-14 * max(values[-1], 1e-300):
         return
-    raise _without_inertia(assembly, np.abs(vectors[:, 0] @ free))
+    raise _massless_directions(assembly, np.abs(vectors[:, 0] @ free))
 
 
 def _is_clearly_positive(weighed: FloatArray) -> bool:
@@ -79,7 +79,7 @@ def _sizes_of_inertia(mass: Matrix, sizes: FloatArray) -> FloatArray:
     return np.where(has, even, sizes * np.median(even[has] / sizes[has]))
 
 
-def _without_inertia(assembly: Assembly, moving: FloatArray) -> StartError:
+def _massless_directions(assembly: Assembly, moving: FloatArray) -> StartError:
     every = motion_names(assembly.equations)
     names = [name for name, size in zip(every, moving, strict=True) if size > 0.1 * np.max(moving)]
     units = dict(zip(every, (one.unit for one in assembly.equations.speed_names), strict=True))

@@ -86,8 +86,8 @@ def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | 
     scales = motion_scales(equations, start.length)
     q, _ = maximal_state(assembly, start)
     balance = balance_of(assembly, "dae")
-    rows = scaled(to_array(balance.at(start.time, q, np.zeros_like(scales)).slope), scales)
-    errors = balance.errors.of_slopes(start.time, q, scales)
+    rows = scaled(to_array(balance.at(start.time, q, np.zeros_like(scales)).jacobian), scales)
+    errors = balance.errors.of_jacobian(start.time, q, scales)
     groups: dict[str, list[int]] = {}
     for i, one in enumerate(equations.constraints):
         groups.setdefault(_name(assembly, one), []).append(i)

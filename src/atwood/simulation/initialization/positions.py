@@ -10,7 +10,12 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.linalg.matrices import Matrix
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.simulation.dynamics.kinematic_map import Turning, resting_place, roughly_turned, turning_of
+from atwood.simulation.dynamics.kinematic_map import (
+    KinematicMap,
+    best_rough_orientation,
+    kinematic_map_of,
+    reference_coordinates,
+)
 from atwood.simulation.dynamics.rank import row_sizes
 from atwood.simulation.initialization.assembly_branch import wrongly_turned
 from atwood.simulation.initialization.errors import Failed, explain_positions, far_from_guess, wrong_way_round
@@ -70,9 +75,9 @@ def solve_positions(
         If a loop cannot close, or what is fixed contradicts itself or the constraints.
     """
     every = [*level.guessed, *level.fixed]
-    turning = turning_of(assembly, "regular")
-    q, is_direct = said(equations.coordinates, every, resting_place(equations))
-    q = near_to = _turned(equations, turning, q)
+    kinematic_map = kinematic_map_of(assembly, "regular")
+    q, is_direct = said(equations.coordinates, every, reference_coordinates(equations))
+    q = near_to = _turned(equations, kinematic_map, q)
     if not is_direct:
         system = System(assembly, equations, every, False)
         near = _brought_near(system, equations, scales, t, q)
@@ -83,39 +88,41 @@ def solve_positions(
         q = near
     q = rough = unwound(assembly, equations, every, scales, length, t, near_to, q)
     system = System(assembly, equations, level.fixed, True)
-    q, missing, matrix = newton(system, scales, t, q)
-    if not _is_met(missing) or wrongly_turned(assembly, equations, t, q):
-        failed = Failed(assembly, equations, level, scales, length, t, rough, q, missing)
+    q, residual, matrix = newton(system, scales, t, q)
+    if not _is_met(residual) or wrongly_turned(assembly, equations, t, q):
+        failed = Failed(assembly, equations, level, scales, length, t, rough, q, residual)
         q, matrix = _elsewhere(failed, system)
     q = unwound(assembly, equations, every, scales, length, t, near_to, q)
-    errors = system.errors.of_slopes(t, q, scales)
-    tangent = None if turning.is_plain else turning.tangent(t, q)
-    for chart in equations.charts:  # what turns at all has no orientation, whichever coordinate shows it here
+    errors = system.errors.of_jacobian(t, q, scales)
+    tangent = None if kinematic_map.is_plain else kinematic_map.matrix(t, q)
+    for (
+        orientation
+    ) in equations.orientation_coordinates:  # what turns at all has no orientation, whichever coordinate shows it here
         assert tangent is not None
-        tangent[list(chart.coordinates)] = np.max(np.abs(tangent[list(chart.coordinates)]), axis=0)
+        tangent[list(orientation.coordinates)] = np.max(np.abs(tangent[list(orientation.coordinates)]), axis=0)
     names = [one.name for one in equations.names]
     return Positions(q, rough, *counted(names, tangent, level.fixed, system.constraints, matrix, errors))
 
 
-def _is_met(missing: FloatArray) -> bool:
-    return float(np.max(np.abs(missing), initial=0.0)) <= MET
+def _is_met(residual: FloatArray) -> bool:
+    return float(np.max(np.abs(residual), initial=0.0)) <= MET
 
 
 def _elsewhere(failed: Failed, system: System) -> tuple[FloatArray, Matrix]:
     """Return the place nearest to the guess, of those that other ways lead to; raise what says why there is none."""
     assembly, equations, t, scales = failed.assembly, failed.equations, failed.time, failed.scales
-    assert system.turning is not None
+    assert system.kinematic_map is not None
     units = units_of_rows(assembly, equations, system, failed.length)
     hangs = not failed.level.guessed  # where no place is preferred, what nothing holds up is down
     best: tuple[float, FloatArray, Matrix] | None = None
-    wrong = wrongly_turned(assembly, equations, t, failed.nearest) if _is_met(failed.missing) else []
+    wrong = wrongly_turned(assembly, equations, t, failed.nearest) if _is_met(failed.residual) else []
     for number, place in enumerate(places_around(system, scales, t, failed.rough, hangs)):
         try:
             near = closest(system, units, scales, t, place, iterations=40)
             if not near.size < 0.1:
                 continue
-            q, missing, matrix = newton(system, scales, t, near.coordinates)
-            if not _is_met(missing):
+            q, residual, matrix = newton(system, scales, t, near.coordinates)
+            if not _is_met(residual):
                 continue
         except (KernelEvaluationError, np.linalg.LinAlgError):
             continue
@@ -123,7 +130,7 @@ def _elsewhere(failed: Failed, system: System) -> tuple[FloatArray, Matrix]:
         if turned:
             wrong = turned
             continue
-        off = float(np.linalg.norm(system.turning.difference(t, failed.rough, q) / scales))
+        off = float(np.linalg.norm(system.kinematic_map.difference(t, failed.rough, q) / scales))
         if best is None or off < best[0]:
             best = off, q, matrix
         if number == 0 or (hangs and number == 1):
@@ -149,13 +156,13 @@ def _brought_near(system: System, equations: Equations, scales: FloatArray, t: f
     """Return a configuration near what is said of it; orientations begin elsewhere where they do not get there."""
     near: FloatArray | None = None
     try:
-        near, missing, _ = newton(system, scales, t, q, iterations=20)
-        if not equations.charts or _is_met(missing):
+        near, residual, _ = newton(system, scales, t, q, iterations=20)
+        if not equations.orientation_coordinates or _is_met(residual):
             return near
     except KernelEvaluationError:
-        if not equations.charts:
+        if not equations.orientation_coordinates:
             raise
-    turned = roughly_turned(equations, lambda trial: _far_off(system, t, trial), q)
+    turned = best_rough_orientation(equations, lambda trial: _far_off(system, t, trial), q)
     found = newton(system, scales, t, turned, iterations=20)[0]
     # What is said may not fit together; then the better of the two is what was meant.
     return near if near is not None and _far_off(system, t, near) <= _far_off(system, t, found) else found
@@ -164,16 +171,16 @@ def _brought_near(system: System, equations: Equations, scales: FloatArray, t: f
 def _far_off(system: System, t: float, q: FloatArray) -> float:
     """Return how far a configuration is from what is asked for; infinite where that has no value."""
     try:
-        missing, matrix = system.at(t, q, np.zeros(system.speeds))
+        residual, matrix = system.at(t, q, np.zeros(system.speeds))
     except KernelEvaluationError:
         return np.inf
     rows = row_sizes(matrix, np.ones(matrix.shape[1]))
-    return float(np.sum((missing / np.where(rows > 0.0, rows, 1.0)) ** 2))
+    return float(np.sum((residual / np.where(rows > 0.0, rows, 1.0)) ** 2))
 
 
-def _turned(equations: Equations, turning: Turning, q: FloatArray) -> FloatArray:
+def _turned(equations: Equations, kinematic_map: KinematicMap, q: FloatArray) -> FloatArray:
     """Return rough coordinates whose orientations mean something."""
-    for chart in equations.charts:
-        if not np.any(q[list(chart.coordinates)]):
-            raise StartError("coordinates of an orientation that are all zero mean nothing", where=chart.body)
-    return turning.normalized(q)
+    for orientation in equations.orientation_coordinates:
+        if not np.any(q[list(orientation.coordinates)]):
+            raise StartError("coordinates of an orientation that are all zero mean nothing", where=orientation.body)
+    return kinematic_map.normalized(q)

@@ -21,15 +21,15 @@ from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.simulation.dynamics.kinematic_map import turning_of
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rank import FREE, independent_rows, least_norm, open_directions, row_scales
 from atwood.simulation.dynamics.scales import motion_scales
-from atwood.simulation.initialization.closure_error import Gap, find_gaps
+from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors
 from atwood.simulation.initialization.start import Start
 from atwood.simulation.initialization.system import System
 from atwood.simulation.initialization.targets import Level, sort_targets
 
-__all__ = ["GuessMet", "MovedBody", "Placement", "find_placement"]
+__all__ = ["GuessMet", "InitializationReport", "MovedBody", "report_initialization"]
 
 
 _STILL = 1e-9
@@ -98,7 +98,7 @@ class GuessMet:
 
 
 @dataclass(frozen=True)
-class Placement:
+class InitializationReport:
     """What the start moved.
 
     Attributes
@@ -116,7 +116,7 @@ class Placement:
 
     bodies: tuple[MovedBody, ...]
     guesses: tuple[GuessMet, ...]
-    opened: tuple[Gap, ...]
+    opened: tuple[ClosureError, ...]
     length: float
 
     def __str__(self) -> str:
@@ -140,7 +140,7 @@ class Placement:
         }
 
 
-def find_placement(assembly: Assembly, start: Start) -> Placement:
+def report_initialization(assembly: Assembly, start: Start) -> InitializationReport:
     """Find out what a start moved.
 
     Parameters
@@ -153,10 +153,10 @@ def find_placement(assembly: Assembly, start: Start) -> Placement:
     equations, t = assembly.regular, start.time
     guesses = _guesses(assembly, equations, start)
     if np.array_equal(start.rough, start.coordinates):
-        return Placement((), guesses, (), start.length)
+        return InitializationReport((), guesses, (), start.length)
     level, _ = sort_targets(assembly, equations)
-    gaps = find_gaps(assembly, equations, t, start.rough, start.length)
-    opened = [one for one in gaps if one.size(start.length) > _STILL]
+    closure_errors = find_closure_errors(assembly, equations, t, start.rough, start.length)
+    opened = [one for one in closure_errors if one.size(start.length) > _STILL]
     opened.sort(key=lambda one: -one.size(start.length))
     bodies = _Bodies(assembly, equations)
     distances, angles = bodies.apart(t, start.rough, start.coordinates)
@@ -173,7 +173,7 @@ def find_placement(assembly: Assembly, start: Start) -> Placement:
         return float(np.hypot(one[0] / start.length, one[1]))
 
     found.sort(key=lambda one: (-size(one.moved), -size(one.placed)))
-    return Placement(tuple(found), guesses, tuple(opened), start.length)
+    return InitializationReport(tuple(found), guesses, tuple(opened), start.length)
 
 
 def _guesses(assembly: Assembly, equations: Equations, start: Start) -> tuple[GuessMet, ...]:
@@ -205,7 +205,7 @@ class _Bodies:
         self.indices, self.names = [one.index for one in every], [one.name for one in every]
         placements = equations.kinematics.placements
         self.turns = [i in placements.angles or i in placements.axes for i in self.indices]
-        self.places, self.slopes, self.entries = assembly.shared.get("bodies", self._programs)
+        self.places, self.jacobian_program, self.entries = assembly.shared.get("bodies", self._programs)
 
     def _programs(self) -> tuple[Program, Program, tuple[Any, Any, tuple[int, int]]]:
         kinematics, placements = self.equations.kinematics, self.equations.kinematics.placements
@@ -228,7 +228,7 @@ class _Bodies:
                 f"{self.assembly.flat.name} movements of bodies",
                 state_groups(self.equations),
                 self.assembly.parameters,
-                (OutputGroup("slopes", tuple(entries.entries)),),
+                (OutputGroup("jacobian", tuple(entries.entries)),),
             ),
             (entries.rows, entries.columns, (len(rates), len(speeds))),
         )
@@ -257,7 +257,7 @@ class _Bodies:
         """Return how position (in shares of the extent) and orientation of each body move with the scaled speeds."""
         rows, columns, shape = self.entries
         matrix = np.zeros(shape)
-        matrix[rows, columns] = self.assembly.kernel(self.slopes)([t], q, np.zeros(shape[1]))[0]
+        matrix[rows, columns] = self.assembly.kernel(self.jacobian_program)([t], q, np.zeros(shape[1]))[0]
         matrix *= motion_scales(self.equations, length)
         kinematics, found, at = self.equations.kinematics, [], 0
         for i, turns in zip(self.indices, self.turns, strict=True):
@@ -271,12 +271,14 @@ class _Bodies:
         """Return whether what is said tells the position of each body, and its orientation."""
         system = System(self.assembly, self.equations, [*level.guessed, *level.fixed], False)
         scales = motion_scales(self.equations, start.length)
-        slopes = to_array(system.at(t, start.rough, np.zeros_like(scales))[1]) if system.targets else None
-        if slopes is None:
+        derivatives = to_array(system.at(t, start.rough, np.zeros_like(scales))[1]) if system.targets else None
+        if derivatives is None:
             free = np.eye(len(scales))
         else:
-            slopes = scaled(slopes, scales)
-            free = open_directions(slopes[independent_rows(slopes, system.errors.of_slopes(t, start.rough, scales))])
+            derivatives = scaled(derivatives, scales)
+            free = open_directions(
+                derivatives[independent_rows(derivatives, system.errors.of_jacobian(t, start.rough, scales))]
+            )
 
         def is_told(rows: FloatArray) -> bool:
             return float(np.linalg.norm(rows @ free.T)) <= FREE * float(np.linalg.norm(rows))
@@ -289,16 +291,16 @@ class _Bodies:
         system = System(self.assembly, self.equations, level.fixed, True)
         scales = motion_scales(self.equations, start.length)
         t, q = start.time, start.coordinates
-        slopes = to_array(system.at(t, q, np.zeros_like(scales))[1])
-        if not slopes.shape[0]:
+        derivatives = to_array(system.at(t, q, np.zeros_like(scales))[1])
+        if not derivatives.shape[0]:
             return dict.fromkeys(wanted, ())
-        slopes = scaled(slopes, scales, row_scales(slopes, scales, system.errors.near(t, q, scales)))
-        way = turning_of(self.assembly, "regular").difference(t, start.rough, q) / scales
-        weights = least_norm(slopes.T, way)
+        derivatives = scaled(derivatives, scales, row_scales(derivatives, scales, system.errors.near(t, q, scales)))
+        way = kinematic_map_of(self.assembly, "regular").difference(t, start.rough, q) / scales
+        weights = least_norm(derivatives.T, way)
         names = [one.key[0] for one in self.equations.constraints if one.value is not None]
         names += [target.path for target in level.fixed]
         ways: dict[str, FloatArray] = {}
-        for name, row, weight in zip(names, slopes, weights, strict=True):
+        for name, row, weight in zip(names, derivatives, weights, strict=True):
             ways[name] = ways.get(name, np.zeros_like(scales)) + weight * row
         moves = self._movements(t, q, start.length)
         found = {}

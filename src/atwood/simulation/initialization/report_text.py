@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from atwood.simulation.initialization.report import GuessMet, Placement
+    from atwood.simulation.initialization.report import GuessMet, InitializationReport
 
 __all__ = ["as_table", "in_a_line"]
 
@@ -30,7 +30,7 @@ def _few(names: Sequence[str]) -> str:
     return ", ".join(names[:_SHOWN]) + (f" and {rest} more" if rest > 0 else "")
 
 
-def in_a_line(placement: Placement) -> str:
+def in_a_line(placement: InitializationReport) -> str:
     """Return what moved and what was placed in one line; empty if nothing was.
 
     Parameters
@@ -53,7 +53,7 @@ def in_a_line(placement: Placement) -> str:
     return "; ".join(text)
 
 
-def as_table(placement: Placement) -> str:
+def as_table(placement: InitializationReport) -> str:
     """Return all that moved, all guesses, and what was open, as text.
 
     Parameters
@@ -65,7 +65,7 @@ def as_table(placement: Placement) -> str:
     return "\n".join(lines) or "Nothing was moved: everything starts where it was said."
 
 
-def _tables(placement: Placement) -> Iterator[str]:
+def _tables(placement: InitializationReport) -> Iterator[str]:
     length = placement.length
     rows = [
         (one.path, _how_far(*one.moved, length) or "-", _how_far(*one.placed, length) or "-", ", ".join(one.by))

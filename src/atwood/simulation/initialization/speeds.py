@@ -45,18 +45,18 @@ def solve_speeds(
     u, is_direct = said(equations.speeds, [*level.guessed, *level.fixed], np.zeros(len(equations.speeds)))
     if level.guessed and not is_direct:
         rough = System(assembly, equations, level.guessed, False, of_speeds=True)
-        missing, matrix = rough.at(t, q, u)
-        u = u - scales * least_norm(scaled(matrix, scales), missing)
+        residual, matrix = rough.at(t, q, u)
+        u = u - scales * least_norm(scaled(matrix, scales), residual)
     system = System(assembly, equations, level.fixed, True, of_speeds=True)
-    errors = system.errors.of_slopes(t, q, scales)
+    errors = system.errors.of_jacobian(t, q, scales)
     for _ in range(3):  # linear: the second pass takes out rounding
-        missing, matrix = system.at(t, q, u)
-        if not np.any(missing):
+        residual, matrix = system.at(t, q, u)
+        if not np.any(residual):
             break
         rows = row_scales(matrix, scales, errors)
-        u = u - scales * least_norm(scaled(matrix, scales, rows), missing / rows)
-    missing, matrix = system.at(t, q, u)
-    if missing.size:
+        u = u - scales * least_norm(scaled(matrix, scales, rows), residual / rows)
+    residual, matrix = system.at(t, q, u)
+    if residual.size:
         rows = row_scales(matrix, scales, errors)
         # Each equation is measured by its own terms, so that what is small beside another speed is not lost.
         own = abs(matrix) @ np.abs(u)
@@ -64,7 +64,7 @@ def solve_speeds(
         # What is summed up within an equation rounds, even if all that comes out of it is zero.
         fastest = float(np.max(np.abs(u / scales), initial=0.0))
         own += certain(errors, rows) * fastest / _MET
-        share = np.abs(missing) / np.where(own > 0.0, own, 1.0)
+        share = np.abs(residual) / np.where(own > 0.0, own, 1.0)
         if not float(np.max(share)) <= _MET:
             freedom = freedom_at(assembly, equations, scales, t, q)
             held = contradicted(equations, share[: system.constraints])

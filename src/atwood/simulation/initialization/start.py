@@ -18,10 +18,10 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.forms.starting import starting
 from atwood.late import dataclass
-from atwood.simulation.dynamics.kinematic_map import resting_place, turning_of
-from atwood.simulation.dynamics.orientation_coordinates import Reassemble, enter_charts, from_regular, own_names
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
+from atwood.simulation.dynamics.orientation_coordinates import Reassemble, from_regular, own_names, switch_coordinates
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, scene_length
-from atwood.simulation.dynamics.undefined_values import missing_at
+from atwood.simulation.dynamics.undefined_values import undefined_value_at
 from atwood.simulation.initialization.positions import solve_positions
 from atwood.simulation.initialization.speeds import solve_speeds
 from atwood.simulation.initialization.targets import sort_targets
@@ -71,7 +71,7 @@ def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]
 def maximal_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
     """Return a start in maximal coordinates, whatever the form of an assembly."""
     q, u = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
-    return turning_of(assembly, "dae").normalized(np.asarray(q, dtype=float)), np.asarray(u, dtype=float)
+    return kinematic_map_of(assembly, "dae").normalized(np.asarray(q, dtype=float)), np.asarray(u, dtype=float)
 
 
 def settle(assembly: Assembly, start: Start, reassemble: Reassemble) -> tuple[Assembly, FloatArray, FloatArray]:
@@ -85,7 +85,7 @@ def settle(assembly: Assembly, start: Start, reassemble: Reassemble) -> tuple[As
         Gives the scene in other charts.
     """
     if assembly.form == "reduced":
-        return *enter_charts(assembly, start.coordinates, reassemble), start.speeds
+        return *switch_coordinates(assembly, start.coordinates, reassemble), start.speeds
     return assembly, *own_state(assembly, start)
 
 
@@ -126,8 +126,8 @@ def find_start(assembly: Assembly) -> Start:
 
 def _without_value(assembly: Assembly, t: float, error: KernelEvaluationError) -> AtwoodError:
     """Return the error that names the law that has no value where bodies are placed if nothing is said of them."""
-    at_rest = resting_place(assembly.equations)
-    found = missing_at(assembly, t, at_rest, np.zeros(len(assembly.equations.speeds)))
+    at_rest = reference_coordinates(assembly.equations)
+    found = undefined_value_at(assembly, t, at_rest, np.zeros(len(assembly.equations.speeds)))
     if found is None:
         return error
     why = f" ({found.reason})" if found.reason else ""
@@ -151,10 +151,10 @@ def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
     u = dict(zip(before.speeds, start.speeds.tolist(), strict=True))
     place = {**assembly.mechanism.table.values, **assembly.known_relations, before.time: start.time, **q}
     sizes = np.maximum(coordinate_scales(before, start.length), np.abs(start.coordinates))
-    slopes_of = assembly.shared.get(
+    integral_gradients = assembly.shared.get(
         "slopes of integrals", lambda: [jacobian([one.value], before.coordinates) for one in after.integrals]
     )
-    for one, slopes in zip(after.integrals, slopes_of, strict=True):
+    for one, slopes in zip(after.integrals, integral_gradients, strict=True):
         (missed,) = evaluate([one.value], place)
         terms = np.abs(evaluate(slopes.entries, place)) * sizes[list(slopes.columns)]
         if not abs(missed) <= 1e-9 * float(np.max(terms, initial=0.0)):

@@ -19,7 +19,7 @@ from atwood.linalg.matrices import (
     to_array,
 )
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.simulation.dynamics.kinematic_map import turning_of
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rank import FREE, independent_rows, least_norm, open_directions, row_scales
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.simulation.initialization.targets import Target
@@ -69,7 +69,7 @@ def start_conditions(
         entries = jacobian(expressions, list(unknowns)) if expressions else None
         outputs = (
             OutputGroup("values", tuple(expressions)),
-            OutputGroup("slopes", tuple(entries.entries) if entries else ()),
+            OutputGroup("jacobian", tuple(entries.entries) if entries else ()),
         )
         program = Program(f"{assembly.flat.name} start", state_groups(equations), assembly.parameters, outputs)
         places = (tuple(entries.rows), tuple(entries.columns)) if entries else ((), ())
@@ -99,15 +99,17 @@ class System:
         whole_turns: bool = False,
     ) -> None:
         made = start_conditions(assembly, equations, targets, constrained, of_speeds)
-        turning = turning_of(assembly, "regular")
-        self.turning = None if of_speeds else turning
+        kinematic_map = kinematic_map_of(assembly, "regular")
+        self.kinematic_map = None if of_speeds else kinematic_map
         self.program = made.program
         self.kernel = assembly.kernel(made.program)
         self.rows, self.columns, self.shape = made.rows, made.columns, made.shape
         places = made.rows, made.columns
         held = [one.key[:2] for one in equations.constraints if of_speeds or one.value is not None]
         laws = [*(held if constrained else []), *(one.path for one in targets)]
-        self.errors = RowErrors(assembly, made.program, ("values", "slopes"), laws, places, turning, not of_speeds)
+        self.errors = RowErrors(
+            assembly, made.program, ("values", "jacobian"), laws, places, kinematic_map, not of_speeds
+        )
         self.targets, self.constraints = targets, made.shape[0] - len(targets)
         self.wrapped = [one.observable.periodic or (whole_turns and one.observable.unit == "rad") for one in targets]
         self.speed_names = tuple(one.name for one in equations.speed_names)
@@ -115,16 +117,16 @@ class System:
 
     def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, Matrix]:
         """Return what is missing in each equation, and the derivatives."""
-        values, slopes = self.kernel([t], q, u)
-        matrix = from_entries(self.rows, self.columns, slopes, self.shape)
-        if self.turning is not None and not self.turning.is_plain:
-            matrix = to_array(matrix) @ self.turning.tangent(t, q)
-        missing = np.asarray(values, dtype=float)
+        values, entries = self.kernel([t], q, u)
+        matrix = from_entries(self.rows, self.columns, entries, self.shape)
+        if self.kinematic_map is not None and not self.kinematic_map.is_plain:
+            matrix = to_array(matrix) @ self.kinematic_map.matrix(t, q)
+        residual = np.asarray(values, dtype=float)
         for i, target in enumerate(self.targets, start=self.constraints):
-            missing[i] -= target.value
+            residual[i] -= target.value
             if self.wrapped[i - self.constraints]:
-                missing[i] = np.remainder(missing[i] + np.pi, 2.0 * np.pi) - np.pi
-        return missing, matrix
+                residual[i] = np.remainder(residual[i] + np.pi, 2.0 * np.pi) - np.pi
+        return residual, matrix
 
 
 def newton(
@@ -132,30 +134,30 @@ def newton(
 ) -> tuple[FloatArray, FloatArray, Matrix]:
     """Move to the nearest configuration that fulfils a system; return it with what is missing, scaled."""
     still = np.zeros_like(scales)
-    assert system.turning is not None
-    missing, matrix = system.at(t, q, still)
+    assert system.kinematic_map is not None
+    residual, matrix = system.at(t, q, still)
     errors = system.errors.near(t, q, scales)
     rows = row_scales(matrix, scales, errors)
     for _ in range(iterations):
-        size = float(np.max(np.abs(missing / rows), initial=0.0))
+        size = float(np.max(np.abs(residual / rows), initial=0.0))
         if size < 1e-15:
             break
-        step = scales * least_norm(scaled(matrix, scales, rows), missing / rows)
+        step = scales * least_norm(scaled(matrix, scales, rows), residual / rows)
         longest = float(np.max(np.abs(step / scales), initial=0.0))
         step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
         for _ in range(8):
-            trial = system.turning.moved(t, q, -step)
-            new_missing, new_matrix = system.at(t, trial, still)
-            if float(np.max(np.abs(new_missing / rows))) < size or longest < 1e-9:
+            trial = system.kinematic_map.moved(t, q, -step)
+            new_residual, new_matrix = system.at(t, trial, still)
+            if float(np.max(np.abs(new_residual / rows))) < size or longest < 1e-9:
                 break
             step *= 0.5
-        if float(np.max(np.abs(new_missing / rows))) >= size and size < MET:
+        if float(np.max(np.abs(new_residual / rows))) >= size and size < MET:
             break
-        q, missing, matrix = trial, new_missing, new_matrix
+        q, residual, matrix = trial, new_residual, new_matrix
         rows = row_scales(matrix, scales, errors)
     # What hardly changes with any coordinate, as where links line up, is measured by the scene.
     sizes = np.maximum(rows, 1e-4 * max(np.max(rows, initial=0.0), np.max(scales, initial=0.0)))
-    return q, missing / sizes, scaled(matrix, scales)
+    return q, residual / sizes, scaled(matrix, scales)
 
 
 def counted(
@@ -172,7 +174,7 @@ def counted(
     ----------
     names
         Of the coordinates or speeds.
-    tangent
+    matrix
         How coordinates move with the speeds; None where each has its own.
     fixed, constraints
         What is fixed, and how many constraints come before that.

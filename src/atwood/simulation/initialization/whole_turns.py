@@ -57,7 +57,7 @@ def unwound(
     """
     if assembly.mechanism.space.name != "space":  # in a plane angles are absolute, and not those of joints
         return q
-    of_charts = {number for chart in equations.charts for number in chart.coordinates}
+    of_charts = {number for orientation in equations.orientation_coordinates for number in orientation.coordinates}
     whole = np.round((q - near) / _TURN)
     wound = [i for i, one in enumerate(equations.names) if one.unit == "rad" and i not in of_charts and whole[i] != 0.0]
     if not wound:
@@ -81,7 +81,10 @@ def _places(assembly: Assembly, t: float, q: FloatArray, length: float) -> Float
     forest = assembly.maximal.forest
     given = assembly.kernel(to_maximal(assembly, "regular"))([t], q, np.zeros(len(assembly.regular.speeds)))[0]
     found = np.asarray(given, dtype=float)
-    rotations = [np.outer(v, v).ravel() / (v @ v) for v in (found[list(one.coordinates)] for one in forest.charts)]
-    of_charts = [number for one in forest.charts for number in one.coordinates]
+    rotations = [
+        np.outer(v, v).ravel() / (v @ v)
+        for v in (found[list(one.coordinates)] for one in forest.orientation_coordinates)
+    ]
+    of_charts = [number for one in forest.orientation_coordinates for number in one.coordinates]
     counted = [number for number, _ in forest.counted.values()]
     return np.concatenate([np.delete(found, [*of_charts, *counted]) / length, *rotations])

@@ -24,7 +24,7 @@ from atwood.errors import AtwoodError, UsageError
 from atwood.forms.dae import LEVELS
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.simulation.problem.options import SOLVERS
-from atwood.topology.charts import ORIENTATIONS
+from atwood.topology.orientation_coordinates import ORIENTATIONS
 
 __all__ = [
     "FORM",

@@ -18,12 +18,12 @@ from atwood.model.declare.component import bind
 from atwood.model.local.laws import LocalPart
 from atwood.model.values.vector import Vector
 
-__all__ = ["announce", "find_uncompiled"]
+__all__ = ["announce", "find_not_compilable"]
 
 _PLAIN = ("potential", "dissipation", "force", "inertia", "lagrangian")
 
 
-def find_uncompiled(assembly: Assembly, program: Program) -> str:
+def find_not_compilable(assembly: Assembly, program: Program) -> str:
     """Return what keeps a program from being compiled, with the component and the law; empty if nothing does.
 
     Parameters
@@ -34,24 +34,24 @@ def find_uncompiled(assembly: Assembly, program: Program) -> str:
         One of its programs.
     """
     _, found = assembly.shared.get(
-        ("uncompiled", id(program)),
+        ("not compilable", id(program)),
         lambda: (program, _describe(assembly, program)),  # kept, so that its identity stays its own
     )
     return found
 
 
-def announce(assembly: Assembly, uncompiled: str) -> None:
+def announce(assembly: Assembly, not_compilable: str) -> None:
     """Warn that a scene runs through kernels in Python.
 
     Parameters
     ----------
     assembly
         The scene.
-    uncompiled
-        What `find_uncompiled` gave.
+    not_compilable
+        What `find_not_compilable` gave.
     """
     warnings.warn(
-        f"{assembly.flat.name} runs through kernels in Python, which are slower: {uncompiled}. Write it in plain "
+        f"{assembly.flat.name} runs through kernels in Python, which are slower: {not_compilable}. Write it in plain "
         "arithmetic with Atwood's functions to have it compiled.",
         stacklevel=2,
     )

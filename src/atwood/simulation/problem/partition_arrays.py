@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.codegen.sundials.null_space import LoopShape
-from atwood.forms.loops import LoopProgram
+from atwood.codegen.sundials.null_space import NullSpaceShape
+from atwood.forms.null_space import NullSpaceProgram
 from atwood.topology.groups import connected_groups
 
-__all__ = ["choice_lists", "loop_shape"]
+__all__ = ["choice_lists", "null_space_shape"]
 
 
-def loop_shape(program: LoopProgram) -> LoopShape:
+def null_space_shape(program: NullSpaceProgram) -> NullSpaceShape:
     """Return how many there are of each in a mechanism."""
-    return LoopShape(program.coordinates, program.speeds, program.values, program.rates)
+    return NullSpaceShape(program.coordinates, program.speeds, program.values, program.rates)
 
 
 def choice_lists(
-    program: LoopProgram, dependent: tuple[int, ...], places: tuple[int, ...] | None = None
+    program: NullSpaceProgram, dependent: tuple[int, ...], places: tuple[int, ...] | None = None
 ) -> NDArray[np.int64]:
     """Return a choice as the lists of numbers that compiled code reads.
 
@@ -34,7 +34,7 @@ def choice_lists(
     places
         As many speeds as there are constraints on positions, along which displacements follow; the same when None.
     """
-    shape, given = loop_shape(program), set(dependent)
+    shape, given = null_space_shape(program), set(dependent)
     free = [i for i in range(shape.speeds) if i not in given]
     kinematic = [i for i in range(shape.coordinates) if i not in set(dependent if places is None else places)]
     balances = [shape.coordinates + i for i in free]
@@ -55,13 +55,13 @@ def choice_lists(
     return np.array([number for name in shape.choice if name != "end" for number in lists[name]], dtype=np.int64)
 
 
-def _blocks(program: LoopProgram, dependent: tuple[int, ...]) -> list[tuple[list[int], list[int]]]:
+def _blocks(program: NullSpaceProgram, dependent: tuple[int, ...]) -> list[tuple[list[int], list[int]]]:
     """Return constraints and dependent speeds in groups that share nothing."""
     given = set(dependent)
     owner: dict[int, int] = {}
     shared = [
         (owner.setdefault(column, row), row)
-        for row, column in zip(program.slope_rows.tolist(), program.slope_columns.tolist(), strict=True)
+        for row, column in zip(program.jacobian_rows.tolist(), program.jacobian_columns.tolist(), strict=True)
         if column in given
     ]
     blocks: list[tuple[list[int], list[int]]] = []

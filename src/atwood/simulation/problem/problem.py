@@ -22,15 +22,15 @@ from atwood.linalg.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of, solve_balance
 from atwood.simulation.dynamics.columns import columns_of
 from atwood.simulation.dynamics.determined_reactions import check_read_reactions
-from atwood.simulation.dynamics.partitioning import choose_dependent, review_choice
+from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates, review_partitioning
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank, review_kept
 from atwood.simulation.dynamics.scales import Scales, coordinate_scales, find_scales, motion_scales
-from atwood.simulation.initialization.massless import check_inertia
-from atwood.simulation.problem.not_compilable import announce, find_uncompiled
+from atwood.simulation.initialization.massless import check_massless_directions
+from atwood.simulation.problem.not_compilable import announce, find_not_compilable
 
 if TYPE_CHECKING:
-    from atwood.forms.loops import LoopProgram
-    from atwood.simulation.problem.native_loops import CompiledLoops
+    from atwood.forms.null_space import NullSpaceProgram
+    from atwood.simulation.problem.native_null_space import CompiledNullSpace
 
 __all__ = ["Plan", "make_plan", "pack_state"]
 
@@ -62,7 +62,7 @@ class Plan:
         follow from all constraints, at present. They differ only if there are constraints on velocities alone.
     switches
         How often they changed.
-    uncompiled
+    not_compilable
         What keeps the scene from being compiled, in words; empty if nothing does.
     """
 
@@ -76,10 +76,10 @@ class Plan:
     dependent: tuple[int, ...]
     dependent_speeds: tuple[int, ...]
     switches: int = 0
-    uncompiled: str = ""
+    not_compilable: str = ""
     _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
     _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
-    _loops: CompiledLoops | None = field(default=None, repr=False)
+    _null_space: CompiledNullSpace | None = field(default=None, repr=False)
 
     @property
     def kept(self) -> NDArray[np.intp] | None:
@@ -96,7 +96,7 @@ class Plan:
     def in_piece(self, assembly: Assembly) -> Plan:
         """Return the plan of the same scene with other relations of functions of time, after a time event."""
         balance = balance_of(assembly, assembly.form)
-        return replace(self, assembly=assembly, balance=balance, _kernels=None, _seen=None, _loops=None)
+        return replace(self, assembly=assembly, balance=balance, _kernels=None, _seen=None, _null_space=None)
 
     def kernels(self) -> tuple[BoundKernel, BoundKernel]:
         """Return residual and Jacobian at present."""
@@ -113,21 +113,21 @@ class Plan:
             return self.program
         return self.assembly.form_program(_kept_or_none(self.finding), self.dependent, self.dependent_speeds)
 
-    def review_dependent(self, t: float, q: FloatArray) -> bool:
+    def review_partitioning(self, t: float, q: FloatArray) -> bool:
         """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
         if not self.dependent_speeds:
             return False
-        slope = to_array(self.balance.held(t, q, np.zeros_like(self.sizes)).slope)
-        speeds = review_choice(slope[list(self.finding.kept)], self.sizes, self.dependent_speeds)
+        constraint_jacobian = to_array(self.balance.constraints_at(t, q, np.zeros_like(self.sizes)).jacobian)
+        speeds = review_partitioning(constraint_jacobian[list(self.finding.kept)], self.sizes, self.dependent_speeds)
         holding = self.balance.holding(self.finding.kept)
         is_same = len(holding) == len(speeds)
-        places = speeds if is_same else review_choice(slope[holding], self.sizes, self.dependent)
+        places = speeds if is_same else review_partitioning(constraint_jacobian[holding], self.sizes, self.dependent)
         if (places, speeds) == (self.dependent, self.dependent_speeds):
             return False
         self.dependent, self.dependent_speeds = places, speeds
         self._kernels = None
-        if self._loops is not None:
-            self._loops.choose(places, speeds)
+        if self._null_space is not None:
+            self._null_space.choose(places, speeds)
         self.switches += 1
         return True
 
@@ -138,10 +138,10 @@ class Plan:
 
     def keep(self, finding: RankFinding, t: float, q: FloatArray) -> None:
         """Keep other constraints from a place on; programs and sessions for those before have had their day."""
-        self.finding, self._kernels, self._loops = finding, None, None
+        self.finding, self._kernels, self._null_space = finding, None, None
         if self.dependent_speeds:
-            slope = to_array(self.balance.held(t, q, np.zeros_like(self.sizes)).slope)
-            self.dependent, self.dependent_speeds = _dependent(self.balance, finding, slope, self.sizes)
+            constraint_jacobian = to_array(self.balance.constraints_at(t, q, np.zeros_like(self.sizes)).jacobian)
+            self.dependent, self.dependent_speeds = _dependent(self.balance, finding, constraint_jacobian, self.sizes)
         self.program = self.assembly.form_program(finding.kept, self.dependent, self.dependent_speeds)
 
     def review_output(self, t: float, q: FloatArray) -> bool:
@@ -149,7 +149,7 @@ class Plan:
 
         These look at the speeds alone.
         """
-        return (self._loops is None or self.dependent != self.dependent_speeds) and self.review_dependent(t, q)
+        return (self._null_space is None or self.dependent != self.dependent_speeds) and self.review_partitioning(t, q)
 
     def check_held(self, t: float, q: FloatArray, u: FloatArray) -> None:
         """Refuse a state that misses constraints even after it has been projected onto them: they contradict.
@@ -175,11 +175,11 @@ class Plan:
         """Review the dependent coordinates where the solver last asked for a Jacobian; for a driver's poll."""
         if self._seen is not None:
             seen, self._seen = self._seen, None
-            self.review_dependent(*seen)
+            self.review_partitioning(*seen)
 
     def poll(self, solver: str) -> Callable[[float], None] | None:
         """Return what a driver calls between two steps; compiled functions tell by themselves when it is time to."""
-        native = solver == "ida" and not self.uncompiled
+        native = solver == "ida" and not self.not_compilable
         return self.between_steps if self.dependent_speeds and not native else None
 
     def problem(
@@ -225,26 +225,26 @@ class Plan:
 
     def _native(self) -> Callable[[LinearSolver], NativeCallbacks] | None:
         """Return what compiles residual and Jacobian; None if nothing can."""
-        if self.uncompiled:
+        if self.not_compilable:
             return None
-        return self.compiled_loops if self.dependent_speeds else self.compiled
+        return self.compiled_null_space if self.dependent_speeds else self.compiled
 
-    def compiled_loops(self, linear_solver: LinearSolver) -> NativeCallbacks:
+    def compiled_null_space(self, linear_solver: LinearSolver) -> NativeCallbacks:
         """Return residual and Jacobian of the reduced form with loops as machine code, for one session."""
-        from atwood.simulation.problem.native_loops import CompiledLoops, compile_loops
+        from atwood.simulation.problem.native_null_space import CompiledNullSpace, compile_null_space
 
         shared, kept = self.assembly.shared, self.finding.kept
-        if self._loops is None:
-            program = shared.get(("loops", kept), lambda: _loop_program(self.assembly, kept))
-            self._loops = CompiledLoops(program, self.assembly.parameter_values, self.sizes)
-        made = self._loops.program
-        code = shared.get(("loops", kept, linear_solver), lambda: compile_loops(made, linear_solver))
+        if self._null_space is None:
+            program = shared.get(("loops", kept), lambda: _null_space_program(self.assembly, kept))
+            self._null_space = CompiledNullSpace(program, self.assembly.parameter_values, self.sizes)
+        made = self._null_space.program
+        code = shared.get(("loops", kept, linear_solver), lambda: compile_null_space(made, linear_solver))
         coordinates = self.program.coordinates
 
         def review(t: float, y: FloatArray) -> bool:
-            return self.review_dependent(t, y[:coordinates])
+            return self.review_partitioning(t, y[:coordinates])
 
-        return self._loops.callbacks(code, (self.dependent, self.dependent_speeds), review)
+        return self._null_space.callbacks(code, (self.dependent, self.dependent_speeds), review)
 
     def compiled(self, linear_solver: LinearSolver) -> NativeCallbacks:
         """Return residual and Jacobian as machine code, for one session."""
@@ -289,11 +289,11 @@ class Plan:
         return np.concatenate([relative * self.coordinate_sizes, relative * (self.sizes / self.scales.time), loose])
 
 
-def _loop_program(assembly: Assembly, kept: tuple[int, ...]) -> LoopProgram:
-    from atwood.forms.loops import loop_program
+def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceProgram:
+    from atwood.forms.null_space import null_space_program
 
     equations = keep_constraints(assembly.equations, kept)
-    return loop_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)
+    return null_space_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)
 
 
 def _kept_or_none(finding: RankFinding) -> tuple[int, ...] | None:
@@ -332,29 +332,32 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
             where=assembly.flat.name,
             advice="Do two points coincide that a spring, damper or rope joins? Give start positions that part them.",
         ) from error
-    slope = now.slope[list(finding.kept)] if finding.kept else now.slope[:0]
-    check_inertia(assembly, now.mass, slope, sizes)
+    constraint_jacobian = now.jacobian[list(finding.kept)] if finding.kept else now.jacobian[:0]
+    check_massless_directions(assembly, now.mass, constraint_jacobian, sizes)
     if finding.starts_singular:
         raise _singular_start(assembly, finding)
     dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
     if assembly.form == "reduced" and finding.kept:
-        dependent = _dependent(balance, finding, to_array(now.slope), sizes)
+        dependent = _dependent(balance, finding, to_array(now.jacobian), sizes)
     program = assembly.form_program(_kept_or_none(finding), *dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = solve_balance(now, kept, t)
     scales = find_scales(assembly, length, u, accelerations, sizes, span)
-    uncompiled = find_uncompiled(assembly, program.residual)
-    if uncompiled:
-        announce(assembly, uncompiled)
-    return Plan(assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent, uncompiled=uncompiled)
+    not_compilable = find_not_compilable(assembly, program.residual)
+    if not_compilable:
+        announce(assembly, not_compilable)
+    return Plan(
+        assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent, not_compilable=not_compilable
+    )
 
 
 def _dependent(
-    balance: Balance, finding: RankFinding, slope: FloatArray, sizes: FloatArray
+    balance: Balance, finding: RankFinding, constraint_jacobian: FloatArray, sizes: FloatArray
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the speeds whose displacements follow from constraints on positions, and those that follow from all."""
     places, speeds = (
-        choose_dependent(slope[list(one)], sizes) for one in (balance.holding(finding.kept), finding.kept)
+        choose_dependent_coordinates(constraint_jacobian[list(one)], sizes)
+        for one in (balance.holding(finding.kept), finding.kept)
     )
     return places, speeds
 
@@ -380,5 +383,5 @@ def pack_state(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[Floa
     else:
         tail = []
     y = np.concatenate([q, u, *tail])
-    yp = np.concatenate([plan.balance.turning.rates(t, q, u), accelerations, *(np.zeros_like(x) for x in tail)])
+    yp = np.concatenate([plan.balance.kinematic_map.rates(t, q, u), accelerations, *(np.zeros_like(x) for x in tail)])
     return y, yp

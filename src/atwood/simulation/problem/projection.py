@@ -73,8 +73,8 @@ class ConstraintsAt:
     """
 
     value: FloatArray
-    slope: FloatArray
-    drift: FloatArray
+    jacobian: FloatArray
+    explicit_rate: FloatArray
     kept: list[int]
     normal: Normal | None
     rows: FloatArray
@@ -82,9 +82,9 @@ class ConstraintsAt:
     def rate(self, speeds: FloatArray) -> FloatArray:
         """Return the constraints on velocity for speeds in units of the scales, shape (states, number)."""
         if self.normal is not None:
-            return self.normal.whole.times(self.slope, speeds.T).T + self.drift
-        moved: FloatArray = np.einsum("smn,sn->sm", self.slope, speeds)
-        return moved + self.drift
+            return self.normal.whole.times(self.jacobian, speeds.T).T + self.explicit_rate
+        moved: FloatArray = np.einsum("smn,sn->sm", self.jacobian, speeds)
+        return moved + self.explicit_rate
 
     def step(self, right: FloatArray, rows: Sequence[int] | None = None) -> FloatArray:
         """Return the shortest displacements that change independent constraints by so much.
@@ -99,15 +99,15 @@ class ConstraintsAt:
         if self.normal is not None or rows is None:
             return self.solver()(right)
         chosen = list(rows)
-        return _least_norm(self.slope[:, chosen])(right[:, chosen])
+        return _least_norm(self.jacobian[:, chosen])(right[:, chosen])
 
     def solver(self) -> Callable[[FloatArray], FloatArray]:
         """Return what gives such displacements for one right-hand side after another."""
         kept = self.kept
         if self.normal is not None:
-            solve = self.normal.factorised(self.slope)
+            solve = self.normal.factorised(self.jacobian)
             return lambda right: solve(right[:, kept].T).T
-        dense = _least_norm(self.slope[:, kept])
+        dense = _least_norm(self.jacobian[:, kept])
         return lambda right: dense(right[:, kept])
 
 
@@ -135,7 +135,7 @@ def project_states(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> P
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class ProjectedStates:
     """States after one step of Newton's method towards the constraints.
 
     Attributes
@@ -151,7 +151,7 @@ class Held:
     hold: Callable[[FloatArray], FloatArray]
 
 
-def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Held:
+def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> ProjectedStates:
     """Return states after one step of Newton's method towards the constraints on position and velocity.
 
     For iterations that come ever nearer to the constraints by themselves: what is missed is missed squared afterwards.
@@ -164,11 +164,11 @@ def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) ->
     t, q, u
         States quite near the constraints, of shape (states,) and (number, states).
     """
-    sizes, turning = plan.sizes[:, None], plan.balance.turning
+    sizes, kinematic_map = plan.sizes[:, None], plan.balance.kinematic_map
     holding = plan.balance.holding(list(plan.finding.kept))
-    q = turning.normalized(q)
+    q = kinematic_map.normalized(q)
     now = constraints_at(plan, t, q, u)
-    q = turning.moved_each(t, q, -sizes * now.step(now.value, holding).T)
+    q = kinematic_map.moved_each(t, q, -sizes * now.step(now.value, holding).T)
     now = constraints_at(plan, t, q, u)
     solve = now.solver()
 
@@ -176,7 +176,7 @@ def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) ->
         speeds = (other / sizes).T
         return sizes * (speeds - solve(now.rate(speeds))).T
 
-    return Held(q, hold(u), hold)
+    return ProjectedStates(q, hold(u), hold)
 
 
 def misses_of(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
@@ -209,13 +209,13 @@ def _chunk(plan: Plan) -> int:
 def _normal(plan: Plan) -> Normal | None:
     """Return the normal equations of the independent constraints by their entries; None where arrays are better."""
     program = plan.balance.program
-    plain = plan.balance.turning.is_plain and len(program.holonomic) == program.constraints
-    if not plain or is_best_full((program.constraints, program.speeds), len(program.slope_rows), many=True):
+    plain = plan.balance.kinematic_map.is_plain and len(program.holonomic) == program.constraints
+    if not plain or is_best_full((program.constraints, program.speeds), len(program.jacobian_rows), many=True):
         return None
     from atwood.linalg.sparse_batch import Normal, Pattern
 
     def make() -> Normal:
-        pattern = Pattern(program.slope_rows, program.slope_columns, (program.constraints, program.speeds))
+        pattern = Pattern(program.jacobian_rows, program.jacobian_columns, (program.constraints, program.speeds))
         return Normal(pattern, plan.finding.kept)
 
     return plan.assembly.shared.get(("normal equations", plan.assembly.form, plan.finding.kept), make)
@@ -231,28 +231,30 @@ def constraints_at(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> C
     program = p.constraints_alone
     if count == 1:  # numbers one by one take a tenth of the time of arrays with one number each
         alone = plan.assembly.kernel(program)(t, q[:, 0], u[:, 0])
-        value, slope, drift = (np.reshape(one, (-1, 1)) for one in alone)
+        value, jacobian, explicit_rate = (np.reshape(one, (-1, 1)) for one in alone)
     else:
-        value, slope, drift = plan.assembly.kernel(program, vectorized=True)(t[None, :], q, u)
+        value, jacobian, explicit_rate = plan.assembly.kernel(program, vectorized=True)(t[None, :], q, u)
     kept, normal = list(plan.finding.kept), _normal(plan)
     farthest = int(np.argmax(np.max(np.abs(q), axis=0, initial=0.0)))
     errors = plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)
     if normal is not None:
         pattern = normal.whole
-        slope = slope * plan.sizes[pattern.columns, None]
-        rows = trusted_sizes(pattern.largest(slope).T, errors)
-        return ConstraintsAt(value.T / rows, slope / rows.T[pattern.rows], drift.T / rows, kept, normal, rows)
+        jacobian = jacobian * plan.sizes[pattern.columns, None]
+        rows = trusted_sizes(pattern.largest(jacobian).T, errors)
+        return ConstraintsAt(
+            value.T / rows, jacobian / rows.T[pattern.rows], explicit_rate.T / rows, kept, normal, rows
+        )
     full = np.zeros((count, p.constraints, p.speeds))
-    full[:, p.slope_rows, p.slope_columns] = slope.T
+    full[:, p.jacobian_rows, p.jacobian_columns] = jacobian.T
     full *= plan.sizes
     rows = trusted_sizes(np.max(np.abs(full), axis=2), errors)
-    return ConstraintsAt(value.T / rows, full / rows[:, :, None], drift.T / rows, kept, None, rows)
+    return ConstraintsAt(value.T / rows, full / rows[:, :, None], explicit_rate.T / rows, kept, None, rows)
 
 
 def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
     sizes = plan.sizes[:, None]
-    turning, holding = plan.balance.turning, plan.balance.holding(list(plan.finding.kept))
-    q, speeds = turning.normalized(q.copy()), (u / sizes).T
+    kinematic_map, holding = plan.balance.kinematic_map, plan.balance.holding(list(plan.finding.kept))
+    q, speeds = kinematic_map.normalized(q.copy()), (u / sizes).T
     now = constraints_at(plan, t, q, u)
     held = _largest(now, speeds)
     last = np.full(len(t), np.inf)
@@ -264,7 +266,7 @@ def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Project
             break
         last = miss
         step = now.step(now.value, holding)
-        q = turning.moved_each(t, q, -sizes * np.where(active[:, None], step, 0.0).T)
+        q = kinematic_map.moved_each(t, q, -sizes * np.where(active[:, None], step, 0.0).T)
         now = constraints_at(plan, t, q, u)
     solve = now.solver()
     for _ in range(2):  # the second pass takes out the rounding of the first
@@ -274,18 +276,18 @@ def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Project
     return Projected(q, sizes * speeds.T, held, doubtful)
 
 
-def _least_norm(slope: FloatArray) -> Callable[[FloatArray], FloatArray]:
+def _least_norm(jacobian: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Return what gives the shortest solutions of ``slope x = right``; not finite where rows depend on each other."""
-    across = np.swapaxes(slope, 1, 2)
+    across = np.swapaxes(jacobian, 1, 2)
     with np.errstate(all="ignore"):
-        square = slope @ across
+        square = jacobian @ across
 
     def solve(right: FloatArray) -> FloatArray:
         with np.errstate(all="ignore"):
             try:
                 solved = np.linalg.solve(square, right[:, :, None])
             except np.linalg.LinAlgError:
-                return np.full((len(slope), slope.shape[2]), np.nan)
+                return np.full((len(jacobian), jacobian.shape[2]), np.nan)
             return np.asarray((across @ solved)[:, :, 0])
 
     return solve

@@ -125,7 +125,7 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
     if found is None and options.relative_tolerance <= VERY_ACCURATE and _has_series(assembly):
         reason = f"no constraints are left among its coordinates, nothing dies away, and {VERY_ACCURATE:g} or better"
         return Choice(t, "taylor", f"{reason} is asked for")
-    if found is None and plan.balance.turning.can_be_left and _has_series(assembly):
+    if found is None and plan.balance.kinematic_map.has_singular_coordinates and _has_series(assembly):
         reason = "its orientations are in three coordinates, which are singular somewhere: series err least near there"
         return Choice(t, "taylor", reason)
     return Choice(t, "explicit", "no constraints are left among its coordinates, and it is not stiff")

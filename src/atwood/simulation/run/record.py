@@ -15,9 +15,9 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of, project_safely, project_states
-from atwood.simulation.singular.crossing import Passage
+from atwood.simulation.singular.crossing import SingularCrossing
 
-__all__ = ["Recorder", "Segment"]
+__all__ = ["Recorder", "SegmentRecord"]
 
 
 _PENDING = 512
@@ -32,7 +32,7 @@ _Waiting: TypeAlias = Sequence[tuple[float, FloatArray, bool]]
 
 
 @dataclass(frozen=True, eq=False)
-class Segment:
+class SegmentRecord:
     """A stretch of a run in one mode.
 
     Attributes
@@ -50,7 +50,7 @@ class Segment:
         Which samples are outputs.
     held
         By how much the solver's own states missed the constraints on position and velocity, shape (2, samples).
-    passages
+    singular_crossings
         Singular positions that it passed through.
     after_time_event
         Whether it began at a time event, at which energy that comes or goes is work of inputs and drives.
@@ -63,7 +63,7 @@ class Segment:
     speeds: FloatArray
     shown: NDArray[np.bool_]
     held: FloatArray
-    passages: tuple[Passage, ...] = ()
+    singular_crossings: tuple[SingularCrossing, ...] = ()
     after_time_event: bool = False
 
     @property
@@ -100,7 +100,7 @@ class Recorder:
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self.passages: list[Passage] = []
+        self.singular_crossings: list[SingularCrossing] = []
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
         self._samples: tuple[tuple[_Block, ...], list[tuple[float, FloatArray, bool]]] = ((), [])
 
@@ -139,35 +139,35 @@ class Recorder:
             self.settle()
             self._finish(t, y, shown)
 
-    def pass_over(self, passage: Passage, t: FloatArray, shown: NDArray[np.bool_]) -> None:
+    def pass_over(self, crossing: SingularCrossing, t: FloatArray, shown: NDArray[np.bool_]) -> None:
         """Record a passage, in place of all samples since its start; its states are not to be projected.
 
         Parameters
         ----------
-        passage
+        crossing
             The passage, with its path.
         t, shown
             Sample times on its way, and which of them are outputs.
         """
-        assert passage.path is not None
-        self._rewind(passage.path.start)
+        assert crossing.path is not None
+        self._rewind(crossing.path.start)
         self.settle()
-        self.passages.append(passage)
+        self.singular_crossings.append(crossing)
         if len(t):
-            q, u, _ = passage.path.at(t)
-            q = self.plan.balance.turning.normalized(q)
+            q, u, _ = crossing.path.at(t)
+            q = self.plan.balance.kinematic_map.normalized(q)
             self._add(_Block(t, q, u, shown.copy(), misses_of(self.plan, t, q, u)))
 
-    def note(self, passages: Sequence[Passage]) -> None:
+    def note(self, singular_crossings: Sequence[SingularCrossing]) -> None:
         """Record passages that the solver made by itself; states quite near the place cannot be projected well."""
         self.settle()
-        for passage in passages:
-            self.passages.append(passage)
+        for crossing in singular_crossings:
+            self.singular_crossings.append(crossing)
             for block in self._samples[0]:
-                inside = passage.has_in_its_middle(block.time)
-                if passage.path is not None and inside.any():
-                    q, u, _ = passage.path.at(block.time[inside])
-                    block.q[:, inside], block.u[:, inside] = self.plan.balance.turning.normalized(q), u
+                inside = crossing.has_in_its_middle(block.time)
+                if crossing.path is not None and inside.any():
+                    q, u, _ = crossing.path.at(block.time[inside])
+                    block.q[:, inside], block.u[:, inside] = self.plan.balance.kinematic_map.normalized(q), u
 
     def _rewind(self, t: float) -> None:
         """Forget all samples after a time."""
@@ -211,17 +211,19 @@ class Recorder:
         """Whether nothing has been recorded, and nothing waits."""
         return not any(self._samples)
 
-    def segment(self, impact: bool, after_time_event: bool = False) -> Segment:
+    def segment(self, impact: bool, after_time_event: bool = False) -> SegmentRecord:
         """Return what was recorded."""
         self.settle()
         blocks = self._samples[0]
         q, u, held = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u", "held"))
         time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
-        return Segment(self.plan, impact, time, q, u, shown, held, tuple(self.passages), after_time_event)
+        return SegmentRecord(
+            self.plan, impact, time, q, u, shown, held, tuple(self.singular_crossings), after_time_event
+        )
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: _Waiting = ()) -> None:
         q, u = (part.copy() for part in self.plan.program.split(y.T))
-        q = self.plan.balance.turning.normalized(q)
+        q = self.plan.balance.kinematic_map.normalized(q)
         if not self.plan.balance.constraints:
             self._add(_Block(t, q, u, shown, np.zeros((2, len(t)))), waiting)
             return

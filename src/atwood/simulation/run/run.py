@@ -13,11 +13,17 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
 from atwood.late import dataclass
-from atwood.simulation.dynamics.orientation_coordinates import CHART, Reassemble, Restated, enter_charts, to_regular
+from atwood.simulation.dynamics.orientation_coordinates import (
+    COORDINATE_SWITCH,
+    CoordinateSwitch,
+    Reassemble,
+    switch_coordinates,
+    to_regular,
+)
 from atwood.simulation.dynamics.scales import scene_length
-from atwood.simulation.dynamics.undefined_values import missing_at
+from atwood.simulation.dynamics.undefined_values import undefined_value_at
 from atwood.simulation.events.impacts_in_time import pass_time_event
-from atwood.simulation.events.modes import EventProbe, Happening, enter_mode
+from atwood.simulation.events.modes import EventProbe, EventRecord, enter_mode
 from atwood.simulation.events.time_events import Schedule, find_schedule
 from atwood.simulation.initialization.mobility import refuse_immobile
 from atwood.simulation.initialization.start import Start, settle
@@ -25,11 +31,11 @@ from atwood.simulation.problem.arguments import check_span
 from atwood.simulation.problem.options import RunOptions, Samples, sample_times
 from atwood.simulation.problem.problem import Plan, make_plan
 from atwood.simulation.run.choice import Choice, check_solver, choose, describe_choices
-from atwood.simulation.run.record import Recorder, Segment
-from atwood.simulation.run.segment import Outcome, Stretch, run_stretch
+from atwood.simulation.run.record import Recorder, SegmentRecord
+from atwood.simulation.run.segment import Outcome, Segment, run_segment
 from atwood.simulation.run.tolerances import allowed
-from atwood.simulation.singular.crossing import Passage
-from atwood.topology.charts import Orientation
+from atwood.simulation.singular.crossing import SingularCrossing
+from atwood.topology.orientation_coordinates import Orientation
 
 __all__ = ["Run", "run", "run_out_of_time"]
 
@@ -48,7 +54,7 @@ class Run:
         The scene as it was assembled at the start.
     segments
         The stretches between changes of mode; none where time was used up before the start was recorded.
-    happenings
+    events
         Events, in order.
     statistics
         What the solver did.
@@ -63,28 +69,28 @@ class Run:
         What was asked for.
     choices
         What solved it and why, one after the other.
-    restated
+    coordinate_switches
         When which orientation went on in other coordinates, since these came near to where they are singular.
     again
         Makes the same run with other options, and with samples in between that change nothing.
     """
 
     assembly: Assembly
-    segments: tuple[Segment, ...]
-    happenings: tuple[Happening, ...]
+    segments: tuple[SegmentRecord, ...]
+    events: tuple[EventRecord, ...]
     statistics: Statistics
     status: str
     message: str
     start: Start | None
     options: RunOptions
     choices: tuple[Choice, ...]
-    restated: tuple[Restated, ...] = ()
+    coordinate_switches: tuple[CoordinateSwitch, ...] = ()
     again: Callable[[RunOptions, FloatArray], Run] | None = None
 
     @property
-    def passages(self) -> tuple[Passage, ...]:
+    def singular_crossings(self) -> tuple[SingularCrossing, ...]:
         """Singular positions that it passed through, or came too close to, in order."""
-        return tuple(one for segment in self.segments for one in segment.passages if one.is_told)
+        return tuple(one for segment in self.segments for one in segment.singular_crossings if one.is_told)
 
     @property
     def solver(self) -> str:
@@ -177,14 +183,14 @@ class _Walk:
         self._schedules: dict[int, tuple[Shared, Schedule]] = {}
         self._plans: dict[tuple[float, ...], Plan] = {}
         self._piece_start = start.time
-        self.segments: list[Segment] = []
-        self.happenings: list[Happening] = []
+        self.segments: list[SegmentRecord] = []
+        self.events: list[EventRecord] = []
         self.choices: list[Choice] = []
         self.statistics = Statistics(error_test_failures=0, convergence_failures=0)
         self.t = start.time
         self.assembly, self.q, self.u = settle(assembly, start, reassemble)
         self.assembly = self.first = self._in_piece(self.assembly)
-        self.restated: list[Restated] = []
+        self.coordinate_switches: list[CoordinateSwitch] = []
         self.impact, self.show = False, bool(samples.shown[0])
         self.plan: Plan | None = None
         self.probe: EventProbe | None = None
@@ -205,28 +211,28 @@ class _Walk:
         chatter = 0
         while True:
             before = self.t
-            recorder, outcome = self._stretch()
+            recorder, outcome = self._segment()
             self.t = outcome.t
             chatter = chatter + 1 if outcome.t - before < 1e-9 * (self.options.t_end - self.start.time) else 0
-            if outcome.happening is None:
+            if outcome.event is None:
                 if outcome.status == "finished" and outcome.t < self.options.t_end:
                     _, self.q, self.u, _ = recorder.last()
                     self.impact, chatter = False, 0
                     continue
                 return self._made(outcome.status, outcome.message, outcome)
-            is_chart = outcome.happening.target == CHART
-            if not is_chart:
-                self.happenings.append(outcome.happening)
-            if outcome.happening.target == "stop":
-                return self._made("stopped", outcome.happening.describe(), outcome)
+            is_switch = outcome.event.target == COORDINATE_SWITCH
+            if not is_switch:
+                self.events.append(outcome.event)
+            if outcome.event.target == "stop":
+                return self._made("stopped", outcome.event.describe(), outcome)
             if chatter > _CHATTER:
-                endless = f"{outcome.happening.part} changes its mode endlessly at t = {self.t:.9g}"
+                endless = f"{outcome.event.part} changes its mode endlessly at t = {self.t:.9g}"
                 return self._made("failed", endless, outcome)
-            self._change_chart(outcome.happening, recorder) if is_chart else self._enter(outcome.happening, recorder)
+            self._switch_coordinates(outcome.event, recorder) if is_switch else self._enter(outcome.event, recorder)
             if self.t >= self.options.t_end:
                 return self._made("finished", "", outcome)
 
-    def _stretch(self) -> tuple[Recorder, Outcome]:
+    def _segment(self) -> tuple[Recorder, Outcome]:
         """Run one stretch in the present mode, until the next time event at most."""
         options, schedule = self.options, self._schedule(self.assembly)
         self.t = schedule.reached(self.t)
@@ -241,16 +247,16 @@ class _Walk:
         ahead = self.samples.until(t, limit)
         if limit < options.t_end:  # the state just after it is shown
             ahead = ahead.without_last_shown()
-        stretch = Stretch(self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics)
+        segment = Segment(self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics)
         recorder = Recorder(self.plan)
-        outcome = run_stretch(stretch, recorder, t, q, u)
+        outcome = run_segment(segment, recorder, t, q, u)
         if recorder.is_empty and outcome.error is not None:  # not even the start could be projected
             raise outcome.error
         if recorder.is_empty:  # nor was there time to
             return recorder, outcome
         self.segments.append(recorder.segment(self.impact, after_time_event))
         self.statistics = self.statistics + outcome.statistics
-        self.restated += outcome.restated
+        self.coordinate_switches += outcome.coordinate_switches
         for choice in outcome.choices:
             if not self.choices or choice.solver != self.choices[-1].solver:
                 self.choices.append(choice)
@@ -280,7 +286,7 @@ class _Walk:
         except UnsupportedError:
             raise
         except AtwoodError as error:
-            found = missing_at(self.assembly, self.t, self.q, self.u)
+            found = undefined_value_at(self.assembly, self.t, self.q, self.u)
             if found is None:
                 raise
             raise StartError(
@@ -306,10 +312,10 @@ class _Walk:
     def _reassemble(
         self,
         modes: Mapping[str, str],
-        sides: Mapping[tuple[str, str, str], float],
+        line_signs: Mapping[tuple[str, str, str], float],
         orientation: Orientation,
     ) -> Assembly:
-        return self._in_piece(self._other(modes, sides, orientation))
+        return self._in_piece(self._other(modes, line_signs, orientation))
 
     def _pass_time_event(self) -> None:
         """Go on with the relations of functions of time that hold after a time event."""
@@ -319,7 +325,7 @@ class _Walk:
         self.q, self.u, impacts = pass_time_event(before, self.assembly, self.t, self.q, self.u, length)
         self.show = self.samples.shows(self.t)
         if impacts:  # both states are shown, as at any event
-            self.happenings += impacts
+            self.events += impacts
             self.impact = self.show = True
             self.segments[-1].shown[-1] = True
         if self.plan is not None:
@@ -327,22 +333,22 @@ class _Walk:
             known = self._plans.get(self.assembly.relation_values)
             self.plan = self.plan.in_piece(self.assembly) if known is None else known
             self.assembly = self.plan.assembly
-            self.plan.review_dependent(self.t, self.q)
+            self.plan.review_partitioning(self.t, self.q)
 
-    def _change_chart(self, happening: Happening, recorder: Recorder) -> None:
+    def _switch_coordinates(self, event: EventRecord, recorder: Recorder) -> None:
         """Go on in other coordinates of an orientation."""
         _, q, self.u, _ = recorder.last()
-        self.assembly, self.q = enter_charts(self.assembly, to_regular(self.assembly, q), self._reassemble)
+        self.assembly, self.q = switch_coordinates(self.assembly, to_regular(self.assembly, q), self._reassemble)
         self.plan, self.impact, self.show = None, False, False
-        self.restated.append(Restated(self.t, happening.part))
+        self.coordinate_switches.append(CoordinateSwitch(self.t, event.part))
 
-    def _enter(self, happening: Happening, recorder: Recorder) -> None:
+    def _enter(self, event: EventRecord, recorder: Recorder) -> None:
         """Enter the mode that an event leads to."""
         _, q, u, _ = recorder.last()
         self.assembly, self.q, self.u = enter_mode(
-            (self.t, q, u), self.assembly, happening, self._reassemble, self.start.length
+            (self.t, q, u), self.assembly, event, self._reassemble, self.start.length
         )
-        self.plan, self.impact, self.show = None, happening.impact, True
+        self.plan, self.impact, self.show = None, event.impact, True
 
     def _made(self, status: str, message: str, outcome: Outcome) -> Run:
         """Return the run, or raise with it what made it fail."""
@@ -358,8 +364,8 @@ class _Walk:
         return made
 
     def _run_so_far(self, status: str, message: str) -> Run:
-        parts = (self.first, tuple(self.segments), tuple(self.happenings), self.statistics, status, message)
-        return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.restated), self.again)
+        parts = (self.first, tuple(self.segments), tuple(self.events), self.statistics, status, message)
+        return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.coordinate_switches), self.again)
 
 
 def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:

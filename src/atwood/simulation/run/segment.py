@@ -11,31 +11,36 @@ import numpy as np
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import SolveError
 from atwood.integrators.explicit_session import ExplicitSession
-from atwood.integrators.protocol import Advance, Budget, FloatArray, Session, Statistics, Status
+from atwood.integrators.protocol import Budget, FloatArray, Session, Statistics, Status, StepResult
 from atwood.late import dataclass
-from atwood.simulation.dynamics.orientation_coordinates import CHART, Restated, longest_step, restated
+from atwood.simulation.dynamics.orientation_coordinates import (
+    COORDINATE_SWITCH,
+    CoordinateSwitch,
+    longest_step,
+    switched,
+)
 from atwood.simulation.dynamics.redundancy import RankFinding
-from atwood.simulation.dynamics.undefined_values import find_missing, states_ahead
-from atwood.simulation.events.modes import EventProbe, Happening
+from atwood.simulation.dynamics.undefined_values import find_undefined_value, states_ahead
+from atwood.simulation.events.modes import EventProbe, EventRecord
 from atwood.simulation.problem.options import RunOptions, Samples
 from atwood.simulation.problem.problem import Plan, pack_state
 from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import Choice, stiffness_of, turned_stiff
 from atwood.simulation.run.record import Recorder
-from atwood.simulation.run.session import Order, open_explicit_session, open_implicit_session
+from atwood.simulation.run.session import SolverRequest, open_explicit_session, open_implicit_session
 from atwood.simulation.run.stuck import explain_stuck
 from atwood.simulation.run.tolerances import too_tight
-from atwood.simulation.singular.crossing import Passage, events_on
-from atwood.simulation.singular.monitor import Guard, guard_of
+from atwood.simulation.singular.crossing import SingularCrossing, events_on
+from atwood.simulation.singular.monitor import SingularityMonitor, singularity_monitor_of
 
-__all__ = ["Outcome", "Stretch", "run_stretch"]
+__all__ = ["Outcome", "Segment", "run_segment"]
 
 _BLOCKS = 50
 """Progress is told about so many times."""
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class Segment:
     """What one stretch is to be.
 
     Attributes
@@ -80,13 +85,13 @@ class Outcome:
         Why: ``"finished"``, ``"event"``, or as in `atwood.simulation.run.run.Run`.
     statistics
         What it cost.
-    happening
+    event
         The event that ended it.
     choices
         What solved it, one after the other.
     error
         What went wrong, where that names a part.
-    restated
+    switched
         Orientations that went on in other coordinates.
     """
 
@@ -95,67 +100,67 @@ class Outcome:
     message: str
     statistics: Statistics
     choices: tuple[Choice, ...]
-    happening: Happening | None = None
+    event: EventRecord | None = None
     error: SolveError | None = None
-    restated: tuple[Restated, ...] = ()
+    coordinate_switches: tuple[CoordinateSwitch, ...] = ()
 
 
-def run_stretch(stretch: Stretch, recorder: Recorder, t: float, q: FloatArray, u: FloatArray) -> Outcome:
+def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u: FloatArray) -> Outcome:
     """Integrate in one mode until a time, an event or a limit of the run.
 
     Parameters
     ----------
-    stretch
+    segment
         What it is to be.
     recorder
         Takes up the samples.
     t, q, u
         The state at its start.
     """
-    plan = stretch.plan
+    plan = segment.plan
     n = plan.program.coordinates
     with more_time():  # so that there is its start, whatever comes
         y, yp = (np.zeros(0), np.zeros(0)) if n == 0 else pack_state(plan, t, q, u)
-        recorder.take(t, y, stretch.first_shown)
-    already = stretch.probe.broken_at_start(t)
+        recorder.take(t, y, segment.first_shown)
+    already = segment.probe.broken_at_start(t)
     if already is not None:
-        return Outcome(t, "event", "", Statistics(), (stretch.choice,), already)
+        return Outcome(t, "event", "", Statistics(), (segment.choice,), already)
     if n == 0:
-        return _follow(stretch, recorder, t)
-    return _Runner(stretch, recorder).run(t, y, yp)
+        return _follow(segment, recorder, t)
+    return _Runner(segment, recorder).run(t, y, yp)
 
 
-def _follow(stretch: Stretch, recorder: Recorder, t: float) -> Outcome:
+def _follow(segment: Segment, recorder: Recorder, t: float) -> Outcome:
     """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen."""
-    nothing, last, options = np.zeros(0), t, stretch.options
+    nothing, last, options = np.zeros(0), t, segment.options
     try:
-        for moment, show in zip(stretch.samples.times, stretch.samples.shown, strict=True):
+        for moment, show in zip(segment.samples.times, segment.samples.shown, strict=True):
             check_time()
-            happening = stretch.probe.between(last, float(moment))
-            if happening is not None:
-                recorder.take(happening.time, nothing, True)
-                return Outcome(happening.time, "event", "", Statistics(), (stretch.choice,), happening)
+            event = segment.probe.between(last, float(moment))
+            if event is not None:
+                recorder.take(event.time, nothing, True)
+                return Outcome(event.time, "event", "", Statistics(), (segment.choice,), event)
             last = float(moment)
             recorder.take(last, nothing, bool(show))
             if options.progress is not None:
                 options.progress(last)
     except TimeIsUp:
         last = recorder.close()
-        return Outcome(last, "time_limit", options.out_of_time(last), Statistics(), (stretch.choice,))
-    return Outcome(last, "finished", "", Statistics(), (stretch.choice,))
+        return Outcome(last, "time_limit", options.out_of_time(last), Statistics(), (segment.choice,))
+    return Outcome(last, "finished", "", Statistics(), (segment.choice,))
 
 
 class _Runner:
     """The way through one stretch, with whatever solves it."""
 
-    def __init__(self, stretch: Stretch, recorder: Recorder) -> None:
-        self.stretch, self.recorder = stretch, recorder
-        self.choices = [stretch.choice]
+    def __init__(self, segment: Segment, recorder: Recorder) -> None:
+        self.segment, self.recorder = segment, recorder
+        self.choices = [segment.choice]
         self.before = Statistics(error_test_failures=0, convergence_failures=0)
         self.session: Session | None = None
-        self.guard: Guard | None = None
-        self.order: Order | None = None
-        self.restated: list[Restated] = []
+        self.monitor: SingularityMonitor | None = None
+        self.request: SolverRequest | None = None
+        self.coordinate_switches: list[CoordinateSwitch] = []
 
     def run(self, t: float, y: FloatArray, yp: FloatArray) -> Outcome:
         """Go from sample to sample; change the solver where the scene turns out stiff."""
@@ -164,15 +169,15 @@ class _Runner:
             session = self._open(t, y, yp)
             while True:
                 if isinstance(session, ExplicitSession):
-                    done, advance = self._sample(session, done)
+                    done, step_result = self._sample(session, done)
                 else:
-                    done, advance = self._advance(session, done)
+                    done, step_result = self._advance(session, done)
                     session = self.session or session
-                if advance is not None and advance.status is Status.STIFF:
-                    session = self._open(*self._change_solver(advance))
-                elif advance is None or not self._restates(session, advance):
+                if step_result is not None and step_result.status is Status.STIFF:
+                    session = self._open(*self._change_solver(step_result))
+                elif step_result is None or not self._switches_coordinates(session, step_result):
                     break
-            return self._outcome(advance)
+            return self._outcome(step_result)
         except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
             t = self.recorder.close()
             return self._ended(t, "interrupted", f"interrupted (at t = {t:.9g})")
@@ -183,245 +188,254 @@ class _Runner:
 
     def _out_of_time(self) -> Outcome:
         t = max(self.recorder.close(), self.began)
-        return self._ended(t, "time_limit", self.stretch.options.out_of_time(t))
+        return self._ended(t, "time_limit", self.segment.options.out_of_time(t))
 
     def _ended(self, t: float, status: str, message: str) -> Outcome:
-        return Outcome(t, status, message, self._cost(), tuple(self.choices), restated=tuple(self.restated))
+        return Outcome(
+            t, status, message, self._cost(), tuple(self.choices), coordinate_switches=tuple(self.coordinate_switches)
+        )
 
     def _cost(self) -> Statistics:
         cost = self.before if self.session is None else self.before + self.session.statistics
-        return cost if self.guard is None else replace(cost, seconds=cost.seconds + self.guard.seconds)
+        return cost if self.monitor is None else replace(cost, seconds=cost.seconds + self.monitor.seconds)
 
-    def _outcome(self, advance: Advance | None) -> Outcome:
+    def _outcome(self, step_result: StepResult | None) -> Outcome:
         """Record where a solver stopped early, if it did."""
-        if advance is None:
+        if step_result is None:
             self.recorder.settle()
-            return self._ended(self.stretch.end, "finished", "")
-        if advance.status is Status.EVENT:
-            happening = self.stretch.probe.name(advance.t, advance.events)
-            if happening.target != CHART:
-                self.recorder.take(advance.t, advance.y, True)
-            elif advance.t > self.recorder.end:
-                stretch = self.stretch
+            return self._ended(self.segment.end, "finished", "")
+        if step_result.status is Status.EVENT:
+            event = self.segment.probe.name(step_result.t, step_result.events)
+            if event.target != COORDINATE_SWITCH:
+                self.recorder.take(step_result.t, step_result.y, True)
+            elif step_result.t > self.recorder.end:
+                segment = self.segment
                 self.recorder.take(
-                    advance.t, advance.y, bool(np.any(stretch.samples.shown[stretch.samples.times == advance.t]))
+                    step_result.t,
+                    step_result.y,
+                    bool(np.any(segment.samples.shown[segment.samples.times == step_result.t])),
                 )
-            return replace(self._ended(advance.t, "event", ""), happening=happening)
-        if advance.t > self.recorder.end:
-            self.recorder.take(advance.t, advance.y, True)
-        if advance.status is Status.TIME_LIMIT:
+            return replace(self._ended(step_result.t, "event", ""), event=event)
+        if step_result.t > self.recorder.end:
+            self.recorder.take(step_result.t, step_result.y, True)
+        if step_result.status is Status.TIME_LIMIT:
             return self._out_of_time()
-        message = advance.message
-        if advance.status is Status.STEP_LIMIT:
-            message = self.stretch.options.out_of_steps(advance.t)
-        ended = self._ended(advance.t, advance.status.value, message)
-        return ended if advance.status is not Status.FAILED else replace(ended, error=self._explain(advance))
+        message = step_result.message
+        if step_result.status is Status.STEP_LIMIT:
+            message = self.segment.options.out_of_steps(step_result.t)
+        ended = self._ended(step_result.t, step_result.status.value, message)
+        return ended if step_result.status is not Status.FAILED else replace(ended, error=self._explain(step_result))
 
-    def _restates(self, session: Session, advance: Advance) -> bool:
+    def _switches_coordinates(self, session: Session, step_result: StepResult) -> bool:
         """After an event, go on in other coordinates of an orientation, if that is all that has happened."""
-        stretch = self.stretch
-        plan = stretch.plan
-        if advance.status is not Status.EVENT or stretch.probe.name(advance.t, advance.events).target != CHART:
+        segment = self.segment
+        plan = segment.plan
+        if (
+            step_result.status is not Status.EVENT
+            or segment.probe.name(step_result.t, step_result.events).target != COORDINATE_SWITCH
+        ):
             return False
-        q, u = (part.copy() for part in plan.program.split(advance.y))
-        q, bodies = restated(plan.assembly, q)
+        q, u = (part.copy() for part in plan.program.split(step_result.y))
+        q, bodies = switched(plan.assembly, q)
         if not bodies:
             return False
         if plan.is_projected:
-            q, u = plan.balance.project(advance.t, q, u, plan.sizes)
+            q, u = plan.balance.project(step_result.t, q, u, plan.sizes)
         if isinstance(session, ExplicitSession):
             session.limit_steps(longest_step(plan.assembly.equations, u))
-            session.reinitialize(advance.t, np.concatenate([q, u]))
+            session.reinitialize(step_result.t, np.concatenate([q, u]))
         else:
-            y, yp = pack_state(plan, advance.t, q, u)
-            session.reinitialize(advance.t, y, yp)
-            if self.guard is not None:
-                self.guard.restart(Advance(advance.t, y, yp, Status.REACHED))
-        self.restated += [Restated(advance.t, body) for body in bodies]
+            y, yp = pack_state(plan, step_result.t, q, u)
+            session.reinitialize(step_result.t, y, yp)
+            if self.monitor is not None:
+                self.monitor.restart(StepResult(step_result.t, y, yp, Status.REACHED))
+        self.coordinate_switches += [CoordinateSwitch(step_result.t, body) for body in bodies]
         return True
 
-    def _explain(self, advance: Advance) -> SolveError | None:
+    def _explain(self, step_result: StepResult) -> SolveError | None:
         """Return an error that names what has no value, or a singular position; None where it is neither."""
-        program, assembly, options = self.stretch.plan.program, self.stretch.plan.assembly, self.stretch.options
-        now, rates = program.split(advance.y), program.split(advance.yp)
-        states = states_ahead(advance.t, now, rates, options.t_end - self.stretch.choice.time)
-        found = find_missing(assembly, *states)
+        program, assembly, options = self.segment.plan.program, self.segment.plan.assembly, self.segment.options
+        now, rates = program.split(step_result.y), program.split(step_result.yp)
+        states = states_ahead(step_result.t, now, rates, options.t_end - self.segment.choice.time)
+        found = find_undefined_value(assembly, *states)
         if found is None:
-            stuck = None if self.guard is None else self.guard.explain(advance.message)
-            tight = None if stuck or self.order is None else too_tight(self.order, self.choices[-1].solver, advance)
-            return stuck or tight or explain_stuck(self.stretch.plan, advance)
+            stuck = None if self.monitor is None else self.monitor.explain(step_result.message)
+            tight = (
+                None if stuck or self.request is None else too_tight(self.request, self.choices[-1].solver, step_result)
+            )
+            return stuck or tight or explain_stuck(self.segment.plan, step_result)
         return SolveError(
-            f"{found.describe()}, so that the run cannot go on: {advance.message}",
+            f"{found.describe()}, so that the run cannot go on: {step_result.message}",
             where=found.part,
             advice="A law is evaluated where it has no value: look at its formula, and at what the scene does before "
             "(the error's `run`).",
         )
 
     def _open(self, t: float, y: FloatArray, yp: FloatArray) -> Session:
-        stretch, choice = self.stretch, self.choices[-1]
-        options, spent = stretch.options, stretch.spent + self.before
-        order = Order(
-            stretch.plan,
-            stretch.probe,
+        segment, choice = self.segment, self.choices[-1]
+        options, spent = segment.options, segment.spent + self.before
+        request = SolverRequest(
+            segment.plan,
+            segment.probe,
             options,
-            stretch.end,
+            segment.end,
             Budget(
                 max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
                 wall_seconds=None if options.max_seconds is None else max(0.0, time_left()),
-                poll=_both(stretch.plan.poll(choice.solver), options.on_step),
+                poll=_both(segment.plan.poll(choice.solver), options.on_step),
             ),
         )
         if choice.solver.startswith("ida"):
-            here = Advance(t, y, yp, Status.REACHED)
-            self.order = order
-            self.guard = guard_of(stretch.plan, options.relative_tolerance, stretch.end, here)
-            self.session = open_implicit_session(order, choice.solver, t, y, yp)
+            here = StepResult(t, y, yp, Status.REACHED)
+            self.request = request
+            self.monitor = singularity_monitor_of(segment.plan, options.relative_tolerance, segment.end, here)
+            self.session = open_implicit_session(request, choice.solver, t, y, yp)
         else:
             leave = self._is_stiff if options.solver == "auto" else None
-            self.session = open_explicit_session(order, choice.solver, t, y, leave)
+            self.session = open_explicit_session(request, choice.solver, t, y, leave)
         return self.session
 
     def _is_stiff(self, t: float, y: FloatArray) -> bool:
-        plan = self.stretch.plan
-        found = stiffness_of(plan, self.stretch.options, t, *plan.program.split(y))
+        plan = self.segment.plan
+        found = stiffness_of(plan, self.segment.options, t, *plan.program.split(y))
         if found is None or not found.is_stiff:
             return False
         self.choices.append(turned_stiff(t, found))
         return True
 
-    def _change_solver(self, advance: Advance) -> tuple[float, FloatArray, FloatArray]:
+    def _change_solver(self, step_result: StepResult) -> tuple[float, FloatArray, FloatArray]:
         """Return the state from which another solver goes on."""
         self.before, self.session = self._cost(), None
-        self.choices[-1] = replace(self.choices[-1], time=advance.t)
-        plan = self.stretch.plan
-        return advance.t, *pack_state(plan, advance.t, *plan.program.split(advance.y))
+        self.choices[-1] = replace(self.choices[-1], time=step_result.t)
+        plan = self.segment.plan
+        return step_result.t, *pack_state(plan, step_result.t, *plan.program.split(step_result.y))
 
-    def _sample(self, session: ExplicitSession, done: int) -> tuple[int, Advance | None]:
+    def _sample(self, session: ExplicitSession, done: int) -> tuple[int, StepResult | None]:
         """Let an explicit method fill tables; return how many samples are done, and why it stopped early."""
-        stretch, progress = self.stretch, self.stretch.options.progress
-        turning = stretch.plan.balance.turning
-        whole = progress is None and not turning.can_stray
-        samples = stretch.samples
+        segment, progress = self.segment, self.segment.options.progress
+        kinematic_map = segment.plan.balance.kinematic_map
+        whole = progress is None and not kinematic_map.has_homogeneous
+        samples = segment.samples
         ends = samples.ends_of_blocks(1 if whole else _BLOCKS)
         while done < len(samples.times):
             times = samples.times[done : ends[np.searchsorted(ends, done, side="right")]]
-            y, _, advance = session.sample(times)
+            y, _, step_result = session.sample(times)
             count = len(y)
-            self.recorder.take_many(times[:count], y, stretch.samples.shown[done : done + count])
+            self.recorder.take_many(times[:count], y, segment.samples.shown[done : done + count])
             done += count
-            if advance.status is not Status.REACHED:
-                return done, advance
-            q, u = stretch.plan.program.split(y[-1])
-            if turning.strays(q):
-                session.reinitialize(float(times[-1]), np.concatenate([turning.normalized(q), u]))
+            if step_result.status is not Status.REACHED:
+                return done, step_result
+            q, u = segment.plan.program.split(y[-1])
+            if kinematic_map.needs_normalization(q):
+                session.reinitialize(float(times[-1]), np.concatenate([kinematic_map.normalized(q), u]))
             if progress is not None:
                 progress(float(times[-1]))
         return done, None
 
-    def _advance(self, session: Session, done: int) -> tuple[int, Advance | None]:
+    def _advance(self, session: Session, done: int) -> tuple[int, StepResult | None]:
         """Go from sample to sample; return how many are done, and why it stopped early."""
-        stretch, recorder, progress = self.stretch, self.recorder, self.stretch.options.progress
-        samples = stretch.samples
+        segment, recorder, progress = self.segment, self.recorder, self.segment.options.progress
+        samples = segment.samples
         times, shown, extra = (x.tolist() for x in (samples.times, samples.shown, samples.between))
-        plan, told = stretch.plan, -np.inf
-        looks = plan.is_projected or bool(plan.dependent_speeds) or not plan.balance.turning.is_plain
+        plan, told = segment.plan, -np.inf
+        looks = plan.is_projected or bool(plan.dependent_speeds) or not plan.balance.kinematic_map.is_plain
         while done < len(times):
-            moment, guard = times[done], self.guard
-            between = guard is not None and guard.next < moment
-            target = guard.next if guard is not None and between else moment
-            advance = session.advance(target)
-            if advance.status is Status.FAILED and self._chose_anew(session, advance):
-                advance = session.advance(target)
-            turned = self._turned(advance) if between or guard is None else None
-            at_end = moment >= stretch.end or turned is not None
-            passage = None if guard is None else guard.look(advance, between, at_end)
-            if passage is not None:
-                done, stopped = self._pass_over(session, passage)
+            moment, monitor = times[done], self.monitor
+            between = monitor is not None and monitor.next < moment
+            target = monitor.next if monitor is not None and between else moment
+            step_result = session.advance(target)
+            if step_result.status is Status.FAILED and self._repartitioned(session, step_result):
+                step_result = session.advance(target)
+            turned = self._turned(step_result) if between or monitor is None else None
+            at_end = moment >= segment.end or turned is not None
+            crossing = None if monitor is None else monitor.look(step_result, between, at_end)
+            if crossing is not None:
+                done, stopped = self._pass_over(session, crossing)
                 if stopped is not None:
                     return done, stopped
                 continue
-            if guard is not None and guard.agreed:
-                recorder.note(guard.agreed)
-                for one in guard.agreed:
+            if monitor is not None and monitor.agreed:
+                recorder.note(monitor.agreed)
+                for one in monitor.agreed:
                     if one.path is None:
                         warnings.warn(one.describe(), stacklevel=2)
-                guard.agreed.clear()
-            if advance.status is not Status.REACHED:
-                return done, advance
+                monitor.agreed.clear()
+            if step_result.status is not Status.REACHED:
+                return done, step_result
             if turned is not None:
-                session = self._keep(turned, advance)
+                session = self._keep(turned, step_result)
             if between:
                 continue
-            recorder.take(advance.t, advance.y, shown[done])
+            recorder.take(step_result.t, step_result.y, shown[done])
             done += 1
             if looks and not extra[done - 1]:
-                plan.review_output(advance.t, advance.y[: plan.program.coordinates])
-                self._repair(session, advance)
+                plan.review_output(step_result.t, step_result.y[: plan.program.coordinates])
+                self._repair(session, step_result)
             if progress is not None and moment > told:
                 told = moment
                 progress(moment)
         return done, None
 
-    def _pass_over(self, session: Session, passage: Passage) -> tuple[int, Advance | None]:
+    def _pass_over(self, session: Session, crossing: SingularCrossing) -> tuple[int, StepResult | None]:
         """Take a passage into the record and go on behind it, unless something happens on its way."""
-        stretch, plan, path = self.stretch, self.stretch.plan, passage.path
+        segment, plan, path = self.segment, self.segment.plan, crossing.path
         assert path is not None
-        times = stretch.samples.times
-        root = events_on(path, plan, stretch.probe)
+        times = segment.samples.times
+        root = events_on(path, plan, segment.probe)
         end = path.end if root is None else min(path.end, root.state[0])
         first, done = (int(np.searchsorted(times, one, side="right")) for one in (path.start, end))
-        self.recorder.pass_over(passage, times[first:done], stretch.samples.shown[first:done])
-        if root is not None and root.state[0] <= stretch.end:
-            return done, Advance(*root.state, Status.EVENT, root.events)
+        self.recorder.pass_over(crossing, times[first:done], segment.samples.shown[first:done])
+        if root is not None and root.state[0] <= segment.end:
+            return done, StepResult(*root.state, Status.EVENT, root.events)
         if done < len(times):
             q, u, _ = (one[:, 0] for one in path.at(np.array([path.end])))
             q, u = project_safely(plan, path.end, q, u)
-            plan.review_dependent(path.end, q)
+            plan.review_partitioning(path.end, q)
             y, yp = pack_state(plan, path.end, q, u)
             session.reinitialize(path.end, y, yp)
-            assert self.guard is not None
-            self.guard.restart(Advance(path.end, y, yp, Status.REACHED), is_behind=True)
+            assert self.monitor is not None
+            self.monitor.restart(StepResult(path.end, y, yp, Status.REACHED), is_behind=True)
         return done, None
 
-    def _chose_anew(self, session: Session, advance: Advance) -> bool:
+    def _repartitioned(self, session: Session, step_result: StepResult) -> bool:
         """After a failure, go on with other dependent coordinates if those were a poor choice."""
-        plan = self.stretch.plan
-        q, u = (part.copy() for part in plan.program.split(advance.y))
-        if not plan.review_dependent(advance.t, q):
+        plan = self.segment.plan
+        q, u = (part.copy() for part in plan.program.split(step_result.y))
+        if not plan.review_partitioning(step_result.t, q):
             return False
-        q, u = plan.balance.project(advance.t, q, u, plan.sizes)
-        session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
+        q, u = plan.balance.project(step_result.t, q, u, plan.sizes)
+        session.reinitialize(step_result.t, *pack_state(plan, step_result.t, q, u))
         return True
 
-    def _turned(self, advance: Advance) -> RankFinding | None:
+    def _turned(self, step_result: StepResult) -> RankFinding | None:
         """Return which constraints are better kept from here on, if those that are have become a poor choice."""
-        plan = self.stretch.plan
-        q, _ = plan.program.split(advance.y)
-        return plan.better_kept(advance.t, q) if advance.status is Status.REACHED else None
+        plan = self.segment.plan
+        q, _ = plan.program.split(step_result.y)
+        return plan.better_kept(step_result.t, q) if step_result.status is Status.REACHED else None
 
-    def _keep(self, finding: RankFinding, advance: Advance) -> Session:
+    def _keep(self, finding: RankFinding, step_result: StepResult) -> Session:
         """Go on with other constraints kept, from the same state."""
-        plan = self.stretch.plan
-        q, u = (part.copy() for part in plan.program.split(advance.y))
+        plan = self.segment.plan
+        q, u = (part.copy() for part in plan.program.split(step_result.y))
         if plan.is_projected:
-            q, u = project_safely(plan, advance.t, q, u)
+            q, u = project_safely(plan, step_result.t, q, u)
         self.before, self.session = self._cost(), None
-        plan.keep(finding, advance.t, q)
-        return self._open(advance.t, *pack_state(plan, advance.t, q, u))
+        plan.keep(finding, step_result.t, q)
+        return self._open(step_result.t, *pack_state(plan, step_result.t, q, u))
 
-    def _repair(self, session: Session, advance: Advance) -> None:
+    def _repair(self, session: Session, step_result: StepResult) -> None:
         """Go on from the recorded state where the solver's own has strayed.
 
         At index 1 with projection that is where the drift outgrows the error of the steps; for any orientation, where
         the size of its coordinates is no longer near one.
         """
-        plan = self.stretch.plan
-        strays = plan.balance.turning.strays(plan.program.split(advance.y)[0])
-        if plan.program.level != "index1-projected" and not strays:
+        plan = self.segment.plan
+        needs_normalization = plan.balance.kinematic_map.needs_normalization(plan.program.split(step_result.y)[0])
+        if plan.program.level != "index1-projected" and not needs_normalization:
             return
         _, q, u, held = self.recorder.last()
-        if strays or np.max(held) > 100.0 * self.stretch.options.relative_tolerance:
-            session.reinitialize(advance.t, *pack_state(plan, advance.t, q, u))
+        if needs_normalization or np.max(held) > 100.0 * self.segment.options.relative_tolerance:
+            session.reinitialize(step_result.t, *pack_state(plan, step_result.t, q, u))
 
 
 def _both(

@@ -23,11 +23,11 @@ from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.options import SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
 
-__all__ = ["Order", "open_explicit_session", "open_implicit_session"]
+__all__ = ["SolverRequest", "open_explicit_session", "open_implicit_session"]
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class SolverRequest:
     """What is to be solved.
 
     Attributes
@@ -61,33 +61,33 @@ class Order:
         )
 
 
-def open_implicit_session(order: Order, solver: str, t: float, y: FloatArray, yp: FloatArray) -> Session:
+def open_implicit_session(request: SolverRequest, solver: str, t: float, y: FloatArray, yp: FloatArray) -> Session:
     """Start IDA, driven directly or through scikit-sundae.
 
     Parameters
     ----------
-    order
+    request
         What is to be solved.
     solver
         ``"ida"`` or ``"ida-sundae"``.
     t, y, yp
         Consistent start values.
     """
-    plan, probe, settings = order.plan, order.probe, order.settings(t)
+    plan, probe, settings = request.plan, request.probe, request.settings(t)
     if solver == "ida":
-        problem = _with_events(_implicit_problem(order), probe)
+        problem = _with_events(_implicit_problem(request), probe)
         from atwood.integrators.ida import native as ida_native
 
-        tuning = ida_native.IdaTuning(angle_like=plan.angles, stop_time=order.end)
-        return ida_native.open_session(problem, settings, t, y, yp, order.budget, tuning)
+        tuning = ida_native.IdaTuning(angle_like=plan.angles, stop_time=request.end)
+        return ida_native.open_session(problem, settings, t, y, yp, request.budget, tuning)
     from atwood.integrators.ida.sundae import open_session
 
-    return open_session(_implicit_problem(order), settings, t, y, yp, order.budget)
+    return open_session(_implicit_problem(request), settings, t, y, yp, request.budget)
 
 
-def _implicit_problem(order: Order) -> ImplicitProblem:
-    probe = order.probe
-    return replace(order.plan.problem(probe.function(), probe.directions), event_rough=probe.rough)
+def _implicit_problem(request: SolverRequest) -> ImplicitProblem:
+    probe = request.probe
+    return replace(request.plan.problem(probe.function(), probe.directions), event_rough=probe.rough)
 
 
 def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem:
@@ -117,13 +117,13 @@ def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem
 
 
 def open_explicit_session(
-    order: Order, solver: str, t: float, y: FloatArray, leave: Leave | None = None
+    request: SolverRequest, solver: str, t: float, y: FloatArray, leave: Leave | None = None
 ) -> ExplicitSession:
     """Start an explicit method.
 
     Parameters
     ----------
-    order
+    request
         What is to be solved.
     solver
         A key of `SOLVERS`.
@@ -140,7 +140,7 @@ def open_explicit_session(
     from atwood.integrators.explicit_session import open_explicit
     from atwood.simulation.problem.explicit_scene import explicit_problem
 
-    assembly, probe = order.plan.assembly, order.probe
+    assembly, probe = request.plan.assembly, request.probe
     problem = explicit_problem(assembly, probe.function(), probe.directions) if assembly.form == "reduced" else None
     if problem is None:
         raise UsageError(
@@ -156,8 +156,8 @@ def open_explicit_session(
     if solver == "taylor":
         from atwood.simulation.problem.taylor_scene import open_taylor, taylor_problem
 
-        series = taylor_problem(assembly, order.end, has_events=bool(probe.directions))
-        return open_taylor(problem, series, order.settings(t, LOOSEST), t, y, order.budget)
-    session = open_explicit(problem, order.settings(t, LOOSEST), t, y, order.budget, leave=leave, end=order.end)
-    session.limit_steps(longest_step(assembly.equations, order.plan.program.split(y)[1]))
+        series = taylor_problem(assembly, request.end, has_events=bool(probe.directions))
+        return open_taylor(problem, series, request.settings(t, LOOSEST), t, y, request.budget)
+    session = open_explicit(problem, request.settings(t, LOOSEST), t, y, request.budget, leave=leave, end=request.end)
+    session.limit_steps(longest_step(assembly.equations, request.plan.program.split(y)[1]))
     return session

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from atwood.errors import SolveError
-from atwood.integrators.protocol import Advance
+from atwood.integrators.protocol import StepResult
 from atwood.simulation.dynamics.scales import motion_names, motion_scales
 from atwood.simulation.problem.problem import Plan
 
 __all__ = ["explain_stuck"]
 
 
-def explain_stuck(plan: Plan, failed: Advance) -> SolveError | None:
+def explain_stuck(plan: Plan, failed: StepResult) -> SolveError | None:
     """Return the error of a run that failed, with the motion that changes fastest there; None if nothing moves.
 
     Changes of speeds are compared in units of the scene's length, or one radian, so that metres and radians compare.

@@ -6,9 +6,9 @@ import warnings
 from dataclasses import replace
 
 from atwood.errors import AtwoodError, SolveError
-from atwood.integrators.protocol import Advance, Budget, Status
+from atwood.integrators.protocol import Budget, Status, StepResult
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.run.session import Order, open_implicit_session
+from atwood.simulation.run.session import SolverRequest, open_implicit_session
 
 __all__ = ["allowed", "too_tight"]
 
@@ -44,32 +44,32 @@ def allowed(options: RunOptions) -> RunOptions:
     return replace(options, relative_tolerance=LEAST)
 
 
-def too_tight(order: Order, solver: str, failed: Advance) -> SolveError | None:
+def too_tight(request: SolverRequest, solver: str, failed: StepResult) -> SolveError | None:
     """Return the error of a run that failed since its tolerance is below what rounding allows; None if it is not.
 
     Larger tolerances are tried from where it failed.
 
     Parameters
     ----------
-    order, solver
+    request, solver
         What was to be solved, and by which kind of IDA.
     failed
         How it ended.
     """
-    options, t = order.options, failed.t
+    options, t = request.options, failed.t
     asked = options.relative_tolerance
-    if asked > _TIGHT or not t < order.end:
+    if asked > _TIGHT or not t < request.end:
         return None
     for factor in (10.0, 100.0, 1000.0):
-        looser = replace(order, options=replace(options, relative_tolerance=factor * asked), budget=Budget(_TRIAL))
+        looser = replace(request, options=replace(options, relative_tolerance=factor * asked), budget=Budget(_TRIAL))
         try:
-            found = open_implicit_session(looser, solver, t, failed.y, failed.yp).advance(order.end)
+            found = open_implicit_session(looser, solver, t, failed.y, failed.yp).advance(request.end)
         except AtwoodError:
             continue
-        if found.status is not Status.FAILED and found.t - t >= _ENOUGH * (order.end - t):
+        if found.status is not Status.FAILED and found.t - t >= _ENOUGH * (request.end - t):
             return SolveError(
                 f"the relative tolerance, {asked:g}, is below what rounding allows here: {failed.message}",
-                where=order.plan.assembly.flat.name,
+                where=request.plan.assembly.flat.name,
                 advice=f"With rtol={factor * asked:g} it goes on.",
             )
     return None

@@ -20,7 +20,7 @@ from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.simulation.dynamics.reactions import accelerations_at
 from atwood.simulation.problem.problem import Plan
-from atwood.simulation.problem.projection import Held, nearly_projected, project_safely, project_states
+from atwood.simulation.problem.projection import ProjectedStates, nearly_projected, project_safely, project_states
 
 __all__ = ["Arc", "Path", "find_arc", "follow"]
 
@@ -72,8 +72,8 @@ class Arc:
         """Return coordinates, speeds and accelerations at times, each of shape (number, times)."""
         x = (2.0 * np.asarray(t, dtype=float) - self.start - self.end) / (self.end - self.start)
         each = legendre.legvander(x, len(self.speeds) - 1)
-        slope = (_DERIVATIVE @ self.speeds) * (2.0 / (self.end - self.start))
-        return (each @ self.coordinates).T, (each @ self.speeds).T, (each[:, :-1] @ slope).T
+        constraint_jacobian = (_DERIVATIVE @ self.speeds) * (2.0 / (self.end - self.start))
+        return (each @ self.coordinates).T, (each @ self.speeds).T, (each[:, :-1] @ constraint_jacobian).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +172,7 @@ def _settle(
         turned = half * (integral @ accelerations.T)
         turned[0] += u
         later = (_REACH @ turned).T  # known already, and twice as near as what the places would follow from
-        rates = plan.balance.turning.rates_each(times, held.coordinates, held.hold(later))
+        rates = plan.balance.kinematic_map.rates_each(times, held.coordinates, held.hold(later))
         moved = half * (integral @ rates.T)
         moved[0] += q
         now = (_REACH @ moved).T, later
@@ -191,10 +191,10 @@ def _settle(
     return None
 
 
-def _held(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray, is_far: bool) -> Held:
+def _held(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray, is_far: bool) -> ProjectedStates:
     """Return states near the constraints, or at first far from them, that are projected onto these."""
     if not plan.balance.constraints:
-        return Held(q, u, lambda speeds: speeds)
+        return ProjectedStates(q, u, lambda speeds: speeds)
     if not is_far:
         return nearly_projected(plan, t, q, u)
     made = project_states(plan, t, q, u)
@@ -202,7 +202,7 @@ def _held(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray, is_far: bool)
     bad = made.doubtful | ~np.all(np.isfinite(q), axis=0) | ~np.all(np.isfinite(u), axis=0)
     for i in np.flatnonzero(bad):
         q[:, i], u[:, i] = project_safely(plan, float(t[i]), q[:, i], u[:, i])
-    return Held(q, u, lambda speeds: speeds)
+    return ProjectedStates(q, u, lambda speeds: speeds)
 
 
 def _size(plan: Plan, q: FloatArray, u: FloatArray) -> float:

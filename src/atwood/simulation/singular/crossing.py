@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import SolveError
-from atwood.integrators.event_location import EventWatch, Root, State
+from atwood.integrators.event_location import EventLocator, Root, State
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
@@ -20,14 +20,14 @@ from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.singular.collocation import Path
 
-__all__ = ["Passage", "events_on", "stuck_at"]
+__all__ = ["SingularCrossing", "events_on", "stuck_at"]
 
 _PIECES = 8
 """In so many pieces a path is searched for events."""
 
 
 @dataclass(frozen=True, eq=False)
-class Passage:
+class SingularCrossing:
     """A singular position that a run passed through, or came close to.
 
     Attributes
@@ -125,19 +125,19 @@ def events_on(path: Path, plan: Plan, probe: EventProbe) -> Root | None:
     plan, probe
         The scene in its mode, and what is watched.
     """
-    if not probe.watches:
+    if not probe.event_functions:
         return None
     size, n, m = plan.program.size, plan.program.coordinates, len(plan.sizes)
 
     def at(t: float) -> State:
         q, u, a = (one[:, 0] for one in path.at(np.array([t])))
         y, yp = np.zeros(size), np.zeros(size)
-        y[:n], y[n : n + m], yp[n : n + m] = plan.balance.turning.normalized(q), u, a
-        yp[:n] = plan.balance.turning.rates(t, y[:n], u)
+        y[:n], y[n : n + m], yp[n : n + m] = plan.balance.kinematic_map.normalized(q), u, a
+        yp[:n] = plan.balance.kinematic_map.rates(t, y[:n], u)
         return t, y, yp
 
-    watch = EventWatch(plan.problem(probe.function(), probe.directions), path.end - path.start)
-    watch.restart(at(path.start))
+    locator = EventLocator(plan.problem(probe.function(), probe.directions), path.end - path.start)
+    locator.restart(at(path.start))
     times = np.linspace(path.start, path.end, _PIECES + 1).tolist()
-    found = (watch.search(one, other, at) for one, other in pairwise(times))
+    found = (locator.search(one, other, at) for one, other in pairwise(times))
     return next((root for root in found if root is not None), None)

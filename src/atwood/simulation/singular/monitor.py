@@ -13,15 +13,15 @@ import time
 import numpy as np
 
 from atwood.errors import AtwoodError, SolveError
-from atwood.integrators.protocol import Advance, FloatArray, Status
+from atwood.integrators.protocol import FloatArray, Status, StepResult
 from atwood.late import dataclass
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely, project_states
 from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow
-from atwood.simulation.singular.crossing import Passage, stuck_at
-from atwood.simulation.singular.rank_measure import Nearness, crossing, find_loss, nearly_lost
+from atwood.simulation.singular.crossing import SingularCrossing, stuck_at
+from atwood.simulation.singular.rank_measure import RankMeasure, find_crossing, find_loss, nearly_lost
 
-__all__ = ["Guard", "guard_of"]
+__all__ = ["SingularityMonitor", "singularity_monitor_of"]
 
 _MOVE = 0.3
 """Between two looks nothing moves by more of its size; an angle by so many radians."""
@@ -62,19 +62,21 @@ _AGREES = 30.0
 """Times the tolerance: a solver whose states behind the place differ by less from the arc has gone the same way."""
 
 
-def guard_of(plan: Plan, tolerance: float, end: float, advance: Advance) -> Guard | None:
+def singularity_monitor_of(
+    plan: Plan, tolerance: float, end: float, step_result: StepResult
+) -> SingularityMonitor | None:
     """Return what looks out for singular positions; None where there can be none: without loops.
 
     Without projection (plain index 1) drift is to be seen, and nothing is looked out for.
 
     Parameters
     ----------
-    plan, tolerance, end, advance
-        See `Guard`.
+    plan, tolerance, end, step_result
+        See `SingularityMonitor`.
     """
     if not plan.is_projected or not plan.assembly.reduced.constraints:
         return None
-    return Guard(plan, tolerance, end, advance)
+    return SingularityMonitor(plan, tolerance, end, step_result)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,7 @@ class _Look:
     yp: FloatArray
 
 
-class Guard:
+class SingularityMonitor:
     """Looks out for singular positions while a scene runs.
 
     When it looks depends on the motion alone, so that outputs change nothing.
@@ -97,7 +99,7 @@ class Guard:
         The relative tolerance of the run.
     end
         When the stretch ends at the latest, s.
-    advance
+    step_result
         The state at its start.
 
     Attributes
@@ -113,37 +115,37 @@ class Guard:
 
     trouble: tuple[float, int] | None
 
-    def __init__(self, plan: Plan, tolerance: float, end: float, advance: Advance) -> None:
+    def __init__(self, plan: Plan, tolerance: float, end: float, step_result: StepResult) -> None:
         self.plan, self.tolerance = plan, tolerance
-        self._whole = end - advance.t
+        self._whole = end - step_result.t
         self.seconds = 0.0
-        self.agreed: list[Passage] = []
+        self.agreed: list[SingularCrossing] = []
         self._n, self._m = plan.program.coordinates, len(plan.sizes)
         self._looks: list[_Look] = []
         self._away: list[float] = []
         self._judged = -np.inf
         self._largest = 0.0
-        self._measures = Nearness(plan)
-        self.restart(advance)
+        self._measures = RankMeasure(plan)
+        self.restart(step_result)
 
-    def restart(self, advance: Advance, is_behind: bool = False) -> None:
+    def restart(self, step_result: StepResult, is_behind: bool = False) -> None:
         """Begin again from a state, perhaps behind a singular position."""
         self._is_behind = is_behind
         self._looks, self._away = [], []
         self._judged = -np.inf
         self.trouble = None
-        self.note(advance)
+        self.note(step_result)
 
-    def note(self, advance: Advance) -> None:
+    def note(self, step_result: StepResult) -> None:
         """Take up a state, and decide when to look again."""
-        if self._looks and advance.t <= self._looks[-1].t:
+        if self._looks and step_result.t <= self._looks[-1].t:
             return
-        self._looks.append(_Look(advance.t, advance.y, advance.yp))
-        self.next = advance.t + self._stride(advance)
+        self._looks.append(_Look(step_result.t, step_result.y, step_result.yp))
+        self.next = step_result.t + self._stride(step_result)
 
-    def _stride(self, advance: Advance) -> float:
+    def _stride(self, step_result: StepResult) -> float:
         """Return the time in which something moves as far as it may; never beyond the end."""
-        u, a = advance.y[self._n : self._n + self._m], advance.yp[self._n : self._n + self._m]
+        u, a = step_result.y[self._n : self._n + self._m], step_result.yp[self._n : self._n + self._m]
         speed, pull = float(np.max(np.abs(u) / self.plan.sizes)), float(np.max(np.abs(a) / self.plan.sizes))
         if not np.isfinite(speed + pull):
             return _SHARE * self._whole
@@ -152,37 +154,37 @@ class Guard:
         stride = 2.0 * _MOVE / below if below > 0.0 else np.inf
         return stride if stride < self._whole else _SHARE * self._whole
 
-    def look(self, advance: Advance, between: bool, at_end: bool) -> Passage | None:
+    def look(self, step_result: StepResult, between: bool, at_end: bool) -> SingularCrossing | None:
         """Take up what a solver gave, and return the first singular position over which it must be helped.
 
         Parameters
         ----------
-        advance
+        step_result
             Where the solver is, or where and why it ended.
         between
             Whether this is where the guard wanted to look, and not an output.
         at_end
             Whether the run is to end here.
         """
-        ended = advance.status is not Status.REACHED
-        if advance.status is Status.INTERRUPTED or not (between or at_end or ended):
+        ended = step_result.status is not Status.REACHED
+        if step_result.status is Status.INTERRUPTED or not (between or at_end or ended):
             return None
-        self.note(advance)
+        self.note(step_result)
         if len(self._looks) - len(self._away) < _REVIEW and not (at_end or ended):
             return None
         began = time.perf_counter()
         try:
             self._measure()
-            failed = advance.status is Status.FAILED
+            failed = step_result.status is Status.FAILED
             found = self._first_minimum(at_end or ended, failed)
             if found is None and failed:
-                found = self._ahead() or self._from_start(advance.t)
+                found = self._ahead() or self._from_start(step_result.t)
             self._forget()
             return found
         finally:
             self.seconds += time.perf_counter() - began
 
-    def _ahead(self) -> Passage | None:
+    def _ahead(self) -> SingularCrossing | None:
         """Return the singular position towards which the motion was going when a solver failed; None if to none."""
         times, away = [one.t for one in self._looks], self._away
         for last in (len(away) - 1, len(away) - 2):
@@ -195,13 +197,13 @@ class Guard:
                 return found
         return None
 
-    def _from_start(self, near: float) -> Passage | None:
+    def _from_start(self, near: float) -> SingularCrossing | None:
         """Return the way on from a start that is near a singular position, or has one just ahead, at a time.
 
         Behind a passage rounding can be too large for a solver at first; there the motion goes away from the place.
         """
         first = self._looks[0]
-        stride = self._stride(Advance(first.t, first.y, first.yp, Status.REACHED))
+        stride = self._stride(StepResult(first.t, first.y, first.yp, Status.REACHED))
         begin = self._state(first)
         if begin is None or not near < first.t + 0.1 * stride:
             return None
@@ -212,13 +214,13 @@ class Guard:
                 continue
             times = np.linspace(arc.start, arc.end, _FINE)
             away = self._measures.learn(times, arc.at(times)[0])
-            found = crossing(self._measures, arc)
+            found = find_crossing(self._measures, arc)
             if found is not None:
-                return self._passage(arc, *found)
+                return self._crossing(arc, *found)
             leaves = away[0] < (_NEAR * self._largest if self._is_behind else _QUITE_CLOSE * away[-1])
             if longest is None and leaves and np.all(np.diff(away[1:]) > 0.0):
                 longest = Path((arc,))
-        return None if longest is None else Passage(longest.start, 0, (), (), longest)
+        return None if longest is None else SingularCrossing(longest.start, 0, (), (), longest)
 
     def _measure(self) -> None:
         if new := self._looks[len(self._away) :]:
@@ -233,7 +235,7 @@ class Guard:
         if cut > 0:
             del self._looks[:cut], self._away[:cut]
 
-    def _first_minimum(self, at_end: bool, failed: bool) -> Passage | None:
+    def _first_minimum(self, at_end: bool, failed: bool) -> SingularCrossing | None:
         away = self._away
         for i in range(len(away) if at_end else len(away) - 1):
             t = self._looks[i].t
@@ -271,19 +273,19 @@ class Guard:
                     return t, away[i]
         return None
 
-    def _went_along(self, passage: Passage) -> bool:
+    def _went_along(self, crossing: SingularCrossing) -> bool:
         """Return whether the solver went over a singular position by itself, the same way and as accurately."""
-        path, n, m = passage.path, self._n, self._m
+        path, n, m = crossing.path, self._n, self._m
         if path is None:
             return True
-        behind = passage.time + 0.1 * (path.end - passage.time)
+        behind = crossing.time + 0.1 * (path.end - crossing.time)
         looks = [one for one in self._looks if behind < one.t <= path.end]
         if not looks:
             return False
         q, u, _ = path.at(np.array([one.t for one in looks]))
         y = np.stack([one.y for one in looks], axis=1)
-        turning = self.plan.balance.turning
-        places = (turning.normalized(y[:n]) - turning.normalized(q)) / self.plan.coordinate_sizes[:, None]
+        kinematic_map = self.plan.balance.kinematic_map
+        places = (kinematic_map.normalized(y[:n]) - kinematic_map.normalized(q)) / self.plan.coordinate_sizes[:, None]
         speeds = (y[n : n + m] - u) / self.plan.sizes[:, None] * self.plan.scales.time
         return max(float(np.max(np.abs(places))), float(np.max(np.abs(speeds)))) < _AGREES * self.tolerance
 
@@ -309,7 +311,7 @@ class Guard:
             return None
         return float(t[least]), float(away[least])
 
-    def _pass(self, near: float, away: float = 0.0, failed: bool = False) -> Passage | None:
+    def _pass(self, near: float, away: float = 0.0, failed: bool = False) -> SingularCrossing | None:
         """Return the passage near a time; None where the motion is as anywhere else."""
         tried: set[float] = set()
         for reach in (1.0, 2.0, 0.5, 0.25, 0.1):
@@ -329,7 +331,7 @@ class Guard:
             return None
         return self._past(near, begin, failed)
 
-    def _past(self, near: float, begin: tuple[float, FloatArray, FloatArray], failed: bool) -> Passage | None:
+    def _past(self, near: float, begin: tuple[float, FloatArray, FloatArray], failed: bool) -> SingularCrossing | None:
         """Return the way past a singular position that the motion comes close to."""
         measure = self._measures
         try:
@@ -339,12 +341,12 @@ class Guard:
             path = None
         if path is not None:
             times = np.concatenate([np.linspace(one.start, one.end, 5) for one in path.arcs])
-            return Passage(float(times[np.argmin(measure.at(times, path.at(times)[0]))]), 0, (), (), path)
+            return SingularCrossing(float(times[np.argmin(measure.at(times, path.at(times)[0]))]), 0, (), (), path)
         lost = nearly_lost(measure, near, min(self._looks, key=lambda one: abs(one.t - near)).y[: self._n])
         if failed:
             self.trouble = near, lost
             return None
-        return Passage(near, 0, *self._said((lost,)), None)
+        return SingularCrossing(near, 0, *self._said((lost,)), None)
 
     def explain(self, message: str) -> SolveError | None:
         """Return the error of a solver that failed at a singular position; None if it failed elsewhere."""
@@ -378,7 +380,7 @@ class Guard:
         except AtwoodError:
             return None
 
-    def _over(self, near: float, t: float, q: FloatArray, u: FloatArray) -> Passage | None:
+    def _over(self, near: float, t: float, q: FloatArray, u: FloatArray) -> SingularCrossing | None:
         """Return the way over a singular position near a time, from a state."""
         plan, accurate = self.plan, max(self.tolerance, _ACCURATE)
         for _ in range(8):
@@ -391,14 +393,14 @@ class Guard:
                 q, u, _ = (one[:, 0] for one in arc.at(np.array([arc.end])))
                 t, (q, u) = arc.end, plan.balance.project(arc.end, q, u, plan.sizes)
                 continue
-            found = crossing(self._measures, arc)
+            found = find_crossing(self._measures, arc)
             if found is None or found[0] <= t:
                 return None
             now, away = found
             if abs(now - near) > _CENTRED * (near - t):
                 near = now
                 continue
-            return self._passage(arc, now, away)
+            return self._crossing(arc, now, away)
         return None
 
     def _between(self, t: FloatArray) -> tuple[FloatArray, FloatArray] | None:
@@ -415,10 +417,14 @@ class Guard:
         )
         return both[: self._n], both[self._n :]
 
-    def _passage(self, arc: Arc, t: float, away: float) -> Passage | None:
+    def _crossing(self, arc: Arc, t: float, away: float) -> SingularCrossing | None:
         """Return the passage that an arc makes at a time; None if that is no singular position."""
         loss = find_loss(self._measures, arc, t, away)
-        return None if loss is None else Passage(t, loss.rank, *self._said(loss.constraints), Path((arc,)), loss.gap)
+        return (
+            None
+            if loss is None
+            else SingularCrossing(t, loss.rank, *self._said(loss.constraints), Path((arc,)), loss.gap)
+        )
 
 
 def _cubic(s: FloatArray, ends: tuple[FloatArray, FloatArray], slopes: tuple[FloatArray, FloatArray]) -> FloatArray:

@@ -18,7 +18,7 @@ from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import ConstraintsAt, constraints_at
 from atwood.simulation.singular.collocation import Arc
 
-__all__ = ["Loss", "Nearness", "crossing", "find_loss", "nearly_lost"]
+__all__ = ["Loss", "RankMeasure", "find_crossing", "find_loss", "nearly_lost"]
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
@@ -56,7 +56,7 @@ class Loss:
     gap: float = 0.0
 
 
-class Nearness:
+class RankMeasure:
     """How far states are from a singular position.
 
     Each constraint is measured by how much it has changed most so far: one that hardly changes where it is asked for is
@@ -91,7 +91,7 @@ class Nearness:
     def _of(self, now: ConstraintsAt) -> FloatArray:
         share, count = now.rows / self.rows, len(now.value)
         if now.normal is None and len(now.kept) <= _SMALL:
-            slopes = (now.slope * share[:, :, None])[:, now.kept]
+            slopes = (now.jacobian * share[:, :, None])[:, now.kept]
             if not slopes.shape[1]:
                 return np.ones(count)  # what constraints there are follow from what is eliminated
             if not np.all(np.isfinite(slopes)):
@@ -103,17 +103,17 @@ class Nearness:
             size: FloatArray = np.linalg.norm(right[:, now.kept], axis=1) / np.linalg.norm(step, axis=1)
         return size
 
-    def slope_at(self, t: float, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def jacobian_at(self, t: float, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return slopes of all constraints at one place, scaled, and by how much positions miss them."""
-        now = self.plan.balance.held(t, q, np.zeros_like(self.plan.sizes))
-        slope = to_array(scaled(now.slope, self.plan.sizes, self.rows))
-        return slope, np.abs(now.value / self.rows)[self.plan.balance.holonomic]
+        now = self.plan.balance.constraints_at(t, q, np.zeros_like(self.plan.sizes))
+        constraint_jacobian = to_array(scaled(now.jacobian, self.plan.sizes, self.rows))
+        return constraint_jacobian, np.abs(now.value / self.rows)[self.plan.balance.holonomic]
 
     def _constraints(self, t: FloatArray, q: FloatArray) -> ConstraintsAt:
         return constraints_at(self.plan, t, q, np.zeros((len(self.plan.sizes), len(t))))
 
 
-def crossing(measure: Nearness, arc: Arc) -> tuple[float, float] | None:
+def find_crossing(measure: RankMeasure, arc: Arc) -> tuple[float, float] | None:
     """Return when an arc passes closest to a singular position, and how far away it is at its ends; None if never.
 
     Parameters
@@ -195,7 +195,7 @@ def _clenshaw(coefficients: list[float], x: float) -> float:
     return coefficients[0] + x * value - 0.5 * after
 
 
-def find_loss(measure: Nearness, arc: Arc, t: float, away: float) -> Loss | None:
+def find_loss(measure: RankMeasure, arc: Arc, t: float, away: float) -> Loss | None:
     """Return what is lost at a time of an arc; None if that is no singular position.
 
     Parameters
@@ -210,33 +210,33 @@ def find_loss(measure: Nearness, arc: Arc, t: float, away: float) -> Loss | None
         The measure a little away from it.
     """
     finding, least = measure.plan.finding, _LOST * away
-    q = measure.plan.balance.turning.normalized(arc.at(np.array([t]))[0][:, 0])
-    slope, misses = measure.slope_at(t, q)
+    q = measure.plan.balance.kinematic_map.normalized(arc.at(np.array([t]))[0][:, 0])
+    constraint_jacobian, misses = measure.jacobian_at(t, q)
     kept = list(finding.kept)
-    if not np.linalg.svd(slope[kept], compute_uv=False)[-1] < least:
+    if not np.linalg.svd(constraint_jacobian[kept], compute_uv=False)[-1] < least:
         return None
     if not np.max(misses, initial=0.0) < _HOLDS:
         return None
-    lost = finding.rank - int(np.sum(np.linalg.svd(slope, compute_uv=False) > least))
+    lost = finding.rank - int(np.sum(np.linalg.svd(constraint_jacobian, compute_uv=False) > least))
     if lost <= 0:
         return Loss(0, ())
-    left = set(_independent(slope, least))
+    left = set(_independent(constraint_jacobian, least))
     return Loss(lost, tuple(i for i in kept if i not in left), float(np.max(misses, initial=0.0)))
 
 
-def nearly_lost(measure: Nearness, t: float, q: FloatArray) -> int:
+def nearly_lost(measure: RankMeasure, t: float, q: FloatArray) -> int:
     """Return the number of the constraint that most nearly follows from the others at a place."""
-    slope, _ = measure.slope_at(t, measure.plan.balance.turning.normalized(q))
+    constraint_jacobian, _ = measure.jacobian_at(t, measure.plan.balance.kinematic_map.normalized(q))
     kept = list(measure.plan.finding.kept)
-    left = np.linalg.svd(slope[kept])[0]
+    left = np.linalg.svd(constraint_jacobian[kept])[0]
     return kept[int(np.argmax(np.abs(left[:, -1])))]
 
 
-def _independent(slope: FloatArray, least: float) -> list[int]:
+def _independent(constraint_jacobian: FloatArray, least: float) -> list[int]:
     """Return the numbers of rows that depend on none before them, by what is left of each, whatever its size."""
     kept: list[int] = []
-    basis = np.empty((min(slope.shape), slope.shape[1]))
-    for i, row in enumerate(slope):
+    basis = np.empty((min(constraint_jacobian.shape), constraint_jacobian.shape[1]))
+    for i, row in enumerate(constraint_jacobian):
         known = basis[: len(kept)]
         left = row - (known @ row) @ known
         left = left - (known @ left) @ known

@@ -23,9 +23,9 @@ from atwood.integrators.explicit_problem import LOOSEST
 from atwood.integrators.protocol import SolverOptions
 from atwood.late import dataclass
 from atwood.simulation.dynamics.columns import masses_at
-from atwood.simulation.dynamics.kinematic_map import turning_of
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.reactions import ReactionSolver
-from atwood.simulation.events.modes import find_watches
+from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.initialization.many import size_rows
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.explicit_scene import compiled_rates, explicit_problem
@@ -33,7 +33,7 @@ from atwood.simulation.problem.problem import make_plan
 from atwood.simulation.run.choice import choose
 from atwood.simulation.run.stiffness import can_be_stiff
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows
-from atwood.study.sweeps.runs import Order, Records, shared_work
+from atwood.study.sweeps.runs import Records, SweepRequest, shared_work
 
 __all__ = ["run_batches", "why_not_batched"]
 
@@ -42,9 +42,9 @@ _PIECE, _NUMBERS = 2_000, 2_000_000
 """So many runs are prepared together at most, and so many numbers handed out by them."""
 
 
-def why_not_batched(order: Order) -> str:
+def why_not_batched(request: SweepRequest) -> str:
     """Return why a sweep's runs must be made one by one, in words; empty if they can be made many at a time."""
-    assembly, options = order.assembly, order.options
+    assembly, options = request.assembly, request.options
     if options.solver not in ("auto", "explicit"):
         return f"the solver {options.solver!r} was asked for"
     if assembly.form != "reduced":
@@ -53,7 +53,7 @@ def why_not_batched(order: Order) -> str:
     if equations.constraints or not equations.coordinates:
         is_free = not equations.constraints
         return "nothing is free to move" if is_free else "constraints are left among its coordinates"
-    if find_watches(assembly):
+    if find_event_functions(assembly):
         return "events are watched"
     if assembly.relations or equations.prescribed:
         return "something in it follows the clock"
@@ -63,13 +63,13 @@ def why_not_batched(order: Order) -> str:
         return "whether it is stiff depends on each run (with solver='explicit' it is not asked)"
     if options.max_seconds is not None:
         return "each run has a limit of time"
-    if order.has_turns:
+    if request.has_turns:
         return "a quantity counts turns on the way"
-    return _why_not_compiled(order)
+    return _why_not_compiled(request)
 
 
-def _why_not_compiled(order: Order) -> str:
-    assembly, options = order.assembly, order.options
+def _why_not_compiled(request: SweepRequest) -> str:
+    assembly, options = request.assembly, request.options
     problem = explicit_problem(assembly)
     if problem is None or problem.compiled is None:
         return "it calls functions in Python"
@@ -83,12 +83,14 @@ def _why_not_compiled(order: Order) -> str:
     return "" if chosen == "explicit" else f"the solver is {chosen!r}"
 
 
-def run_batches(order: Order, records: Records, threads: int, watch: Callable[[int], object]) -> NDArray[np.intp]:
+def run_batches(
+    request: SweepRequest, records: Records, threads: int, watch: Callable[[int], object]
+) -> NDArray[np.intp]:
     """Make the runs that can be made many at a time.
 
     Parameters
     ----------
-    order, records
+    request, records
         What to run, and where to write what became of it.
     threads
         How many threads share them.
@@ -100,11 +102,11 @@ def run_batches(order: Order, records: Records, threads: int, watch: Callable[[i
     array
         Numbers of the runs that are left, to be made one by one.
     """
-    equations = order.assembly.reduced
-    count, shown = order.cases.count, len(order.times) * (len(equations.coordinates) + len(equations.speeds))
+    equations = request.assembly.reduced
+    count, shown = request.cases.count, len(request.times) * (len(equations.coordinates) + len(equations.speeds))
     length = max(1, min(_PIECE, -(-count // (4 * threads)), _NUMBERS // max(1, shown)))
     pieces = [np.arange(first, min(first + length, count)) for first in range(0, count, length)]
-    batches = _Batches(order, records)
+    batches = _Batches(request, records)
     shared_work(batches.work, pieces, threads, watch)
     return np.flatnonzero([not status for status in records.status])
 
@@ -122,11 +124,11 @@ class _Prepared:
 class _Batches:
     """Pieces of a sweep, each prepared, run and read out as arrays."""
 
-    def __init__(self, order: Order, records: Records) -> None:
-        self.order, self.records = order, records
-        assembly = order.assembly
-        self.starts, self.rows = StartRows(order), ParameterRows(order)
-        self.needs_reactions = _reads(order, [one.symbol for one in assembly.reactions])
+    def __init__(self, request: SweepRequest, records: Records) -> None:
+        self.request, self.records = request, records
+        assembly = request.assembly
+        self.starts, self.rows = StartRows(request), ParameterRows(request)
+        self.needs_reactions = _reads(request, [one.symbol for one in assembly.reactions])
         self._own = threading.local()
         # What threads share is made before they begin.
         found = assembly.shared.get("accelerations", lambda: acceleration_program(assembly))
@@ -143,13 +145,13 @@ class _Batches:
         if not len(ready.runs):
             return 0
         stepper, own = self._stepper()
-        order, options = self.order, self.order.options
+        request, options = self.request, self.request.options
         parameters = None
         if ready.parameters is not None:
             parameters = BatchParameters(ready.parameters, own.prologue, own.derived, own.scratch, own)
-        begin = order.assembly.flat.t_start
+        begin = request.assembly.flat.t_start
         batch = Batch(
-            stepper.batch_places(), begin, order.times, ready.state, ready.tolerances, options.max_steps, parameters
+            stepper.batch_places(), begin, request.times, ready.state, ready.tolerances, options.max_steps, parameters
         )
         while not batch.advance():
             if stop.is_set():
@@ -165,7 +167,7 @@ class _Batches:
         if not hasattr(self._own, "made"):
             from atwood.integrators.dop853.native import CompiledStepper
 
-            assembly, options = self.order.assembly, self.order.options
+            assembly, options = self.request.assembly, self.request.options
             own = self.rates.open()
             self.rates.fill(own, assembly.parameter_values)
             problem = explicit_problem(assembly)
@@ -185,8 +187,8 @@ class _Batches:
         usable &= found
         state = np.concatenate([q, u], axis=1)
         usable &= np.all(np.isfinite(state), axis=1)
-        t = np.array([[self.order.assembly.flat.t_start]])
-        values = self.order.assembly.parameter_values if parameters is None else parameters.T
+        t = np.array([[self.request.assembly.flat.t_start]])
+        values = self.request.assembly.parameter_values if parameters is None else parameters.T
         with np.errstate(all="ignore"):
             a = self.watched.bind(values)(t, q.T, u.T)[-1].T
             usable &= np.all(np.isfinite(a), axis=1) & self._has_inertia(t, q, u, values, lengths)
@@ -202,12 +204,12 @@ class _Batches:
         program = self.balance
         n = program.speeds
         if program.mass_product is not None:
-            mass = masses_at(self.order.assembly, t, q, u, values)
+            mass = masses_at(self.request.assembly, t, q, u, values)
         else:
-            entries = self.order.assembly.compiled(program.program, vectorized=True).bind(values)(t, q.T, u.T)[0]
+            entries = self.request.assembly.compiled(program.program, vectorized=True).bind(values)(t, q.T, u.T)[0]
             mass = np.zeros((len(q), n, n))
             mass[:, program.mass_rows, program.mass_columns] = entries.T
-        _, sizes = size_rows(self.order.assembly.reduced, lengths)
+        _, sizes = size_rows(self.request.assembly.reduced, lengths)
         mass *= sizes[:, :, None] * sizes[:, None, :]
         usable = np.all(np.isfinite(mass), axis=(1, 2))
         mass[~usable] = np.eye(n)
@@ -217,9 +219,9 @@ class _Batches:
 
     def _tolerances(self, u: FloatArray, a: FloatArray, lengths: FloatArray, values: FloatArray) -> FloatArray:
         """Return the absolute tolerances of each run, as `Plan.tolerances` has them."""
-        order, assembly = self.order, self.order.assembly
+        request, assembly = self.request, self.request.assembly
         coordinate_sizes, sizes = size_rows(assembly.reduced, lengths)
-        span = order.options.t_end - assembly.flat.t_start
+        span = request.options.t_end - assembly.flat.t_start
         times = [np.full_like(u, span), sizes / np.abs(u), np.sqrt(sizes / np.abs(a))]
         symbols = [one.name for one in assembly.parameters]
         if "gravity" in symbols:
@@ -227,7 +229,7 @@ class _Batches:
             times.append(np.broadcast_to(np.sqrt(lengths / gravity)[:, None], u.shape))
         every = np.concatenate(times, axis=1)
         time = np.min(np.where(every > 0.0, every, np.inf), axis=1)
-        relative = min(order.options.relative_tolerance, LOOSEST)
+        relative = min(request.options.relative_tolerance, LOOSEST)
         return np.concatenate([relative * coordinate_sizes, relative * (sizes / time[:, None])], axis=1)
 
     # -- after the last step --------------------------------------------------------------------------------------
@@ -243,7 +245,7 @@ class _Batches:
         done = runs[whole]
         records.values[:, done] = values[:, whole]
         records.steps[done] = steps[good][whole]
-        records.end_time[done] = self.order.options.t_end if self.order.only_end else self.order.times[-1]
+        records.end_time[done] = self.request.options.t_end if self.request.only_end else self.request.times[-1]
         for run in done.tolist():
             records.status[run] = "finished"
         with records.lock:
@@ -253,26 +255,26 @@ class _Batches:
 
     def _quantities(self, ready: _Prepared, states: FloatArray, good: NDArray[np.bool_]) -> FloatArray:
         """Return the quantities of the runs that came to their end, shape (quantities, runs, times)."""
-        order, assembly = self.order, self.order.assembly
-        count, moments = int(np.sum(good)), len(order.times)
+        request, assembly = self.request, self.request.assembly
+        count, moments = int(np.sum(good)), len(request.times)
         n = len(assembly.reduced.coordinates)
         flat = states[good].reshape(count * moments, states.shape[2]).T
-        q, u = turning_of(assembly, "reduced").normalized(flat[:n]), flat[n:]
-        t = np.tile(order.times, count)
+        q, u = kinematic_map_of(assembly, "reduced").normalized(flat[:n]), flat[n:]
+        t = np.tile(request.times, count)
         values = assembly.parameter_values
         if ready.parameters is not None:
             values = np.repeat(ready.parameters[good], moments, axis=0).T
         a = np.zeros_like(u)
         reactions = np.zeros((len(assembly.reactions), len(t)))
         if not count:
-            return np.zeros((len(order.paths), 0, moments))
-        if _reads(order, list(assembly.reduced.accelerations)):
+            return np.zeros((len(request.paths), 0, moments))
+        if _reads(request, list(assembly.reduced.accelerations)):
             a = self.watched.bind(values)(t[None, :], q, u)[-1]
         if self.needs_reactions:
             reactions = self._reactions(ready.runs[good], t, q, u, moments, values, ready.parameters is not None)
-        observer = assembly.compiled(assembly.observer(order.paths), vectorized=True).bind(values)
+        observer = assembly.compiled(assembly.observer(request.paths), vectorized=True).bind(values)
         found: FloatArray = observer(t[None, :], q, u, a, reactions)[0]
-        return found.reshape(len(order.paths), count, moments)
+        return found.reshape(len(request.paths), count, moments)
 
     def _reactions(
         self,
@@ -284,7 +286,7 @@ class _Batches:
         values: FloatArray,
         varies: bool,
     ) -> FloatArray:
-        first = ReactionSolver(self.order.assembly, float(t[0]), q[:, 0], u[:, 0])
+        first = ReactionSolver(self.request.assembly, float(t[0]), q[:, 0], u[:, 0])
         if not varies:
             return first.at(t, q, u)[0]
         if not first.finding.redundant:
@@ -297,6 +299,6 @@ class _Batches:
         return np.concatenate(found, axis=1)
 
 
-def _reads(order: Order, symbols: Any) -> bool:
+def _reads(request: SweepRequest, symbols: Any) -> bool:
     """Return whether a quantity depends on any of some symbols."""
-    return any(depends_on(one.value, symbols) for one in order.assembly.find_observables(order.paths))
+    return any(depends_on(one.value, symbols) for one in request.assembly.find_observables(request.paths))

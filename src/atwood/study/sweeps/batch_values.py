@@ -17,14 +17,14 @@ from atwood.forms.shared import Slot, find_slots
 from atwood.forms.starting import starting
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.model.declare.component import Component
-from atwood.model.declare.parameter_expressions import Deferred
+from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.local.flatten import flatten
 from atwood.simulation.initialization.many import meet_speeds, size_rows
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.initialization.system import start_conditions
 from atwood.simulation.initialization.targets import Level, sort_targets
 from atwood.study.sweeps.cases import Axis
-from atwood.study.sweeps.runs import Order
+from atwood.study.sweeps.runs import SweepRequest
 
 __all__ = ["ParameterRows", "StartRows"]
 
@@ -34,14 +34,14 @@ class ParameterRows:
 
     Parameters
     ----------
-    order
+    request
         What is to be run.
     """
 
-    def __init__(self, order: Order) -> None:
-        self._order = order
-        assembly = order.assembly
-        axes = [(k, axis) for k, axis in enumerate(order.cases.axes) if not axis.is_start]
+    def __init__(self, request: SweepRequest) -> None:
+        self._request = request
+        assembly = request.assembly
+        axes = [(k, axis) for k, axis in enumerate(request.cases.axes) if not axis.is_start]
         # Constants that the start gives are parameters, too.
         self.varies = bool(axes or assembly.mechanism.constants)
         self._lock = threading.Lock()
@@ -99,10 +99,10 @@ class ParameterRows:
         usable = np.ones(len(runs), dtype=bool)
         if not self.varies:
             return None, usable
-        rows = np.tile(self._order.assembly.parameter_values, (len(runs), 1))
+        rows = np.tile(self._request.assembly.parameter_values, (len(runs), 1))
         if self._is_simple:
             for k, number in self._direct:
-                rows[:, number] = self._order.cases.column(k)[runs]
+                rows[:, number] = self._request.cases.column(k)[runs]
                 usable &= rows[:, number] != 0.0
             if self._through:
                 with self._lock:
@@ -118,7 +118,7 @@ class ParameterRows:
 
     def _follow(self, run: int, row: FloatArray) -> bool:
         """Write what follows from the parameters of models; return whether the structure stays."""
-        cases, scene = self._order.cases, self._scene
+        cases, scene = self._request.cases, self._scene
         for k, axis in self._through:
             try:
                 scene.set(axis.path, axis.given[cases.places[k][run]])
@@ -133,7 +133,7 @@ class ParameterRows:
         value = self._scene[slot.part]._value(slot.name)
         value = value if slot.axis is None or value is None else value[slot.axis]
         if number is None:
-            before = slot.read(self._order.assembly.flat)
+            before = slot.read(self._request.assembly.flat)
             return value is before or (type(value) is type(before) and bool(value == before))
         if not isinstance(value, (int, float)) or value == 0.0:
             return False
@@ -142,8 +142,8 @@ class ParameterRows:
 
     def _settings(self, row: FloatArray) -> bool:
         """Take up the scene's own gravity; its other settings must stay."""
-        flat, scene = self._order.assembly.flat, self._scene
-        names = [symbol.name for symbol in self._order.assembly.parameters]
+        flat, scene = self._request.assembly.flat, self._scene
+        names = [symbol.name for symbol in self._request.assembly.parameters]
         now = getattr(scene, "gravity", flat.gravity)
         if "gravity" in names and now != 0.0:
             row[names.index("gravity")] = now
@@ -153,7 +153,7 @@ class ParameterRows:
         return all(getattr(scene, name, getattr(flat, name)) == getattr(flat, name) for name in kept)
 
     def _assembly(self, run: int) -> Assembly | None:
-        cases, assembly = self._order.cases, self._order.assembly
+        cases, assembly = self._request.cases, self._request.assembly
         try:
             flat = flatten(self._source.changed(*cases.of(run), {}), assembly.flat.name)
             return assembly.follow(flat, self._source)[0]
@@ -163,13 +163,13 @@ class ParameterRows:
     def assembly(self, run: int) -> Assembly:
         """Return the assembly of one run, whose structure is that of all."""
         found = self._assembly(run)
-        return found if found is not None else self._order.assembly
+        return found if found is not None else self._request.assembly
 
 
 def _is_bound(scene: object, slot: Slot) -> bool:
     """Return whether a number follows from parameters of a model around its part."""
     part = scene[slot.part]  # type: ignore[index]
-    return isinstance(part._settings.get(slot.name, part._field(slot.name).default), Deferred)
+    return isinstance(part._settings.get(slot.name, part._field(slot.name).default), ParameterExpression)
 
 
 class StartRows:
@@ -177,15 +177,15 @@ class StartRows:
 
     Parameters
     ----------
-    order
+    request
         What is to be run.
     """
 
-    def __init__(self, order: Order) -> None:
-        self._order = order
-        assembly = order.assembly
+    def __init__(self, request: SweepRequest) -> None:
+        self._request = request
+        assembly = request.assembly
         equations = assembly.reduced
-        columns = {axis.path: order.cases.column(k) for k, axis in enumerate(order.cases.axes) if axis.is_start}
+        columns = {axis.path: request.cases.column(k) for k, axis in enumerate(request.cases.axes) if axis.is_start}
         self._columns = columns
         positions, speeds = sort_targets(assembly, equations)
         self._positions = self._said(positions, equations.coordinates)
@@ -195,7 +195,12 @@ class StartRows:
             fixed
         )
         # Guesses of other speeds than the coordinates' own, and orientations in space, are for one run at a time.
-        is_simple = is_simple and not speeds.guessed and not equations.charts and starting(assembly) is assembly
+        is_simple = (
+            is_simple
+            and not speeds.guessed
+            and not equations.orientation_coordinates
+            and starting(assembly) is assembly
+        )
         self.is_direct = is_simple and not self._start_is_bound()
         self._wanted = [columns.get(one.path, one.value) for one in speeds.fixed]
         self._conditions = start_conditions(assembly, equations, speeds.fixed, True, True) if self.is_direct else None
@@ -218,15 +223,15 @@ class StartRows:
 
     def _start_is_bound(self) -> bool:
         """Return whether a start value follows from a parameter that is varied."""
-        source = self._order.assembly.source
+        source = self._request.assembly.source
         assert source is not None
-        if all(axis.is_start for axis in self._order.cases.axes):
+        if all(axis.is_start for axis in self._request.cases.axes):
             return False
         stack: list[object] = [source.scene]
         while stack:
             one = stack.pop()
             starts = one._start_values() if hasattr(one, "_start_values") else {}
-            if any(isinstance(value, Deferred) for values in starts.values() for value in values.values()):
+            if any(isinstance(value, ParameterExpression) for values in starts.values() for value in values.values()):
                 return True
             stack.extend(one._children().values())  # type: ignore[attr-defined]
         return False
@@ -243,7 +248,7 @@ class StartRows:
         parameters
             Their parameters, one row each, where they change.
         """
-        assembly = self._order.assembly
+        assembly = self._request.assembly
         q, u = (np.zeros((len(runs), len(s))) for s in (assembly.reduced.coordinates, assembly.reduced.speeds))
         lengths = self._extents(runs, parameters)
         if self._conditions is not None:
@@ -267,15 +272,15 @@ class StartRows:
 
     def _assembly(self, run: int) -> Assembly:
         """Return the assembly of a run."""
-        order, assembly = self._order, self._order.assembly
-        if assembly.mechanism.constants or any(not axis.is_start for axis in order.cases.axes):
-            return assembly.with_values(order.cases.of(run)[0], start=order.cases.of(run)[1])
+        request, assembly = self._request, self._request.assembly
+        if assembly.mechanism.constants or any(not axis.is_start for axis in request.cases.axes):
+            return assembly.with_values(request.cases.of(run)[0], start=request.cases.of(run)[1])
         start = {path: float(column[run]) for path, column in self._columns.items()}
         return replace(assembly, flat=replace(assembly.flat, start={**assembly.flat.start, **start}))
 
     def _extents(self, runs: NDArray[np.intp], parameters: FloatArray | None) -> FloatArray:
         """Return the extent of the scene for each run, as `scene_length` has it."""
-        assembly = self._order.assembly
+        assembly = self._request.assembly
         lengths = np.full(len(runs), extent(assembly.mechanism))
         if parameters is not None:
             lengths = _moving_lengths(assembly, parameters)

@@ -23,7 +23,7 @@ from atwood.result.result import Result
 from atwood.simulation.problem.options import RunOptions
 from atwood.study.sweeps.cases import Cases
 
-__all__ = ["Order", "Records", "expand_paths", "run_in_processes", "run_one_by_one", "shared_work"]
+__all__ = ["Records", "SweepRequest", "expand_paths", "run_in_processes", "run_one_by_one", "shared_work"]
 
 
 _STRUCTURES = 8
@@ -34,7 +34,7 @@ _CHUNKS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class SweepRequest:
     """What is to be run.
 
     Attributes
@@ -81,10 +81,10 @@ class Records:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     @classmethod
-    def empty(cls, order: Order) -> Records:
+    def empty(cls, request: SweepRequest) -> Records:
         """Return records of runs that have not been made."""
-        count = order.cases.count
-        values = np.full((len(order.paths), count, len(order.times)), np.nan)
+        count = request.cases.count
+        values = np.full((len(request.paths), count, len(request.times)), np.nan)
         return cls(values, np.full(count, np.nan), np.zeros(count, dtype=np.int64), [""] * count)
 
     def fail(self, run: int, error: AtwoodError) -> None:
@@ -143,13 +143,17 @@ class _Structures:
 
 
 def run_one_by_one(
-    order: Order, records: Records, runs: Sequence[int] | NDArray[np.intp], threads: int, watch: Callable[[int], object]
+    request: SweepRequest,
+    records: Records,
+    runs: Sequence[int] | NDArray[np.intp],
+    threads: int,
+    watch: Callable[[int], object],
 ) -> None:
     """Make runs, each by itself, as `simulate` makes them.
 
     Parameters
     ----------
-    order, records
+    request, records
         What to run, and where to write what became of it.
     runs
         Numbers of the runs.
@@ -158,10 +162,10 @@ def run_one_by_one(
     watch
         Called with the number of runs that were done since.
     """
-    structures = _Structures(order.assembly)
+    structures = _Structures(request.assembly)
 
     def work(run: int, _: threading.Event) -> int:
-        _run(order, records, structures, run)
+        _run(request, records, structures, run)
         return 1
 
     shared_work(work, [int(run) for run in runs], threads, watch)
@@ -204,19 +208,19 @@ def _closing(pool: ThreadPoolExecutor, stop: threading.Event) -> Iterator[Thread
     pool.shutdown()
 
 
-def _run(order: Order, records: Records, structures: _Structures, run: int) -> None:
-    options = order.options
+def _run(request: SweepRequest, records: Records, structures: _Structures, run: int) -> None:
+    options = request.options
     try:
-        assembly, reason = structures.assembly(*order.cases.of(run))
+        assembly, reason = structures.assembly(*request.cases.of(run))
         if reason:
             records.reassembled[run] = reason
         # Angles count their turns, and a drifting form is brought back, at samples on the way.
-        samples = 400 if order.has_turns or assembly.level == "index1-projected" else 1
+        samples = 400 if request.has_turns or assembly.level == "index1-projected" else 1
         result = simulate(
             assembly,
             t_end=options.t_end,
             rtol=options.relative_tolerance,
-            outputs=2 if order.only_end else order.times,
+            outputs=2 if request.only_end else request.times,
             max_steps=options.max_steps,
             max_seconds=options.max_seconds,
             solver=options.solver,
@@ -228,7 +232,7 @@ def _run(order: Order, records: Records, structures: _Structures, run: int) -> N
         records.fail(run, error)
         before = getattr(error, "run", None)
         if before is not None:
-            _take(order, records, run, Result(before))
+            _take(request, records, run, Result(before))
         return
     records.status[run] = result.status
     if result.message:
@@ -238,12 +242,12 @@ def _run(order: Order, records: Records, structures: _Structures, run: int) -> N
     if not result.run.segments:  # there was no time to find its start
         return
     try:
-        _take(order, records, run, result)
+        _take(request, records, run, result)
     except AtwoodError as error:
         records.fail(run, error)
 
 
-def _take(order: Order, records: Records, run: int, result: Result) -> None:
+def _take(request: SweepRequest, records: Records, run: int, result: Result) -> None:
     """Record what a run gave at the output times that it reached."""
     statistics = result.statistics
     records.steps[run] = statistics.steps
@@ -251,42 +255,44 @@ def _take(order: Order, records: Records, run: int, result: Result) -> None:
         records.seconds += statistics.seconds
     records.end_time[run] = result.time[-1]
     has_end = records.status[run] in ("finished", "stopped")
-    table = result.table(order.paths)
-    for k, path in enumerate(order.paths):
-        if order.only_end:
+    table = result.table(request.paths)
+    for k, path in enumerate(request.paths):
+        if request.only_end:
             records.values[k, run, -1] = table[path][-1] if has_end else np.nan
             continue
         # After an event there are two states at one time: the later one counts.
-        places = np.searchsorted(result.time, order.times, side="right") - 1
-        reached = (places >= 0) & (result.time[np.maximum(places, 0)] == order.times)
+        places = np.searchsorted(result.time, request.times, side="right") - 1
+        reached = (places >= 0) & (result.time[np.maximum(places, 0)] == request.times)
         records.values[k, run, reached] = table[path][places[reached]]
 
 
 # -- processes -----------------------------------------------------------------------------------------------------
 
 
-def run_in_processes(order: Order, records: Records, executor: Executor, watch: Callable[[int], object]) -> None:
+def run_in_processes(
+    request: SweepRequest, records: Records, executor: Executor, watch: Callable[[int], object]
+) -> None:
     """Make runs where an executor puts them.
 
     Parameters
     ----------
-    order, records, watch
+    request, records, watch
         See `run_one_by_one`.
     executor
         Takes pieces of work.
     """
-    pieces = np.array_split(np.arange(order.cases.count), min(order.cases.count, _CHUNKS))
+    pieces = np.array_split(np.arange(request.cases.count), min(request.cases.count, _CHUNKS))
     waiting: dict[Future[Any], NDArray[np.intp]] = {}
     try:
         for runs in pieces:
-            waiting[executor.submit(_piece, *_packed(order, runs))] = runs
+            waiting[executor.submit(_piece, *_packed(request, runs))] = runs
         for done in as_completed(waiting):
             _merge(records, waiting[done], done.result())
             watch(len(waiting[done]))
     except (pickle.PicklingError, TypeError, AttributeError) as error:
         raise UsageError(
             f"the scene cannot be sent to where it is to be run ({error})",
-            where=order.assembly.flat.name,
+            where=request.assembly.flat.name,
             advice="Functions in it must have a name in a module; or use threads.",
         ) from error
     finally:
@@ -294,17 +300,17 @@ def run_in_processes(order: Order, records: Records, executor: Executor, watch: 
             future.cancel()
 
 
-def _packed(order: Order, runs: NDArray[np.intp]) -> tuple[Any, ...]:
-    assembly, options = order.assembly, order.options
+def _packed(request: SweepRequest, runs: NDArray[np.intp]) -> tuple[Any, ...]:
+    assembly, options = request.assembly, request.options
     assert assembly.source is not None
     axes = [
         (axis.path, axis.is_start, [axis.given[k] for k in places[runs]])
-        for axis, places in zip(order.cases.axes, order.cases.places, strict=True)
+        for axis, places in zip(request.cases.axes, request.cases.places, strict=True)
     ]
     given = {
-        "quantities": order.paths,
+        "quantities": request.paths,
         "t_end": options.t_end,
-        "outputs": None if order.only_end else order.times,
+        "outputs": None if request.only_end else request.times,
         "form": assembly.form,
         "level": assembly.level or "ggl",
         "rtol": options.relative_tolerance,

@@ -34,7 +34,7 @@ from atwood.simulation.run.choice import check_solver
 from atwood.study.sweeps.batch import run_batches, why_not_batched
 from atwood.study.sweeps.cases import COMBINATIONS, Cases, make_cases
 from atwood.study.sweeps.result import Sweep, SweepStatistics
-from atwood.study.sweeps.runs import Order, Records, expand_paths, run_in_processes, run_one_by_one
+from atwood.study.sweeps.runs import Records, SweepRequest, expand_paths, run_in_processes, run_one_by_one
 
 __all__ = ["Sweep", "SweepStatistics", "sweep"]
 
@@ -136,7 +136,7 @@ def sweep(
     cases = make_cases(source, vary, start, combine)
     first = _first(assembly, cases)
     end = assembly.flat.t_end if t_end is None else float(t_end)
-    order = Order(
+    request = SweepRequest(
         first,
         cases,
         expand_paths(first, quantities),
@@ -144,21 +144,21 @@ def sweep(
         outputs is None,
         RunOptions(end, rtol, max_steps=max_steps, max_seconds=max_seconds, solver=solver),
     )
-    records = Records.empty(order)
-    watch = _Watch(progress, cases.count)
+    records = Records.empty(request)
+    watch = _Progress(progress, cases.count)
     count = _threads(threads)
     reason = ""
     try:
         if executor is not None:
             reason = "they were given to an executor"
-            run_in_processes(order, records, executor, watch.count)
+            run_in_processes(request, records, executor, watch.count)
         else:
-            reason = why_not_batched(order)
-            left = np.arange(cases.count) if reason else run_batches(order, records, count, watch.count)
-            run_one_by_one(order, records, left, count, watch.count)
+            reason = why_not_batched(request)
+            left = np.arange(cases.count) if reason else run_batches(request, records, count, watch.count)
+            run_one_by_one(request, records, left, count, watch.count)
     except KeyboardInterrupt:
         records.interrupt()
-    return _finished(order, records, reason, count if executor is None else 0, time.perf_counter() - began)
+    return _finished(request, records, reason, count if executor is None else 0, time.perf_counter() - began)
 
 
 def _first(assembly: Assembly, cases: Cases) -> Assembly:
@@ -191,7 +191,7 @@ def _threads(asked: int | None) -> int:
 
 
 @dataclass
-class _Watch:
+class _Progress:
     """Counts the runs that are done."""
 
     progress: Callable[[int, int], object] | None
@@ -205,21 +205,21 @@ class _Watch:
             self.progress(self.done, self.of)
 
 
-def _finished(order: Order, records: Records, reason: str, threads: int, wall: float) -> Sweep:
-    first, cases = order.assembly, order.cases
-    observables = {one.path: one for one in first.find_observables(order.paths)}
+def _finished(request: SweepRequest, records: Records, reason: str, threads: int, wall: float) -> Sweep:
+    first, cases = request.assembly, request.cases
+    observables = {one.path: one for one in first.find_observables(request.paths)}
     columns = [(axis, cases.column(k)) for k, axis in enumerate(cases.axes)]
     return Sweep(
         scene=first.flat.name,
         form=first.form,
         level=first.level,
-        rtol=order.options.relative_tolerance,
-        time=order.times,
+        rtol=request.options.relative_tolerance,
+        time=request.times,
         end_time=records.end_time,
         parameters={axis.path: column for axis, column in columns if not axis.is_start},
         start={axis.path: column for axis, column in columns if axis.is_start},
         shape=cases.shape,
-        quantities={path: records.values[k] for k, path in enumerate(order.paths)},
+        quantities={path: records.values[k] for k, path in enumerate(request.paths)},
         units={
             **{axis.path: _unit(first, axis.path, axis.is_start) for axis in cases.axes},
             **{path: one.unit for path, one in observables.items()},

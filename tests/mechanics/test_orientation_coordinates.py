@@ -10,13 +10,13 @@ import pytest
 from atwood.expr import Graph, evaluate, jvp
 from atwood.mechanics.kinematics.orientation_coordinates import (
     BASES,
-    chart_axes,
-    chart_margin,
-    chart_quaternion,
-    chart_rates,
+    orientation_axes,
+    orientation_margin,
+    orientation_quaternion,
+    orientation_rates,
 )
 from atwood.simulation.dynamics.orientation_coordinates import _coordinates, _matrix, _quaternion
-from atwood.topology.charts import ORIENTATIONS, Chart, check_orientation
+from atwood.topology.orientation_coordinates import ORIENTATIONS, OrientationCoordinates, check_orientation
 
 from ..references.rotations import about, cross_matrix, from_quaternion
 
@@ -24,9 +24,9 @@ EULER = [kind for kind in ORIENTATIONS if kind.startswith("euler-")]
 SPIN = np.array([0.7, -1.1, 0.4])
 
 
-def chart_of(kind: str, base: int = 0) -> Chart:
+def chart_of(kind: str, base: int = 0) -> OrientationCoordinates:
     count = 4 if kind == "quaternion" else 3
-    return Chart(kind, tuple(range(count)), (0, 1, 2), "body", base)
+    return OrientationCoordinates(kind, tuple(range(count)), (0, 1, 2), "body", base)
 
 
 def places(kind: str) -> list[list[float]]:
@@ -44,9 +44,9 @@ def numbers(kind: str, base: int, at: list[float]) -> dict[str, Any]:
     symbols = [graph.symbol(f"c{i}") for i in range(len(at))]
     spins = [graph.symbol(f"w{i}") for i in range(3)]
     chart = chart_of(kind, base)
-    axes = [graph.convert(axis[i]) for axis in chart_axes(chart, symbols) for i in range(3)]
-    quaternion = [graph.convert(part) for part in chart_quaternion(chart, symbols)]
-    rates = [graph.convert(rate) for rate in chart_rates(chart, symbols, spins)]
+    axes = [graph.convert(axis[i]) for axis in orientation_axes(chart, symbols) for i in range(3)]
+    quaternion = [graph.convert(part) for part in orientation_quaternion(chart, symbols)]
+    rates = [graph.convert(rate) for rate in orientation_rates(chart, symbols, spins)]
     moving = jvp(axes, dict(zip(symbols, rates, strict=True)))
     values = {**dict(zip(symbols, at, strict=True)), **dict(zip(spins, SPIN, strict=True))}
     found = np.array(evaluate([*axes, *moving, *quaternion], values))
@@ -104,7 +104,7 @@ def test_a_rotation_vector_is_exact_up_to_a_full_turn() -> None:
 def test_every_chart_tells_before_it_is_singular(kind: str) -> None:
     graph = Graph()
     symbols = [graph.symbol(f"c{i}") for i in range(4 if kind == "quaternion" else 3)]
-    margin = chart_margin(chart_of(kind), symbols)
+    margin = orientation_margin(chart_of(kind), symbols)
     if kind == "quaternion":
         assert margin is None
         return

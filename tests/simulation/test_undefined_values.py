@@ -165,4 +165,4 @@ def test_what_came_before_a_failed_change_of_mode_is_kept(monkeypatch: pytest.Mo
     result = Result(caught.value.run)  # type: ignore[attr-defined]
     assert result.status == "failed"
     assert result.time[-1] == pytest.approx(0.482, abs=1e-3)
-    assert result.happenings[-1].law == "goes_slack"
+    assert result.events[-1].law == "goes_slack"

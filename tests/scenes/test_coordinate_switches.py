@@ -11,7 +11,7 @@ import pytest
 import atwood_library as lib
 from atwood import Result, Scene, report, simulate, sweep
 from atwood.pipeline import assemble
-from atwood.topology.charts import ORIENTATIONS
+from atwood.topology.orientation_coordinates import ORIENTATIONS
 from atwood_library.scenes import SCENES, FreeBody, LagrangeTop
 
 from ..references.free_body import FreeBody as ExactBody
@@ -76,11 +76,11 @@ def test_energy_and_momentum_stay_while_charts_change(kind: str, solver: str, rt
     assert np.max(np.abs(size - size[0])) < 1e-12 * size[0]
     assert np.max(np.abs(momentum - momentum[0])) < 1e-11 * size[0]
     if kind in ("rodrigues", "rotation-vector", "euler-zyz"):
-        assert len(result.restated) > 2
-        assert all(one.body == "body" for one in result.restated)
-        assert np.all(np.diff([one.time for one in result.restated]) > 0.0)
+        assert len(result.coordinate_switches) > 2
+        assert all(one.body == "body" for one in result.coordinate_switches)
+        assert np.all(np.diff([one.time for one in result.coordinate_switches]) > 0.0)
     elif kind == "quaternion":
-        assert result.restated == ()
+        assert result.coordinate_switches == ()
 
 
 @pytest.mark.sample(6)
@@ -99,7 +99,7 @@ def test_changes_of_chart_are_counted(kind: str) -> None:
     """A body that turns uniformly about z has its coordinates restated once a turn, soon after the angle for it."""
     result = simulate(FreeBody(spin=(0.0, 0.0, 2.0)), orientation=kind, t_end=20.0, rtol=1e-10, outputs=5)
     first = 2.0 * np.arctan(np.sqrt(1.5)) if kind == "rodrigues" else 1.15 * np.pi / 2.0
-    late = np.array([one.time for one in result.restated]) - first - np.pi * np.arange(6)
+    late = np.array([one.time for one in result.coordinate_switches]) - first - np.pi * np.arange(6)
     assert np.all((late >= 0.0) & (late < 1.0))
     turned = about([0.0, 0.0, 1.0], 2.0 * result.time)
     assert np.max(angle_between(axes(result), turned)) < 1e-9
@@ -151,7 +151,7 @@ def test_no_quantity_shows_its_coordinates(kind: str) -> None:
     """Positions, axes, Euler angles that count their turns, velocities, forces, energies."""
     exact, other = (simulate(pendulum(1.0, 0.5, 2.0), orientation=one, rtol=1e-11, t_end=4.0, outputs=41)
                     for one in ("quaternion", kind))  # fmt: skip
-    assert other.restated
+    assert other.coordinate_switches
     assert other.paths == exact.paths
     for path in exact.paths:
         assert np.allclose(other.array(path), exact.array(path), rtol=0.0, atol=1e-7, equal_nan=True), path
@@ -186,7 +186,7 @@ def test_every_method_passes_changes_of_chart(kind: str) -> None:
     exact = simulate(pendulum(*spin), rtol=1e-13, outputs=21, t_end=4.0, solver="taylor")
     for solver in ("taylor", "explicit", "ida", "ida-sundae"):
         made = simulate(pendulum(*spin), orientation=kind, rtol=1e-10, outputs=21, t_end=4.0, solver=solver)
-        assert made.restated
+        assert made.coordinate_switches
         for path in ("body.position.x", "body.x_axis.y", "body.spin.z", "ball.force.x", "body.kinetic_energy"):
             assert np.allclose(made[path], exact[path], atol=2e-6)
 
@@ -199,7 +199,7 @@ def test_loops_and_modes_have_any_coordinates(kind: str) -> None:
         (caught, ("body.position.x", "body.z_axis.x", "body.x_axis.y")),
     ):
         exact, other = (simulate(make(), orientation=one, rtol=1e-9, outputs=16) for one in ("quaternion", kind))
-        assert [one.law for one in other.happenings] == [one.law for one in exact.happenings]
+        assert [one.law for one in other.events] == [one.law for one in exact.events]
         for path in paths:
             assert np.allclose(other[path][-5:], exact[path][-5:], atol=2e-6)
         assert np.allclose(other.time, exact.time, atol=1e-6)
@@ -233,7 +233,7 @@ def test_other_values_and_sweeps_keep_the_coordinates(kind: str) -> None:
 
 def test_an_output_at_a_change_of_chart_is_there_once() -> None:
     scene = FreeBody(spin=(0.1, 2.0, 0.1))
-    when = simulate(scene, orientation="euler-zyz", t_end=2.0).restated[0].time
+    when = simulate(scene, orientation="euler-zyz", t_end=2.0).coordinate_switches[0].time
     for times in ([0.0, when, 2.0], [0.0, np.nextafter(when, 0.0), np.nextafter(when, 3.0), 2.0]):
         result = simulate(scene, orientation="euler-zyz", t_end=2.0, outputs=np.array(times))
         assert result.time.tolist() == times

@@ -16,11 +16,11 @@ from atwood.late import dataclass
 from atwood.model.local.laws import LocalPart
 from atwood.model.values.space import Space
 from atwood.topology.bodies import Bodies, reads_position
-from atwood.topology.charts import Chart, Orientation, coordinates_of
 from atwood.topology.graph import Joint, MechanismGraph, unit_of
 from atwood.topology.groups import connected_groups
+from atwood.topology.orientation_coordinates import Orientation, OrientationCoordinates, coordinates_of
 
-__all__ = ["Attachment", "Coordinate", "Forest", "OrientationStep", "grow_forest"]
+__all__ = ["Attachment", "Coordinate", "OrientationStep", "SpanningForest", "grow_spanning_forest"]
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Attachment:
         Numbers of the coordinates that are used, in the forest's list: those of the joint, or of the position.
     speeds
         Numbers of their speeds.
-    chart
+    orientation
         In space: numbers of the coordinates of its orientation, if the body has one of its own.
     spin
         Numbers of the speeds that belong to the chart.
@@ -74,7 +74,7 @@ class Attachment:
     backwards: bool
     coordinates: tuple[int, ...]
     speeds: tuple[int, ...] = ()
-    chart: tuple[int, ...] = ()
+    orientation: tuple[int, ...] = ()
     spin: tuple[int, ...] = ()
     turns_with_joint: bool = False
 
@@ -102,7 +102,7 @@ class OrientationStep:
 
 
 @dataclass(frozen=True)
-class Forest:
+class SpanningForest:
     """How the configuration is computed.
 
     Attributes
@@ -113,7 +113,7 @@ class Forest:
         The coordinates, in the order in which they are met.
     speeds
         The speeds; as many as coordinates, except where there are charts.
-    charts
+    orientation_coordinates
         The coordinates that stand for an orientation together.
     attachments
         The bodies, in an order in which they can be placed.
@@ -123,7 +123,7 @@ class Forest:
         Constraints, as (part, law, number), that hold whatever the coordinates are.
     loops
         How many independent loops the joints make.
-    cuts
+    loop_joints
         Joints that no body hangs on.
     counted
         Numbers of coordinates, and of their speeds, that only count the turns of a joint, by its coordinate's symbol.
@@ -132,23 +132,23 @@ class Forest:
     form: Literal["reduced", "dae"]
     coordinates: tuple[Coordinate, ...]
     speeds: tuple[Coordinate, ...]
-    charts: tuple[Chart, ...]
+    orientation_coordinates: tuple[OrientationCoordinates, ...]
     attachments: tuple[Attachment, ...]
     orientations: tuple[OrientationStep, ...]
     solved: frozenset[tuple[str, str, int]]
     loops: int
-    cuts: tuple[Joint, ...]
+    loop_joints: tuple[Joint, ...]
     counted: Mapping[Expression, tuple[int, int]] = field(default_factory=dict)
 
 
-def grow_forest(
+def grow_spanning_forest(
     form: Literal["reduced", "dae"],
     graph: MechanismGraph,
     bodies: Bodies,
     locals_: Mapping[str, LocalPart],
     space: Space,
     orientation: Orientation,
-) -> Forest:
+) -> SpanningForest:
     """Decide how every body is placed and turned.
 
     Parameters
@@ -180,17 +180,17 @@ def grow_forest(
     pairs = [(bodies.body_of[joint.a], bodies.body_of[joint.b]) for joint in joints]
     numbers = range(len(bodies.bodies))
     loops = len(pairs) - len(numbers) + len(connected_groups(numbers, pairs))
-    cuts = tuple(joint for joint in joints if id(joint) not in hung) if form == "reduced" else ()
-    return Forest(
+    loop_joints = tuple(joint for joint in joints if id(joint) not in hung) if form == "reduced" else ()
+    return SpanningForest(
         form,
         tuple(grower.coordinates),
         tuple(grower.speeds),
-        tuple(grower.charts),
+        tuple(grower.orientation_coordinates),
         tuple(grower.attachments),
         tuple(grower.orientations),
         frozenset(solved),
         loops,
-        cuts,
+        loop_joints,
         counted,
     )
 
@@ -214,7 +214,7 @@ class _Grower:
         self.orientation = orientation
         self.coordinates: list[Coordinate] = []
         self.speeds: list[Coordinate] = []
-        self.charts: list[Chart] = []
+        self.orientation_coordinates: list[OrientationCoordinates] = []
         self.attachments: list[Attachment] = []
         self.orientations: list[OrientationStep] = []
         self.placed: dict[int, int] = {0: 0}  # body -> depth
@@ -285,11 +285,11 @@ class _Grower:
                 continue
             self.told.add(symbol)
             numbers.append(self._coordinate(symbol.name, unit_of(self.locals[joint.part], symbol.name)))
-        chart, spin = self._chart(child) if in_space and oriented and not follows else ((), ())
+        orientation, spin = self._orientation_coordinates(child) if in_space and oriented and not follows else ((), ())
         node, other = (joint.a, joint.b) if backwards else (joint.b, joint.a)
         coordinates, speeds = tuple(q for q, _ in numbers), tuple(u for _, u in numbers)
         self.attachments.append(
-            Attachment(child, joint, node, other, backwards, coordinates, speeds, chart, spin, follows)
+            Attachment(child, joint, node, other, backwards, coordinates, speeds, orientation, spin, follows)
         )
         self.placed[child] = self.placed[parent] + 1
 
@@ -299,15 +299,17 @@ class _Grower:
         self.speeds.append(Coordinate(f"{name}'", f"{unit}/s"))
         return len(self.coordinates) - 1, len(self.speeds) - 1
 
-    def _chart(self, index: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    def _orientation_coordinates(self, index: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Add an orientation and the angular velocity in body axes; return the numbers of coordinates and speeds."""
         body, kind = self.bodies.bodies[index].name, self.orientation.kind
         first, start = len(self.coordinates), len(self.speeds)
         self.coordinates += [Coordinate(name, unit) for name, unit in coordinates_of(kind, body)]
         self.speeds += [Coordinate(f"{body}.spin.{axis}", "rad/s") for axis in "xyz"]
-        chart, spin = tuple(range(first, len(self.coordinates))), tuple(range(start, start + 3))
-        self.charts.append(Chart(kind, chart, spin, body, int(body in self.orientation.turned)))
-        return chart, spin
+        orientation, spin = tuple(range(first, len(self.coordinates))), tuple(range(start, start + 3))
+        self.orientation_coordinates.append(
+            OrientationCoordinates(kind, orientation, spin, body, int(body in self.orientation.turned))
+        )
+        return orientation, spin
 
     def attach_free(self) -> None:
         """Give every body that is left coordinates of its own."""
@@ -318,9 +320,13 @@ class _Grower:
     def _free(self, index: int) -> None:
         body = self.bodies.bodies[index]
         numbers = [self._coordinate(f"{body.name}.position.{axis}", "m") for axis in self._axis_labels()]
-        chart, spin = self._chart(index) if self.space.name == "space" and index in self.bodies.oriented else ((), ())
+        orientation, spin = (
+            self._orientation_coordinates(index)
+            if self.space.name == "space" and index in self.bodies.oriented
+            else ((), ())
+        )
         coordinates, speeds = tuple(q for q, _ in numbers), tuple(u for _, u in numbers)
-        self.attachments.append(Attachment(index, None, body.root, 0, False, coordinates, speeds, chart, spin))
+        self.attachments.append(Attachment(index, None, body.root, 0, False, coordinates, speeds, orientation, spin))
         self.placed[index] = 1
 
     def _axis_labels(self) -> tuple[str, ...]:

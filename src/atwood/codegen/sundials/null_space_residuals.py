@@ -10,30 +10,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.sundials.null_space import ATTENTION, FIELDS, LIMIT, RATE, LoopShape, loop_text
+from atwood.codegen.sundials.null_space import ATTENTION, FIELDS, LIMIT, RATE, NullSpaceShape, null_space_text
 from atwood.codegen.sundials.text import SundialsLayout, sundials_layout
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
 
-__all__ = ["LoopCallbacks", "LoopData", "compile_loop_callbacks"]
+__all__ = ["NullSpaceCallbacks", "NullSpaceData", "compile_null_space_callbacks"]
 
 
 _PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 _EXPORTS = ("ida_residual", "ida_jacobian", "ida_weights")
 
 
-def compile_loop_callbacks(
+def compile_null_space_callbacks(
     stack: Program,
     derivatives: Program,
-    slope: tuple[ArrayLike, ArrayLike],
+    jacobian: tuple[ArrayLike, ArrayLike],
     pattern: tuple[ArrayLike, ArrayLike],
-    shape: LoopShape,
+    shape: NullSpaceShape,
     sparse: bool = False,
     *,
     cache: bool = True,
     layout: SundialsLayout | None = None,
-) -> LoopCallbacks:
+) -> NullSpaceCallbacks:
     """Compile what the reduced form of a mechanism with loops is made of to functions that IDA calls.
 
     Parameters
@@ -42,7 +42,7 @@ def compile_loop_callbacks(
         Program of (t, y, y') with kinematic rows, balances, constraints, their rates, and their slopes.
     derivatives
         Program of (t, y, y', cj, multipliers) with the entries of the derivatives of all but the slopes.
-    slope, pattern
+    jacobian, pattern
         Row and column of each slope, and of each derivative.
     shape
         How many there are of each.
@@ -58,17 +58,19 @@ def compile_loop_callbacks(
     UsageError
         If the programs have other inputs or outputs than these.
     """
-    slope_rows, slope_columns, rows, columns = (np.asarray(x, dtype=np.int64).ravel() for x in (*slope, *pattern))
-    _check(stack, [1, shape.size, shape.size], shape.stack + len(slope_rows))
+    jacobian_rows, jacobian_columns, rows, columns = (
+        np.asarray(x, dtype=np.int64).ravel() for x in (*jacobian, *pattern)
+    )
+    _check(stack, [1, shape.size, shape.size], shape.stack + len(jacobian_rows))
     _check(derivatives, [1, shape.size, shape.size, 1, shape.rates], len(rows))
-    placed = np.concatenate([np.arange(shape.stack), shape.stack + slope_rows * shape.speeds + slope_columns])
+    placed = np.concatenate([np.arange(shape.stack), shape.stack + jacobian_rows * shape.speeds + jacobian_columns])
     parts = [
         Part("residual", stack, tuple(placed.tolist())),
         Part("jacobian", derivatives, tuple((columns * shape.stack + rows).tolist())),
     ]
-    more = loop_text(layout or sundials_layout(), shape, sparse)
+    more = null_space_text(layout or sundials_layout(), shape, sparse)
     built = build_code(parts, default_options(parts), more=more, exports=_EXPORTS, cached=cache)
-    return LoopCallbacks(stack, derivatives, shape, built)
+    return NullSpaceCallbacks(stack, derivatives, shape, built)
 
 
 class _Pointers(ctypes.Structure):
@@ -76,7 +78,7 @@ class _Pointers(ctypes.Structure):
 
 
 @dataclass(frozen=True, eq=False)
-class LoopData:
+class NullSpaceData:
     """The user's data of the callbacks of one session; it must live as long as IDA may call.
 
     Attributes
@@ -114,7 +116,7 @@ class LoopData:
         return found
 
 
-class LoopCallbacks:
+class NullSpaceCallbacks:
     """Residual, Jacobian and error weights as IDA calls them, for any choice of dependent coordinates.
 
     Residual and Jacobian return 1 (recoverable) where a value is not finite. The weights return -1, at which IDA
@@ -137,7 +139,7 @@ class LoopCallbacks:
         Whether nothing had to be compiled.
     """
 
-    def __init__(self, stack: Program, derivatives: Program, shape: LoopShape, built: Built) -> None:
+    def __init__(self, stack: Program, derivatives: Program, shape: NullSpaceShape, built: Built) -> None:
         self.programs = {"residual": stack, "jacobian": derivatives}
         self.shape = shape
         self.built = built
@@ -146,7 +148,7 @@ class LoopCallbacks:
             built.code.addresses[name] for name in _EXPORTS
         )
 
-    def bind(self, parameter_values: ArrayLike, choice: ArrayLike, sizes: ArrayLike, limit: float) -> LoopData:
+    def bind(self, parameter_values: ArrayLike, choice: ArrayLike, sizes: ArrayLike, limit: float) -> NullSpaceData:
         """Return the user's data for values of the parameters; each run needs its own.
 
         Parameters
@@ -154,7 +156,7 @@ class LoopCallbacks:
         parameter_values
             The values in the order of the programs' parameters.
         choice
-            Which coordinates are dependent, as the lists that `LoopShape.choice` names.
+            Which coordinates are dependent, as the lists that `NullSpaceShape.choice` names.
         sizes
             The size of each speed.
         limit
@@ -187,7 +189,7 @@ class LoopCallbacks:
         if chosen.shape != (self.shape.choice["end"],) or arrays["sizes"].shape != (self.shape.speeds,):
             raise UsageError("the choice or the sizes have another length than the mechanism")
         pointers = _Pointers(*[arrays[name].ctypes.data for name in FIELDS])
-        return LoopData(ctypes.addressof(pointers), chosen, pointers, arrays)
+        return NullSpaceData(ctypes.addressof(pointers), chosen, pointers, arrays)
 
 
 def _check(program: Program, inputs: Sequence[int], outputs: int) -> None:

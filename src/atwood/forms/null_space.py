@@ -17,18 +17,18 @@ from atwood.forms.program import either_sign, rate_symbols, rows_along_speeds
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["LoopProgram", "loop_program"]
+__all__ = ["NullSpaceProgram", "null_space_program"]
 
 
 @dataclass(frozen=True)
-class LoopProgram:
+class NullSpaceProgram:
     """The stack ``(K, r, g, g')`` and its derivatives, with ``r - G^T lambda`` in the place of r.
 
     Attributes
     ----------
     stack
         Program of (t, y, yp) with the stack, followed by the entries of G: the constraints' rates by the speeds.
-    slope_rows, slope_columns
+    jacobian_rows, jacobian_columns
         Where the entries of G are.
     derivatives
         Program of (t, y, yp, cj, multipliers) with the entries of ``d/dy + cj d/dy'`` of the stack.
@@ -39,8 +39,8 @@ class LoopProgram:
     """
 
     stack: Program
-    slope_rows: IndexArray
-    slope_columns: IndexArray
+    jacobian_rows: IndexArray
+    jacobian_columns: IndexArray
     derivatives: Program
     rows: IndexArray
     columns: IndexArray
@@ -50,9 +50,9 @@ class LoopProgram:
     rates: int
 
 
-def loop_program(
+def null_space_program(
     name: str, equations: Equations, parameters: Collection[Expression], rows: Sequence[Expression]
-) -> LoopProgram:
+) -> NullSpaceProgram:
     """Return what the reduced form of a mechanism with loops is made of.
 
     Parameters
@@ -70,7 +70,7 @@ def loop_program(
     kinematic = rows_along_speeds(equations)
     values = [either_sign(one.value) for one in equations.constraints if one.value is not None]
     speeds = [either_sign(one.rate) for one in equations.constraints]
-    slope = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
+    constraint_jacobian = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
     y = (*equations.coordinates, *equations.speeds)
     yp = (*rates, *equations.accelerations)
     cj = equations.graph.symbol("cj")
@@ -78,11 +78,11 @@ def loop_program(
     found = jacobian([*kinematic, *balanced, *values, *speeds], [{a: 1.0, b: cj} for a, b in zip(y, yp, strict=True)])
     groups = (InputGroup("t", (equations.time,)), InputGroup("y", y), InputGroup("yp", yp))
     more = (InputGroup("cj", (cj,)), InputGroup("multipliers", equations.multipliers))
-    stack = OutputGroup("stack", (*kinematic, *rows, *values, *speeds, *slope.entries))
-    return LoopProgram(
+    stack = OutputGroup("stack", (*kinematic, *rows, *values, *speeds, *constraint_jacobian.entries))
+    return NullSpaceProgram(
         Program(f"{name} residual", groups, tuple(parameters), (stack,)),
-        np.asarray(slope.rows, dtype=np.intp),
-        np.asarray(slope.columns, dtype=np.intp),
+        np.asarray(constraint_jacobian.rows, dtype=np.intp),
+        np.asarray(constraint_jacobian.columns, dtype=np.intp),
         Program(f"{name} Jacobian", (*groups, *more), tuple(parameters), (OutputGroup("entries", found.entries),)),
         np.asarray(found.rows, dtype=np.intp),
         np.asarray(found.columns, dtype=np.intp),

@@ -8,7 +8,7 @@ from math import pi
 from atwood.errors import UsageError, suggestion
 from atwood.late import dataclass
 
-__all__ = ["ORIENTATIONS", "Chart", "Orientation", "check_orientation"]
+__all__ = ["ORIENTATIONS", "Orientation", "OrientationCoordinates", "check_orientation"]
 
 _EULER = tuple(f"euler-{a}{b}{c}" for a, b, c in product("xyz", repeat=3) if a != b != c)
 
@@ -25,7 +25,7 @@ class Orientation:
     kind
         One of `ORIENTATIONS`.
     turned
-        With Euler angles: the bodies whose angles are measured from the second base (see `Chart.base`).
+        With Euler angles: the bodies whose angles are measured from the second base (`OrientationCoordinates.base`).
     """
 
     kind: str = "quaternion"
@@ -33,7 +33,7 @@ class Orientation:
 
 
 @dataclass(frozen=True)
-class Chart:
+class OrientationCoordinates:
     """Coordinates of an orientation, whose rates are not the speeds that belong to them.
 
     The size of a quaternion means nothing, nor that of a direction: everything that is computed from them is the same

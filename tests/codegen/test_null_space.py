@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from atwood.codegen.llvm.routine import Routine
-from atwood.codegen.sundials.loop_residuals import compile_loop_callbacks
-from atwood.codegen.sundials.null_space import LoopShape
+from atwood.codegen.sundials.null_space import NullSpaceShape
+from atwood.codegen.sundials.null_space_residuals import compile_null_space_callbacks
 from atwood.codegen.sundials.residuals import JACOBIAN_TYPE, RESIDUAL_TYPE, WEIGHTS_TYPE
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.forms.loops import loop_program
+from atwood.forms.null_space import null_space_program
 from atwood.integrators.ida import library as sundials_library
-from atwood.simulation.dynamics.partitioning import POOR, choose_dependent
-from atwood.simulation.problem.partition_arrays import choice_lists, loop_shape
+from atwood.simulation.dynamics.partitioning import POOR, choose_dependent_coordinates
+from atwood.simulation.problem.partition_arrays import choice_lists, null_space_shape
 from atwood_library.scenes import FourBar, SliderCrank
 
 from ..helpers.mechanisms import double_four_bar, two_four_bars
@@ -33,16 +33,16 @@ SCENES = {
 
 
 def made_of(assembly):
-    return loop_program("loops", assembly.equations, assembly.parameters, assembly.rows)
+    return null_space_program("loops", assembly.equations, assembly.parameters, assembly.rows)
 
 
 def compiled_of(program, sparse=False):
-    return compile_loop_callbacks(
+    return compile_null_space_callbacks(
         program.stack,
         program.derivatives,
-        (program.slope_rows, program.slope_columns),
+        (program.jacobian_rows, program.jacobian_columns),
         (program.rows, program.columns),
-        loop_shape(program),
+        null_space_shape(program),
         sparse=sparse,
         cache=False,
     )
@@ -128,7 +128,7 @@ def test_one_kernel_gives_the_rows_of_every_choice(sundials, name, sparse):
     random = np.random.default_rng(5)
     y = np.concatenate([prepared.q, prepared.u]) + 0.1 * random.standard_normal(2 * n)
     yp = random.standard_normal(2 * n)
-    slope = plan.balance.at(0.3, y[:n], y[n:]).slope
+    slope = plan.balance.at(0.3, y[:n], y[n:]).jacobian
     choices = good_choices(slope, plan.sizes)[:6]
     assert len(choices) >= 2
     data = compiled.bind(assembly.parameter_values, choice_lists(program, choices[0]), plan.sizes, POOR)
@@ -155,9 +155,9 @@ def test_a_poor_choice_asks_for_attention_once(sundials):
     plan, program = prepared.plan, made_of(prepared.assembly)
     compiled = compiled_of(program)
     y = np.concatenate([prepared.q, prepared.u])
-    slope = plan.balance.at(0.0, prepared.q, prepared.u).slope
+    slope = plan.balance.at(0.0, prepared.q, prepared.u).jacobian
     n = program.coordinates
-    best = choose_dependent(slope, plan.sizes)
+    best = choose_dependent_coordinates(slope, plan.sizes)
     data = compiled.bind(prepared.assembly.parameter_values, choice_lists(program, best), plan.sizes, POOR)
     data.set_weights(np.full(2 * n, 1e-3), np.full(2 * n, 1e-6))
     caller = Caller(sundials, compiled, data, 2 * n, False)
@@ -219,20 +219,20 @@ def test_wrong_sizes_are_refused():
     with pytest.raises(UsageError, match="another length"):
         compiled.bind(values, lists[:-1], sizes, POOR)
     with pytest.raises(UsageError, match="input groups"):
-        compile_loop_callbacks(
+        compile_null_space_callbacks(
             program.stack,
             program.stack,
-            (program.slope_rows, program.slope_columns),
+            (program.jacobian_rows, program.jacobian_columns),
             (program.rows, program.columns),
-            loop_shape(program),
+            null_space_shape(program),
         )
 
 
 def test_counts_of_coordinates_and_speeds_are_apart():
-    shape = LoopShape(coordinates=7, speeds=6, values=3, rates=2)
+    shape = NullSpaceShape(coordinates=7, speeds=6, values=3, rates=2)
     assert (shape.size, shape.stack, shape.free) == (13, 18, 4)
     assert shape.choice["end"] == 13 + 4 + 4 + 2 + 2 + 3 + 1
-    assert shape.work["slope"] == 18
+    assert shape.work["jacobian"] == 18
 
 
 def call(text, name, *arguments):

@@ -6,30 +6,30 @@ import weakref
 from collections.abc import Callable
 from dataclasses import field
 
-from atwood.codegen.sundials.loop_residuals import LoopCallbacks, LoopData, compile_loop_callbacks
-from atwood.forms.loops import LoopProgram
+from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks, NullSpaceData, compile_null_space_callbacks
+from atwood.forms.null_space import NullSpaceProgram
 from atwood.integrators.protocol import FloatArray, LinearSolver, NativeCallbacks
 from atwood.late import dataclass
 from atwood.simulation.dynamics.partitioning import POOR
-from atwood.simulation.problem.partition_arrays import choice_lists, loop_shape
+from atwood.simulation.problem.partition_arrays import choice_lists, null_space_shape
 
-__all__ = ["CompiledLoops", "compile_loops"]
+__all__ = ["CompiledNullSpace", "compile_null_space"]
 
 
-def compile_loops(program: LoopProgram, linear_solver: LinearSolver) -> LoopCallbacks:
+def compile_null_space(program: NullSpaceProgram, linear_solver: LinearSolver) -> NullSpaceCallbacks:
     """Return the compiled functions for a matrix of one kind."""
-    return compile_loop_callbacks(
+    return compile_null_space_callbacks(
         program.stack,
         program.derivatives,
-        (program.slope_rows, program.slope_columns),
+        (program.jacobian_rows, program.jacobian_columns),
         (program.rows, program.columns),
-        loop_shape(program),
+        null_space_shape(program),
         sparse=linear_solver == "sparse",
     )
 
 
 @dataclass
-class CompiledLoops:
+class CompiledNullSpace:
     """The compiled functions of a scene with its parameters, for as many sessions as ask for them.
 
     Attributes
@@ -42,14 +42,14 @@ class CompiledLoops:
         The size of each speed.
     """
 
-    program: LoopProgram
+    program: NullSpaceProgram
     parameter_values: FloatArray
     sizes: FloatArray
-    _sessions: weakref.WeakSet[LoopData] = field(default_factory=weakref.WeakSet)
+    _sessions: weakref.WeakSet[NullSpaceData] = field(default_factory=weakref.WeakSet)
 
     def callbacks(
         self,
-        code: LoopCallbacks,
+        code: NullSpaceCallbacks,
         dependent: tuple[tuple[int, ...], tuple[int, ...]],
         review: Callable[[float, FloatArray], bool],
     ) -> NativeCallbacks:
@@ -58,7 +58,7 @@ class CompiledLoops:
         Parameters
         ----------
         code
-            What `compile_loops` gave.
+            What `compile_null_space` gave.
         dependent
             The choice at first: dependent displacements, and dependent speeds.
         review

@@ -70,8 +70,8 @@ def test_a_row_meets_the_published_values_at_every_tolerance(form: str, rtol: fl
     result = quiet(double_four_bar(), form=form, t_end=10.0, rtol=rtol, solver="ida", outputs=times)
     turned = np.pi / 2.0 - result.array("crank0.angle")
     assert np.max(np.abs(turned - [PUBLISHED[t] for t in times])) < ERROR[rtol]
-    assert len(result.passages) == 10
-    assert {one.ways for one in result.passages} == {2}
+    assert len(result.singular_crossings) == 10
+    assert {one.ways for one in result.singular_crossings} == {2}
     for name in ("crank1", "crank2"):
         assert np.allclose(result.array(f"{name}.angle"), result.array("crank0.angle"), rtol=0.0, atol=1e-9)
     assert np.allclose(result.array("coupler1.angle"), 0.0, atol=1e-9)
@@ -89,8 +89,8 @@ def test_rows_of_other_lengths_and_in_space(form: str, windows: int, space: str,
     result = quiet(FourBarRow(windows=windows, space=space), form=form, t_end=1.6, rtol=rtol)
     angle = 0.5 * np.pi - result["foot[0].angle"]
     assert np.max(np.abs(angle - exact.crank_angle(result.time))) < 3e4 * rtol
-    assert [one.ways for one in result.passages] == [windows, windows]
-    passed = exact.crank_angle(np.array([one.time for one in result.passages]))
+    assert [one.ways for one in result.singular_crossings] == [windows, windows]
+    passed = exact.crank_angle(np.array([one.time for one in result.singular_crossings]))
     assert np.max(np.abs(passed - [0.5 * np.pi, 1.5 * np.pi])) < 1e5 * rtol
 
 
@@ -103,14 +103,14 @@ def test_drift_that_is_projected_away_does_no_harm(windows: int, rtol: float) ->
     result = quiet(FourBarRow(windows=windows), form="dae", level="index1-projected", t_end=10.0, rtol=rtol)
     angle = 0.5 * np.pi - result["foot[0].angle"]
     assert np.max(np.abs(angle - ExactRow(windows).crank_angle(result.time))) < 1e4 * rtol**0.9
-    assert [one.ways for one in result.passages] == 10 * [windows]
+    assert [one.ways for one in result.singular_crossings] == 10 * [windows]
 
 
 @needs_sundials
 def test_a_row_of_forty() -> None:
     result = quiet(FourBarRow(windows=40), t_end=0.9, rtol=1e-11, outputs=3)
     assert abs(0.5 * np.pi - result["foot[0].angle"][-1] - ExactRow(40).crank_angle(0.9)) < 1e-7
-    assert [one.ways for one in result.passages] == [40]
+    assert [one.ways for one in result.singular_crossings] == [40]
 
 
 # -- which way it goes -------------------------------------------------------------------------------------------------
@@ -121,11 +121,11 @@ def test_a_row_of_forty() -> None:
 @pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
 def test_a_parallelogram_stays_one_and_a_crossed_one_stays_crossed(form: str, rtol: float) -> None:
     straight = quiet(four_bar(), form=form, rtol=rtol, t_end=1.0)
-    assert len(straight.passages) == 2
+    assert len(straight.singular_crossings) == 2
     assert np.max(np.abs(straight["coupler.angle"])) < 1e-9
     assert np.max(np.abs(straight["crank.angle"] - straight["rocker.angle"])) < 1e-9
     crossed = quiet(four_bar(crossed=True), form=form, rtol=rtol, t_end=1.0)
-    assert len(crossed.passages) == 2
+    assert len(crossed.singular_crossings) == 2
     # its diagonals are parallel, so that tan(crank/2) : tan(rocker/2) stays what it is, 1 - 2 to 1 + 2
     one, other = 0.5 * crossed["crank.angle"], 0.5 * crossed["rocker.angle"]
     assert np.max(np.abs(3.0 * np.sin(one) * np.cos(other) + np.cos(one) * np.sin(other))) < 1e-9
@@ -139,7 +139,7 @@ def test_a_piston_passes_the_shaft_of_its_crank(form: str, rtol: float) -> None:
     result = quiet(equal_slider_crank(), form=form, rtol=rtol, t_end=3.0)
     crank = result["crank.angle"]
     assert crank[-1] > 1.5 * np.pi
-    assert len(result.passages) == 2
+    assert len(result.singular_crossings) == 2
     assert np.max(np.abs(result["piston.position.x"] - np.cos(crank))) < 1e-9
     # one degree of freedom, by energy: both bars are uniform, the piston moves by cos(crank)
     rate = result["crank.angular_velocity"]
@@ -157,7 +157,7 @@ def test_links_that_nearly_fit_turn_away(form: str, longer: float) -> None:
     # Parallelogram and crossed four-bar come close to each other and do not meet: one motion turns into the other.
     runs = [quiet(four_bar(longer), form=form, rtol=rtol, t_end=0.6) for rtol in (1e-5, 1e-9)]
     for rtol, result in zip((1e-5, 1e-9), runs, strict=True):
-        assert not result.passages
+        assert not result.singular_crossings
         assert abs(result["crank.angle"][-1] - result["rocker.angle"][-1]) > 1.0
         assert result.energy.max_drift < 1e3 * rtol
     assert np.max(np.abs(runs[0]["crank.angle"] - runs[1]["crank.angle"])) < 1e-2
@@ -168,7 +168,7 @@ def test_links_that_nearly_fit_turn_away(form: str, longer: float) -> None:
 def test_lengths_that_fit_within_rounding_are_taken_for_exact_and_this_is_said(form: str) -> None:
     result = quiet(four_bar(2e-11), form=form, rtol=1e-8, t_end=0.6)
     assert np.max(np.abs(result["crank.angle"] - result["rocker.angle"])) < 1e-4
-    assert "lengths fit there to" in result.passages[0].describe()
+    assert "lengths fit there to" in result.singular_crossings[0].describe()
 
 
 @needs_sundials
@@ -179,7 +179,7 @@ def test_both_forms_and_drivers_pass_alike() -> None:
         for solver in ("ida", "ida-sundae")
     ]
     for result in runs:
-        assert len(result.passages) == 1
+        assert len(result.singular_crossings) == 1
         assert abs(result["crank0.angle"][-1] - runs[0]["crank0.angle"][-1]) < 1e-7
 
 
@@ -211,7 +211,7 @@ def test_a_start_near_the_place(form: str, angle: float, rtol: float) -> None:
 def test_turning_back_short_of_the_place(form: str, short: float, rtol: float) -> None:
     scene = parallel_four_bar(2, angle=-1.0, rate=parallelogram_speed(-1.0, -short))
     result = quiet(scene, form=form, rtol=rtol, t_end=0.8)
-    assert not result.passages
+    assert not result.singular_crossings
     assert result["crank0.angle"][-1] < -0.6
     assert np.max(np.abs(result["crank0.angle"] - result["crank1.angle"])) < 1e-8
     assert np.max(result["crank0.angle"]) < 0.0
@@ -224,8 +224,8 @@ def test_what_nearly_stops_at_the_place_is_not_told_as_if_it_were_known(form: st
     scene = parallel_four_bar(2, angle=-1.0, rate=parallelogram_speed(-1.0, -1e-6))
     with pytest.warns(UserWarning, match="do not rely on what comes after"):
         result = simulate(scene, form=form, rtol=1e-4, t_end=0.8)
-    assert [one.ways for one in result.passages] == [0]
-    assert "coincidence" in result.passages[0].describe()
+    assert [one.ways for one in result.singular_crossings] == [0]
+    assert "coincidence" in result.singular_crossings[0].describe()
     shown = [one["what"] for one in describe_run(result)["singular_positions"]]
     assert "could not be told" in shown[0]
 
@@ -264,9 +264,9 @@ class Gauge(Component):
 @needs_sundials
 @pytest.mark.parametrize("form", FORMS)
 def test_a_sample_at_the_very_place_is_a_good_one(form: str) -> None:
-    passage = quiet(double_four_bar(), form=form, t_end=1.0, rtol=1e-10).passages[0]
+    crossing = quiet(double_four_bar(), form=form, t_end=1.0, rtol=1e-10).singular_crossings[0]
     exact = ExactRow(2)
-    times = np.array([passage.time - 1e-3, passage.time, passage.time + 1e-3])
+    times = np.array([crossing.time - 1e-3, crossing.time, crossing.time + 1e-3])
     scene = double_four_bar()
     gauge = scene.add("gauge", Gauge())
     scene.connect(scene["crank1"].b, gauge.point)
@@ -285,14 +285,14 @@ def test_a_sample_at_the_very_place_is_a_good_one(form: str) -> None:
 @needs_sundials
 def test_outputs_do_not_change_what_is_passed_through() -> None:
     few, many = (quiet(double_four_bar(), t_end=3.0, rtol=1e-9, outputs=number) for number in (2, 1501))
-    assert [one.time for one in few.passages] == [one.time for one in many.passages]
+    assert [one.time for one in few.singular_crossings] == [one.time for one in many.singular_crossings]
     assert few["crank0.angle"][-1] == many["crank0.angle"][-1]
 
 
 @needs_sundials
 def test_what_was_passed_is_said() -> None:
     result = quiet(double_four_bar(), t_end=1.0)
-    said = result.passages[0].describe()
+    said = result.singular_crossings[0].describe()
     assert "passed through a singular position" in said
     assert "2 more ways to move" in said
     assert "coincidence" in said

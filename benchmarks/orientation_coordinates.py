@@ -65,7 +65,11 @@ def measure(name: str, solver: str, repeat: int, rtols: Sequence[float]) -> dict
         seconds = best_of({kind: timed(kind) for kind in KINDS}, repeat + 1)
         for kind, result in last.items():
             curves[kind].append((float(np.max(np.abs(axes_at_end(result, body) - exact(name)))), seconds[kind]))
-            seen[kind] = (result.run.segments[0].plan.program.size, result.statistics.steps, len(result.restated))
+            seen[kind] = (
+                result.run.segments[0].plan.program.size,
+                result.statistics.steps,
+                len(result.coordinate_switches),
+            )
     return {"case": name, "solver": solver, "curves": curves, "states, steps, restated": seen}
 
 

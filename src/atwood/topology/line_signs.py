@@ -12,10 +12,10 @@ from atwood.model.values.vector import Vector, dot
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
-__all__ = ["find_sides"]
+__all__ = ["find_line_signs"]
 
 
-def find_sides(
+def find_line_signs(
     flat: FlatScene,
     mechanism: MechanismGraph,
     bodies: Bodies,
