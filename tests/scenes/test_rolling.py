@@ -359,3 +359,27 @@ def test_a_cart_straightens_like_a_sleigh() -> None:
     assert np.max(np.abs(made["cart.angular_velocity.z"] - exact[1])) < 1e-7
     forward = 0.1 * (made["left.bearing.angular_velocity"] + made["right.bearing.angular_velocity"])
     assert np.max(np.abs(forward - exact[0])) < 1e-7
+
+
+@pytest.mark.parametrize("level", ["ggl", "index1-projected"])
+def test_a_wheel_that_rolls_on_a_body_and_is_pinned_to_it_turns_with_it(level: str) -> None:
+    """Contact, rolling and pin hold the wheel four ways; which of them are better kept changes as all turns."""
+    scene = Scene(space="plane")
+    base, wheel = (scene.add(name, lib.RigidBody(mass=1.0, moments=(0.3, 0.3, 0.3))) for name in ("base", "wheel"))
+    contact, pin = scene.add("contact", lib.RollingDisc(radius=0.5)), scene.add("pin", lib.Pivot())
+    on_base = scene.add("on_base", lib.Weld(displacement=(0.3, 0.0, 0.9)))
+    on_wheel = scene.add("on_wheel", lib.Weld(displacement=(0.3, 0.0, 0.4)))
+    ends: list[tuple[Any, Any]] = [
+        (base, contact.a),
+        (contact.b, wheel),
+        (base, on_base.a),
+        (wheel, on_wheel.a),
+        (on_base.b, pin.a),
+    ]
+    for a, b in [*ends, (on_wheel.b, pin.b)]:
+        scene.connect(getattr(a, "frame", a), getattr(b, "frame", b))
+    scene.guess["wheel.position.z"] = 0.5
+    scene.start["base.angular_speed"] = 3.0
+    result = simulate(scene, form="dae", level=level, t_end=2.0, outputs=21, rtol=1e-8)
+    for body in ("base", "wheel"):
+        assert np.max(np.abs(result.array(f"{body}.angle") - 3.0 * result.time)) < 1e-5

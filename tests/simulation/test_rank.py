@@ -90,7 +90,7 @@ def test_the_first_are_kept_but_not_those_that_hardly_change() -> None:
     assert independent_rows(strong, 1e-15 * np.ones(3)) == [0, 2]
     weak = np.array([[1e-6, 0.0], [1.0, 0.0], [0.0, 1.0]])  # all three from terms of size one
     assert independent_rows(weak, 4e-15 * np.ones(3)) == [1, 2]
-    assert independent_rows(weak, 4e-15 * np.ones(3), before=1) == [0, 2]
+    assert independent_rows(weak, 4e-15 * np.ones(3), first=np.array([True, False, False])) == [0, 2]
 
 
 def test_no_more_than_asked_for() -> None:
@@ -199,3 +199,12 @@ def test_ways_of_rounding_are_the_same_each_time_and_differ() -> None:
     assert np.all(np.abs(np.mean(signs, axis=0)) < 0.3)
     alike = np.abs(signs.T @ signs) / len(signs) - np.eye(WAYS)
     assert np.max(alike) < 0.4
+
+
+def test_a_constraint_on_velocities_takes_no_place_of_one_on_positions() -> None:
+    """The second row takes the first ten times, but may not: a position that is not held would drift."""
+    rows, exact = np.array([[0.1, 0.0], [1.0, 0.0], [0.0, 1.0]]), 4e-15 * np.ones(3)
+    positions = np.array([True, False, False])
+    assert review_rows(rows, exact, [0, 2]) == [1, 2]
+    assert review_rows(rows, exact, [0, 2], positions) == [0, 2]
+    assert independent_rows(rows, exact, first=positions) == [0, 2]

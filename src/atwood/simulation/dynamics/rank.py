@@ -128,7 +128,9 @@ def _at_least(errors: FloatArray, sizes: FloatArray) -> FloatArray:
     return np.maximum(errors, ROUGHNESS * sizes)  # what is exact now is not known to be so
 
 
-def independent_rows(matrix: Matrix, errors: FloatArray, most: int | None = None, before: int = 0) -> list[int]:
+def independent_rows(
+    matrix: Matrix, errors: FloatArray, most: int | None = None, first: NDArray[np.bool_] | None = None
+) -> list[int]:
     """Return the numbers of independent rows, as many as there are, and rather the first than the last ones.
 
     Parameters
@@ -139,8 +141,8 @@ def independent_rows(matrix: Matrix, errors: FloatArray, most: int | None = None
         How far rounding can take each row, in the same units.
     most
         How many to return at most.
-    before
-        So many rows come before all others, even if these would make a better choice.
+    first
+        Which rows come before all others, even if these would make a better choice.
     """
     errors = _at_least(errors, row_sizes(matrix, np.ones(matrix.shape[1])))
     if not is_full(matrix):
@@ -150,16 +152,16 @@ def independent_rows(matrix: Matrix, errors: FloatArray, most: int | None = None
     # In these units a row of the size of the terms that it was computed from has size one.
     units = np.where(errors > 0.0, errors / ROUGHNESS, 1.0)
     most = min(matrix.shape) if most is None else min(*matrix.shape, most)
-    return _chosen(matrix / units[:, None], errors / units, most, before)
+    return _chosen(matrix / units[:, None], errors / units, most, first)
 
 
-def _chosen(rows: FloatArray, errors: FloatArray, most: int, before: int) -> list[int]:
+def _chosen(rows: FloatArray, errors: FloatArray, most: int, first: NDArray[np.bool_] | None) -> list[int]:
     """Return the rows that Gram and Schmidt's method keeps, each time one of those of which most is left."""
     left = rows.copy()
     sizes = np.linalg.norm(left, axis=1)
     chosen: list[int] = []
     basis = np.empty((most, rows.shape[1]))
-    is_open, is_first = np.ones(len(rows), dtype=bool), np.arange(len(rows)) < before
+    is_open, is_first = np.ones(len(rows), dtype=bool), np.zeros(len(rows), dtype=bool) if first is None else first
     while len(chosen) < most:
         bounds = CERTAIN * errors
         largest = float(np.max(sizes, where=is_open, initial=0.0))
@@ -183,7 +185,9 @@ def _chosen(rows: FloatArray, errors: FloatArray, most: int, before: int) -> lis
     return sorted(chosen)
 
 
-def review_rows(matrix: Matrix, errors: FloatArray, kept: Sequence[int]) -> list[int]:
+def review_rows(
+    matrix: Matrix, errors: FloatArray, kept: Sequence[int], first: NDArray[np.bool_] | None = None
+) -> list[int]:
     """Return a better choice of independent rows if a choice has become poor, else the same one.
 
     A choice is good if what the other rows are made of takes no row of it many times, each measured by the terms that
@@ -197,6 +201,8 @@ def review_rows(matrix: Matrix, errors: FloatArray, kept: Sequence[int]) -> list
         How far rounding can take each row; see `independent_rows`.
     kept
         The choice.
+    first
+        Rows that come before all others, which take no place of these; see `independent_rows`.
     """
     chosen = list(kept)
     others = [i for i in range(matrix.shape[0]) if i not in set(chosen)]
@@ -208,8 +214,10 @@ def review_rows(matrix: Matrix, errors: FloatArray, kept: Sequence[int]) -> list
         made_of = _made_of(rows[chosen], rows[others])
         left = to_array(rows[others]) - made_of @ to_array(rows[chosen])
         if not np.max(np.abs(left), initial=0.0) <= _LOOK:  # the choice itself is not independent here
-            return independent_rows(matrix, errors, len(kept))
+            return independent_rows(matrix, errors, len(kept), first)
         weights = np.abs(made_of)
+        if first is not None:
+            weights[np.outer(~first[others], first[chosen])] = 0.0
         this, that = np.unravel_index(int(np.argmax(weights)), weights.shape)
         if weights[this, that] <= bound:
             break

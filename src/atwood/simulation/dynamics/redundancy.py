@@ -127,7 +127,7 @@ def review_kept(finding: RankFinding, balance: Balance, t: float, q: FloatArray,
     if not finding.redundant or not finding.kept:
         return finding
     jacobian = scaled(balance.constraints_at(t, q, np.zeros_like(scales)).jacobian, scales)
-    kept = tuple(review_rows(jacobian, finding.errors, finding.kept))
+    kept = tuple(review_rows(jacobian, finding.errors, finding.kept, _holding(balance)))
     if kept == finding.kept or len(kept) < len(finding.kept):  # at a singular position no choice is a good one
         return finding
     redundant = tuple(i for i in range(balance.constraints) if i not in set(kept))
@@ -168,8 +168,14 @@ def kept_along(
 def _look(balance: Balance, t: float, q: FloatArray, scales: FloatArray, miss: float = 0.0) -> _Place:
     jacobian = scaled(balance.constraints_at(t, q, np.zeros_like(scales)).jacobian, scales)
     errors = balance.errors.of_jacobian(t, q, scales, miss)
-    kept = independent_rows(jacobian, errors)
+    # What holds positions comes first: then a constraint on velocities alone is never kept in place of one.
+    kept = independent_rows(jacobian, errors, first=_holding(balance))
     return _Place(to_array(jacobian), errors, kept)
+
+
+def _holding(balance: Balance) -> NDArray[np.bool_]:
+    """Return which constraints hold positions."""
+    return np.isin(np.arange(balance.constraints), balance.holonomic)
 
 
 def _nearby(balance: Balance, t: float, q: FloatArray, scales: FloatArray, here: _Place) -> tuple[list[_Place], bool]:

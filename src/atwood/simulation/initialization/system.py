@@ -185,7 +185,7 @@ def counted(
     """
     if 0 in matrix.shape:
         return tuple(names), ()
-    kept = independent_rows(matrix, errors, before=constraints)
+    kept = independent_rows(matrix, errors, first=np.arange(matrix.shape[0]) < constraints)
     repeated = tuple(t.path for i, t in enumerate(fixed, start=constraints) if i not in set(kept))
     if len(kept) == matrix.shape[1]:
         return (), repeated
