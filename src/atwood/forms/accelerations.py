@@ -14,7 +14,8 @@ coordinates, in terms of which everything is written.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from dataclasses import fields
+from typing import TYPE_CHECKING, Literal, cast
 
 from atwood.errors import AtwoodError
 from atwood.expr import (
@@ -28,6 +29,7 @@ from atwood.expr import (
     substitute,
 )
 from atwood.expr.simplify.collect import cost
+from atwood.forms.derived import derive_once
 from atwood.forms.places import to_maximal
 from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.late import dataclass
@@ -104,19 +106,38 @@ def acceleration_program(assembly: Assembly, method: Method | None = None) -> Ac
     equations = assembly.reduced
     if equations.constraints:
         return None
-    best: tuple[int, Method, list[Expression]] | None = None
-    for name, found in _candidates(assembly, method):
-        price = _price(found, assembly.parameters)
-        if best is None or price < best[0]:
-            best = price, name, found
-    if best is None:
+    tree = _is_tree(assembly) if equations.speeds and method in _OF_TREES else False
+    read = _read(equations), _read(assembly.maximal) if tree else None, assembly.parameters, method
+    word, found = derive_once("accelerations", equations.graph, read, lambda: _cheapest(assembly, method, tree))
+    if not word:
         return None
     groups = state_groups(equations)
     title = f"{assembly.flat.name} (accelerations)"
-    outputs: tuple[OutputGroup, ...] = (OutputGroup("accelerations", tuple(best[2])),)
+    outputs: tuple[OutputGroup, ...] = (OutputGroup("accelerations", tuple(found)),)
     if not rates_are_speeds(equations):
         outputs = (OutputGroup("rates", equations.rates), *outputs)
-    return AccelerationProgram(Program(title, groups, assembly.parameters, outputs), best[1])
+    return AccelerationProgram(Program(title, groups, assembly.parameters, outputs), cast("Method", word))
+
+
+_OF_TREES = (None, "joint forces", "leaves to root")
+
+_NOT_READ = ("locals_", "site", "masses", "shapes")
+"""What equations were made of; their derivation reads what was made."""
+
+
+def _read(equations: Equations) -> list[object]:
+    """Return all of equations that their derivation can read."""
+    return [getattr(equations, one.name) for one in fields(equations) if one.name not in _NOT_READ]
+
+
+def _cheapest(assembly: Assembly, method: Method | None, is_tree: bool) -> tuple[str, list[Expression]]:
+    """Return the method whose accelerations cost least, and these; an empty word where none applies."""
+    best: tuple[int, Method, list[Expression]] | None = None
+    for name, found in _candidates(assembly, method, is_tree):
+        price = _price(found, assembly.parameters)
+        if best is None or price < best[0]:
+            best = price, name, found
+    return ("", []) if best is None else best[1:]
 
 
 def _price(values: Sequence[Expression], parameters: Sequence[Expression]) -> int:
@@ -130,14 +151,14 @@ def _waves(values: Sequence[Expression], in_pairs: bool = False) -> int:
     return len({wave.arguments[0] for wave in waves}) if in_pairs else len(waves)
 
 
-def _candidates(assembly: Assembly, method: Method | None) -> Iterator[tuple[Method, list[Expression]]]:
+def _candidates(assembly: Assembly, method: Method | None, is_tree: bool) -> Iterator[tuple[Method, list[Expression]]]:
     """Yield the accelerations in the ways that apply."""
     equations = assembly.reduced
     if not equations.speeds:
         yield "mass matrix", []
         return
     tree: _Tree | None = None
-    if method in (None, "joint forces", "leaves to root") and _is_tree(assembly):
+    if is_tree:
         tree = _Tree(assembly)
         for name, order in tree.orders():
             for differences in (True, False) if method in (None, name) else ():

@@ -17,6 +17,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.core.relations import Relation, values_just_after
 from atwood.expr.simplify.collect import collect
 from atwood.forms.dae import dae_form, keep_constraints
+from atwood.forms.derived import derive_once
 from atwood.forms.places import with_reactions
 from atwood.forms.program import (
     BalanceProgram,
@@ -149,7 +150,11 @@ class Assembly:
         if len(equations.coordinates) > _BY_HAND or equations.solved_speeds:
             return list(rows)
         angles = [q for q, c in zip(equations.coordinates, equations.names, strict=True) if c.unit == "rad"]
-        return collect(list(rows), angles, self.parameters)
+        read = tuple(rows), tuple(angles), self.parameters
+        _, found = derive_once(
+            "rows", equations.graph, read, lambda: ("", collect(list(rows), angles, self.parameters))
+        )
+        return found
 
     # -- parameters -----------------------------------------------------------------------------------------------
 

@@ -293,6 +293,23 @@ class Graph:
             return value
         return self.constant(value)
 
+    def recorded(self, start: int) -> list[tuple[Any, ...]]:
+        """Return what makes the nodes from a place on: operation, places of arguments, payload, whether parametric."""
+        return [
+            (node.operation, tuple(a.index for a in node.arguments), node.payload, node.is_parametric)
+            for node in self.nodes[start:]
+        ]
+
+    def replay(self, record: list[tuple[Any, ...]]) -> None:
+        """Add the nodes that `recorded` gave, to a graph that is as it was when they were made."""
+        nodes = self.nodes
+        for operation, places, payload, is_parametric in record:
+            if operation == "constant":
+                self.constant(payload)
+                continue
+            arguments = tuple(nodes[place] for place in places)
+            self._insert((operation, arguments, payload), operation, arguments, payload, is_parametric)
+
     def _insert(
         self,
         key: tuple[Any, ...],

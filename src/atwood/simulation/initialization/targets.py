@@ -137,7 +137,9 @@ def _later_symbols(assembly: Assembly, equations: Equations) -> tuple[frozenset[
 
 def _is_linear(value: Expression, speeds: Sequence[Expression]) -> bool:
     """Return whether an expression is linear in the speeds: its derivative along them does not depend on them."""
-    directions: dict[Expression, Expression | float] = {u: u.graph.symbol(f"direction:{u.name}") for u in speeds}
+    directions: dict[Expression, Expression | float] = {}
+    for u in sorted(speeds, key=lambda u: u.index):  # new nodes come in the same order in every process
+        directions[u] = u.graph.symbol(f"direction:{u.name}")
     return value.is_symbol or not depends_on(jvp([value], directions)[0], speeds)
 
 

@@ -1,0 +1,144 @@
+"""Derivations that are kept on disk: rewriting equations as by hand, and solving them for accelerations.
+
+A derivation reads expressions and adds nodes to their graph. What it adds depends on the whole graph, since products
+meet products that are there already; on what it reads; and on its code. All of that is the name of its entry, so a
+change of any of it is another entry. What is kept are the nodes themselves in their order, so that the graph is
+afterwards just as if they had been derived.
+"""
+
+from __future__ import annotations
+
+import marshal
+import pickle
+import platform
+import sys
+from collections.abc import Callable, Sequence
+from functools import cache
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from atwood.codegen.cache import default_cache, make_key
+from atwood.errors import UnsupportedError
+from atwood.expr import Expression, Graph
+
+__all__ = ["SOURCES", "derivation_key", "derive_once", "hash_of_sources"]
+
+_FORMAT = 1
+"""Counts changes to what an entry holds."""
+
+SOURCES = ("expr", "forms", "mechanics")
+"""The rooms whose code derives; what other rooms give is read as expressions."""
+
+_LARGEST = 200_000
+"""Graphs of more nodes are derived anew: their entries would fill the cache."""
+
+_PLAIN = 2
+"""The format of `marshal` that writes equal values equally, whoever else refers to them."""
+
+
+def derive_once(
+    what: str, graph: Graph, read: object, derive: Callable[[], tuple[str, Sequence[Expression]]]
+) -> tuple[str, list[Expression]]:
+    """Return what a derivation gives, from the cache if the same was derived before.
+
+    Parameters
+    ----------
+    what
+        Names the derivation.
+    graph
+        The graph to which it adds.
+    read
+        All that it reads: expressions, numbers and texts, in tuples, mappings and dataclasses.
+    derive
+        Derives it; returns a word and expressions.
+    """
+    store = default_cache()
+    key = None if store is None else derivation_key(what, graph, read)
+    if store is None or key is None:
+        word, values = derive()
+        return word, list(values)
+    found = store.read(key)
+    if found is not None:
+        word, added, places = marshal.loads(found)
+        graph.replay(added)
+        return word, [graph.nodes[place] for place in places]
+    before, relations = len(graph), _relations(graph)
+    word, values = derive()
+    content = _written((word, graph.recorded(before), [value.index for value in values]))
+    if content is not None and relations == _relations(graph):
+        store.write(key, content)
+    return word, list(values)
+
+
+def derivation_key(what: str, graph: Graph, read: object) -> str | None:
+    """Return the name of an entry; None where functions of Python are in the graph, whose code no name tells."""
+    if len(graph) > _LARGEST:
+        return None
+    nodes, described = _written(graph.recorded(0)), _described(read)
+    if nodes is None or described is None:
+        return None
+    versions = (sys.version, sys.platform, platform.machine())
+    return make_key([_FORMAT, what, versions, hash_of_sources(), sha256(nodes).digest(), described])
+
+
+@cache
+def hash_of_sources(root: Path = Path(__file__).parents[1]) -> str:
+    """Return a hash of all code that derives.
+
+    Parameters
+    ----------
+    root
+        The folder of the package.
+
+    Raises
+    ------
+    UnsupportedError
+        If it cannot be read: what another version derived could then be taken for what this one would.
+    """
+    total = sha256()
+    for room in SOURCES:
+        files = sorted((root / room).rglob("*.py"))
+        if not files:
+            raise UnsupportedError(
+                "the sources cannot be read",
+                where=f"atwood.{room}",
+                advice="Install atwood with its sources, or switch the cache off: ATWOOD_CACHE=0.",
+            )
+        for file in files:
+            total.update(b"%s %d\n" % (file.name.encode(), file.stat().st_size) + file.read_bytes())
+    return total.hexdigest()
+
+
+class _Pickler(pickle.Pickler):
+    """Writes expressions as their places in the graph, and sets in an order that is always the same."""
+
+    def persistent_id(self, value: Any) -> Any:
+        if isinstance(value, Expression):
+            return value.index
+        if isinstance(value, (set, frozenset)):
+            return sorted(marshal.dumps(one, _PLAIN) for one in value)
+        return "graph" if isinstance(value, Graph) else None
+
+
+def _described(read: object) -> bytes | None:
+    made = BytesIO()
+    pickler = _Pickler(made, protocol=5)
+    pickler.fast = True  # equal values are written equally, whether or not they are one object
+    try:
+        pickler.dump(read)
+    except (pickle.PicklingError, TypeError, ValueError, AttributeError):
+        return None
+    return sha256(made.getvalue()).digest()
+
+
+def _written(data: Any) -> bytes | None:
+    try:
+        return marshal.dumps(data, _PLAIN)
+    except ValueError:
+        return None
+
+
+def _relations(graph: Graph) -> int:
+    return 0 if graph.relations is None else len(graph.relations.found)
