@@ -9,6 +9,12 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from atwood_library.fields.charge import Charge as Charge
+    from atwood_library.fields.coordinate_lagrangian import CoordinateLagrangian as CoordinateLagrangian
+    from atwood_library.fields.lorentz_force import LorentzForce as LorentzForce
+    from atwood_library.fields.mutual_potential import MutualPotential as MutualPotential
+    from atwood_library.fields.pair_potential import PairPotential as PairPotential
+    from atwood_library.fields.potential import Potential as Potential
     from atwood_library.forces.bushing import Bushing as Bushing
     from atwood_library.forces.central_gravity import CentralGravity as CentralGravity
     from atwood_library.forces.damper import Damper as Damper
@@ -27,8 +33,11 @@ if TYPE_CHECKING:
     from atwood_library.joints.planar import Planar as Planar
     from atwood_library.joints.planetary_gear import PlanetaryGear as PlanetaryGear
     from atwood_library.joints.point_on_circle import PointOnCircle as PointOnCircle
+    from atwood_library.joints.point_on_curve import PointOnCurve as PointOnCurve
+    from atwood_library.joints.point_on_level_surface import PointOnLevelSurface as PointOnLevelSurface
     from atwood_library.joints.point_on_line import PointOnLine as PointOnLine
     from atwood_library.joints.point_on_plane import PointOnPlane as PointOnPlane
+    from atwood_library.joints.point_on_surface import PointOnSurface as PointOnSurface
     from atwood_library.joints.rack_and_pinion import RackAndPinion as RackAndPinion
     from atwood_library.joints.rolling_disc import RollingDisc as RollingDisc
     from atwood_library.joints.rolling_sphere import RollingSphere as RollingSphere
@@ -73,8 +82,10 @@ _MODULES = {
     "Box": "parts.box",
     "Bushing": "forces.bushing",
     "CentralGravity": "forces.central_gravity",
+    "Charge": "fields.charge",
     "Cone": "parts.cone",
     "ConstantVelocity": "joints.constant_velocity",
+    "CoordinateLagrangian": "fields.coordinate_lagrangian",
     "Cylinder": "parts.cylinder",
     "Cylindrical": "joints.cylindrical",
     "Damper": "forces.damper",
@@ -89,17 +100,24 @@ _MODULES = {
     "Gear": "joints.gear",
     "Ground": "parts.ground",
     "Link": "parts.link",
+    "LorentzForce": "fields.lorentz_force",
     "Mass1D": "parts.mass_1d",
     "MeshBody": "parts.mesh_body",
+    "MutualPotential": "fields.mutual_potential",
     "OrientationSensor": "sensors.orientation_sensor",
+    "PairPotential": "fields.pair_potential",
     "Pivot": "joints.pivot",
     "Planar": "joints.planar",
     "PlanetaryGear": "joints.planetary_gear",
     "PointMass": "parts.point_mass",
     "PointOnCircle": "joints.point_on_circle",
+    "PointOnCurve": "joints.point_on_curve",
+    "PointOnLevelSurface": "joints.point_on_level_surface",
     "PointOnLine": "joints.point_on_line",
     "PointOnPlane": "joints.point_on_plane",
+    "PointOnSurface": "joints.point_on_surface",
     "PositionSensor": "sensors.position_sensor",
+    "Potential": "fields.potential",
     "Pulley": "ropes.pulley",
     "RackAndPinion": "joints.rack_and_pinion",
     "Ramp": "sources.ramp",

@@ -201,7 +201,7 @@ def read_mechanism(
             locals_ = localize(flat, space, time, table, modes, line_signs)
         network = build_graph(flat, locals_)
         bodies = find_bodies(network, locals_)
-    gravity = make_gravity(table, flat.gravity)
+    gravity = make_gravity(table, flat.gravity, flat.gravity_direction)
     told = None if known_line_signs else line_signs
     if any(local.asks for local in locals_.values()):
         carried = inertia_asked_for(network, bodies, locals_, space)

@@ -24,7 +24,7 @@ from atwood.model.values.units import parse_si_unit
 
 ROOT = Path(atwood_library.__file__).parent
 TETRAHEDRON = Path(__file__).parent / "tetrahedron.stl"
-GROUPS = ("forces", "joints", "parts", "ropes", "sensors", "sources")
+GROUPS = ("fields", "forces", "joints", "parts", "ropes", "sensors", "sources")
 
 
 def library_modules() -> list:
@@ -141,7 +141,7 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
     values = {}
     for name, spec in component.parameter_specs().items():
         value = component.parameters()[name]
-        if value is None or spec.integer or spec.choices or spec.text:
+        if value is None or spec.integer or spec.choices or spec.text or spec.function_of:
             values[name] = value
         elif spec.direction:
             values[name] = aw.Vector(*value)

@@ -189,6 +189,8 @@ def test_degrees_of_freedom_and_states() -> None:
         "chain": (10, 20),
         "driven-pendulum": (1, 2),
         "four-bar": (1, 6),
+        "charged-particle": (2, 4),
+        "kepler": (2, 4),
     }
     for name in EVERYDAY:
         equations = assemble(SCENES[name]()).reduced
@@ -200,7 +202,7 @@ def test_degrees_of_freedom_and_states() -> None:
 def test_every_scene_is_a_part_like_any_other(name: str) -> None:
     outer = Scene(space="line", line_axis=(0.0, 0.0, 1.0)) if "atwood" in name else Scene(space="line")
     if name not in ("atwood", "double-atwood", "mass-spring-chain"):
-        outer = Scene()
+        outer = Scene(gravity=SCENES[name]().gravity)
     make = SCENES[name]
     outer.add("inner", make())
     alone = simulate(make(), rtol=1e-8, t_end=0.3, outputs=3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from atwood import (
     Component,
@@ -23,7 +24,7 @@ from atwood import (
 
 
 class Drag(Component):
-    """A drag against the velocity of a point relative to the wind, linear and quadratic in the speed.
+    """A drag against the velocity relative to a wind that may vary, linear and quadratic in the speed.
 
     ``F = -(b + k |w|) w`` with the velocity w relative to the wind, ``k = 1/2 rho A c_d`` (Batchelor, An Introduction
     to Fluid Dynamics, chapter 5). It has one derivative where the point is at rest, which is all that solvers need.
@@ -47,6 +48,13 @@ class Drag(Component):
         size=3,
         doc="Velocity of the medium in world axes; in a plane or on a line, only what lies there.",
     )
+    wind_field: Any = parameter(
+        (0.0, 0.0, 0.0),
+        unit="m/s",
+        size=3,
+        function_of={"x": "m", "y": "m", "z": "m", "t": "s"},
+        doc="Velocity of the medium besides, as a function of place and time.",
+    )
     point: Point = connector(Point, "The point that feels the drag.")
 
     def coefficient(self) -> Scalar:
@@ -57,7 +65,8 @@ class Drag(Component):
 
     def relative_velocity(self) -> Vector:
         """Return the velocity relative to the medium."""
-        wind = as_vector(self.wind)
+        r, field = self.point.position, self.wind_field
+        wind = as_vector(self.wind) + field(r.x, r.y, r.z, self.time)
         if self.on_a_line:
             wind = self.line * dot(wind, self.line)
         elif not self.in_space:

@@ -14,8 +14,11 @@ from atwood import Scene
 
 if TYPE_CHECKING:
     from atwood_library.scenes.atwood import Atwood as Atwood
+    from atwood_library.scenes.bead_on_surface import BeadOnSurface as BeadOnSurface
+    from atwood_library.scenes.bead_on_wire import BeadOnWire as BeadOnWire
     from atwood_library.scenes.bricard import Bricard as Bricard
     from atwood_library.scenes.chain import Chain as Chain
+    from atwood_library.scenes.charged_particle import ChargedParticle as ChargedParticle
     from atwood_library.scenes.double_atwood import DoubleAtwood as DoubleAtwood
     from atwood_library.scenes.double_pendulum import DoublePendulum as DoublePendulum
     from atwood_library.scenes.double_pendulum_3d import DoublePendulum3D as DoublePendulum3D
@@ -28,16 +31,21 @@ if TYPE_CHECKING:
     from atwood_library.scenes.gyroscope import Gyroscope as Gyroscope
     from atwood_library.scenes.heavy_top import HeavyTop as HeavyTop
     from atwood_library.scenes.intermediate_axis import IntermediateAxis as IntermediateAxis
+    from atwood_library.scenes.kepler import Kepler as Kepler
     from atwood_library.scenes.lagrange_top import LagrangeTop as LagrangeTop
     from atwood_library.scenes.mass_spring_chain import MassSpringChain as MassSpringChain
+    from atwood_library.scenes.n_body import NBody as NBody
     from atwood_library.scenes.pendulum_on_cart import PendulumOnCart as PendulumOnCart
     from atwood_library.scenes.rolling_ball import RollingBall as RollingBall
     from atwood_library.scenes.rolling_disc import RollingDisc as RollingDisc
+    from atwood_library.scenes.rotating_hoop_driven import RotatingHoopDriven as RotatingHoopDriven
+    from atwood_library.scenes.rotating_hoop_free import RotatingHoopFree as RotatingHoopFree
     from atwood_library.scenes.simple_pendulum import SimplePendulum as SimplePendulum
     from atwood_library.scenes.slider_crank import SliderCrank as SliderCrank
     from atwood_library.scenes.spatial_slider_crank import SpatialSliderCrank as SpatialSliderCrank
     from atwood_library.scenes.spherical_pendulum import SphericalPendulum as SphericalPendulum
     from atwood_library.scenes.stewart_platform import StewartPlatform as StewartPlatform
+    from atwood_library.scenes.two_body import TwoBody as TwoBody
     from atwood_library.scenes.universal_shaft import UniversalShaft as UniversalShaft
 
 _CLASSES = {
@@ -67,6 +75,14 @@ _CLASSES = {
     "spherical-pendulum": "SphericalPendulum",
     "stewart-platform": "StewartPlatform",
     "universal-shaft": "UniversalShaft",
+    "rotating-hoop-driven": "RotatingHoopDriven",
+    "rotating-hoop-free": "RotatingHoopFree",
+    "charged-particle": "ChargedParticle",
+    "two-body": "TwoBody",
+    "kepler": "Kepler",
+    "n-body": "NBody",
+    "bead-on-wire": "BeadOnWire",
+    "bead-on-surface": "BeadOnSurface",
 }
 """The class of each scene by the name that the command line knows it by."""
 

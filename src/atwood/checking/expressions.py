@@ -70,7 +70,9 @@ def _localized(trial: Trial, mode: str) -> tuple[LocalPart, dict[Expression, flo
     """Return the part on its symbols, and numbers for them."""
     part = Part(trial.part.path, trial.component, trial.part.values, {n: v for n, (v, _) in trial.inputs.items()})
     line = tuple(trial.space.line) if trial.space.line is not None else (1.0, 0.0, 0.0)
-    flat = FlatScene("check", trial.space.name, line, 0.0, 0.0, 1.0, {part.path: part}, (), {}, {}, {})
+    flat = FlatScene(
+        "check", trial.space.name, line, 0.0, (0.0, 0.0, -1.0), None, 0.0, 1.0, {part.path: part}, (), {}, {}, {}
+    )
     graph = Graph()
     time, table = graph.symbol("t"), ParameterTable(graph, space=trial.space.name)
     carried: Any = {(part.path, name): body for name, body in trial.bodies.items()}

@@ -17,6 +17,7 @@ from atwood.late import dataclass
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
 from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.function_values import Function
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.values.rotation import Rotation
 from atwood.model.values.units import Exponents, parse_unit
@@ -124,7 +125,9 @@ def _bound(trial: Trial, units: Units) -> Any:
     values: dict[str, Any] = {}
     for name, spec in component.parameter_specs().items():
         value, size = trial.values[name], units.of(spec.unit.exponents)
-        if isinstance(value, Vector):
+        if isinstance(value, Function):
+            value = value.scaled([units.of(one.exponents) for one in spec.function_of.values()], size)
+        elif isinstance(value, Vector):
             value = value if spec.direction else value * size
         elif isinstance(value, tuple):
             value = tuple(one * size for one in value)

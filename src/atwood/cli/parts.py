@@ -191,7 +191,7 @@ def _tables(kind: type[Component]) -> Iterator[tuple[str, list[dict[str, str]]]]
     yield (
         "parameters",
         [
-            {"name": name, "default": _value(one), "unit": _unit(one.unit.text), "meaning": one.doc}
+            {"name": name, "default": _value(one), "unit": _unit(one.unit.text), "meaning": one.doc + _read_by(one)}
             for name, one in kind.parameter_specs().items()
         ],
     )
@@ -236,9 +236,16 @@ def _value(one: Any) -> str:
         return "follows"
     if isinstance(one.default, tuple):
         return f"({', '.join(f'{number:g}' for number in one.default)})"
+    if one.function_of:
+        return f"{one.default} (a function)"
     chosen = one.default if isinstance(one.default, str) else f"{one.default:g}"
     others = [word for word in one.choices if word != chosen]
     return f"{chosen} (or {', '.join(others)})" if others else chosen
+
+
+def _read_by(one: Any) -> str:
+    """Return what a parameter that is a function is a function of."""
+    return f" A function of {', '.join(one.function_of)}." if one.function_of else ""
 
 
 def _unit(text: str) -> str:

@@ -172,6 +172,8 @@ class Trial:
     ) -> dict[str, Pose]:
         """Return where connectors are with one of them placed by a joint: b from a, or a from b where b is the world.
 
+        Joints that share a coordinate with it place theirs too.
+
         Parameters
         ----------
         law
@@ -184,8 +186,17 @@ class Trial:
             Where connectors are without it; those of the trial at that time if not given.
         """
         found = dict(poses or self.at(t))
+        for one in self.component.laws("joint"):
+            shares = not set(one.options.coordinates).isdisjoint(law.options.coordinates)
+            if one.name == law.name or (shares and one.holds_in(self.space.name)):
+                found = self._placed(one, t, values or self.coordinates_at(t), found)
+        return found
+
+    def _placed(self, law: Law, t: float, values: Mapping[str, float], poses: Mapping[str, Pose]) -> dict[str, Pose]:
+        """Return where connectors are with one of them placed by a joint."""
+        found = dict(poses)
         a, b = law.options.a, law.options.b
-        placement = self.placement(law, t, found, values or self.coordinates_at(t))
+        placement = self.placement(law, t, found, values)
         if placement is None:
             raise TypeError("a joint returns a Placement")
         backwards = b == "world"

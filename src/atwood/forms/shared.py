@@ -203,6 +203,8 @@ def _changed_parts(flat: FlatScene, other: FlatScene) -> str:
         return "it has other connections"
     if (flat.space, flat.line_axis) != (other.space, other.line_axis):
         return "it lives in another space"
+    if flat.gravity_direction != other.gravity_direction or flat.gravity_potential != other.gravity_potential:
+        return "gravity is another one"
     return ""
 
 

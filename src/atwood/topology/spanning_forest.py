@@ -174,7 +174,8 @@ def grow_spanning_forest(
             if constraint.law.name not in joint.local.law.options.solves:
                 continue
             by_position = reads_position(local, constraint)
-            if id(joint) in hung if by_position else id(joint) in locked:
+            chosen = hung if by_position else locked
+            if all(id(one) in chosen for one in joints if one is joint or _share(one, joint)):
                 solved.add((joint.part, constraint.law.name, constraint.index))
     counted = grower.count_turns(solved)
     pairs = [(bodies.body_of[joint.a], bodies.body_of[joint.b]) for joint in joints]
@@ -199,6 +200,11 @@ def _between(joint: Joint, bodies: Bodies) -> bool:
     return bodies.body_of[joint.a] != bodies.body_of[joint.b]
 
 
+def _share(one: Joint, other: Joint) -> bool:
+    """Return whether two joints of a part have a coordinate in common: then what one solves takes both."""
+    return not set(one.local.coordinates).isdisjoint(other.local.coordinates)
+
+
 class _Grower:
     """Collects attachments, orientations and coordinates while a forest grows."""
 
@@ -218,7 +224,8 @@ class _Grower:
         self.attachments: list[Attachment] = []
         self.orientations: list[OrientationStep] = []
         self.placed: dict[int, int] = {0: 0}  # body -> depth
-        self.told: set[Expression] = set()  # coordinates of joints that bodies hang on
+        # Coordinates of joints that bodies hang on; joints of one part may share them.
+        self.told: dict[Expression, tuple[int, int]] = {}
 
     def attach_by_joints(self, joints: list[Joint]) -> None:
         """Hang bodies on joints, the cheapest way first."""
@@ -266,8 +273,12 @@ class _Grower:
     def _cost(self, joint: Joint, child: int) -> int:
         """Return how many speeds it takes to hang a body on a joint; in a plane, orientations are counted apart."""
         if self.space.name != "space":
-            return len(joint.moves)
-        own = len({*joint.moves, *joint.turns}) if child in self.bodies.oriented else len(joint.moves)
+            return len(set(joint.moves).difference(self.told))
+        own = (
+            len({*joint.moves, *joint.turns}.difference(self.told))
+            if child in self.bodies.oriented
+            else len(joint.moves)
+        )
         return own + (3 if child in self.bodies.oriented and not joint.says_rotation else 0)
 
     def _freedom(self, child: int) -> int:
@@ -283,8 +294,9 @@ class _Grower:
         for symbol in joint.local.coordinates if follows else joint.moves:
             if symbol in joint.turns and not in_space:
                 continue
-            self.told.add(symbol)
-            numbers.append(self._coordinate(symbol.name, unit_of(self.locals[joint.part], symbol.name)))
+            if symbol not in self.told:
+                self.told[symbol] = self._coordinate(symbol.name, unit_of(self.locals[joint.part], symbol.name))
+            numbers.append(self.told[symbol])
         orientation, spin = self._orientation_coordinates(child) if in_space and oriented and not follows else ((), ())
         node, other = (joint.a, joint.b) if backwards else (joint.b, joint.a)
         coordinates, speeds = tuple(q for q, _ in numbers), tuple(u for _, u in numbers)

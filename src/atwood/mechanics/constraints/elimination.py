@@ -110,7 +110,8 @@ def _weightless(mechanism: Mechanism, masses: Masses, forest: SpanningForest) ->
     moving = {path: local for path, local in mechanism.locals_.items() if local.lagrangians}
     nodes |= {mechanism.graph.node_of[path, name] for path, local in moving.items() for name in local.connectors}
     massive = {mechanism.bodies.body_of[node] for node in nodes} | set(masses.bodies)
-    return {number for one in forest.attachments if one.body not in massive for number in one.coordinates}
+    heavy = {number for one in forest.attachments if one.body in massive for number in one.coordinates}
+    return {number for one in forest.attachments for number in one.coordinates} - heavy
 
 
 Prescribed = tuple[tuple[tuple[str, str, int], Expression], ...]

@@ -202,7 +202,8 @@ def _turns_missed(joint: Joint, turn_a: NodeTurn, turn_b: NodeTurn, space: Space
     return [plain(turn_b) - plain(turn_a) - angle]
 
 
-def make_gravity(table: ParameterTable, value: float) -> Vector:
+def make_gravity(table: ParameterTable, value: float, direction: tuple[float, float, float]) -> Vector:
     """Return the acceleration of free fall as a vector."""
     pull = table.scalar("gravity", value)
-    return as_vector((0.0, 0.0, -pull))
+    along: Vector = as_vector(direction) * pull
+    return along

@@ -17,7 +17,8 @@ __all__ = ["Scene"]
 class Scene(Model):
     """The model that is simulated: a model with its space, its gravity and its start.
 
-    Axes: x right, y into the page, z up; a planar scene lives in the x-z plane, gravity is along -z. A scene can be
+    Axes: x right, y into the page, z up; a planar scene lives in the x-z plane, gravity is along -z
+    unless `gravity_direction` says otherwise. A scene can be
     declared as a class, like any model, or put together step by step::
 
         scene = Scene()
@@ -43,6 +44,17 @@ class Scene(Model):
         (1.0, 0.0, 0.0), size=3, structural=True, doc="Direction of the line, for a scene on a line."
     )
     gravity: float = parameter(9.81, unit="m/s^2", doc="Acceleration of free fall, along -z.")
+    gravity_direction: tuple[float, float, float] = parameter(
+        (0.0, 0.0, -1.0),
+        direction=True,
+        doc="Where gravity pulls; in a plane or on a line, only what lies there counts.",
+    )
+    gravity_potential: Any = parameter(
+        None,
+        unit="J/kg",
+        function_of={"x": "m", "y": "m", "z": "m", "t": "s"},
+        doc="Energy of a kilogram in a field of gravity that varies, besides: '-3.986e14/sqrt(x**2 + y**2 + z**2)'.",
+    )
     t_start: float = parameter(0.0, unit="s", doc="Time of the start.")
     t_end: float = parameter(10.0, unit="s", doc="Time of the end, unless a run is given another.")
 

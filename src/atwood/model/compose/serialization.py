@@ -24,6 +24,7 @@ from atwood.model.compose.connection_rules import Parts, find_end
 from atwood.model.compose.differences import REMOVED, Differences, find_differences
 from atwood.model.declare.component import Component
 from atwood.model.declare.fields import FieldReference
+from atwood.model.declare.function_values import Function, read_function
 from atwood.model.declare.parameter_expressions import OPERATIONS, ParameterExpression
 from atwood.model.declare.time_functions import StoredFunction, write_function
 
@@ -193,6 +194,8 @@ def _write_value(value: Any, where: str) -> Any:
         return {"bound": [value.operation, *(_write_operand(one) for one in value.arguments)]}
     if isinstance(value, tuple):
         return list(value)
+    if isinstance(value, Function):
+        return {"function": value.steps(where), "arguments": list(value.arguments), "text": value.text}
     if callable(value):
         return {"function": write_function(value, where)}
     return value
@@ -402,6 +405,8 @@ def _read_value(value: Any, where: str) -> Any:
         return value
     if set(value) == {"function"}:
         return StoredFunction(value["function"], where)
+    if set(value) == {"function", "arguments", "text"}:
+        return read_function(value["function"], value["arguments"], value["text"], where)
     if set(value) == {"bound"}:
         return _read_bound(value["bound"], where)
     raise UsageError(f"the value {str(value)[:60]!r} cannot be read", where=where)

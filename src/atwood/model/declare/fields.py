@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from atwood.arguments import ANYTHING, DOC, FLAG, NAME, TEXT, each, number, optional, real, show, takes, whole
+from atwood.arguments import ANYTHING, BY_PATH, DOC, FLAG, NAME, TEXT, each, number, optional, real, show, takes, whole
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, near_matches, suggestion
+from atwood.model.declare.function_values import make_function
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.time_functions import check_function
 from atwood.model.values.units import Unit, parse_quantity, parse_si_unit
@@ -150,12 +151,16 @@ class ParameterSpec(Field):
         direction: bool = False,
         turning: bool = False,
         text: bool = False,
+        function_of: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__("parameter", default, unit, doc)
+        self.function_of = {name: parse_si_unit(one) for name, one in (function_of or {}).items()}
+        self.results = size or 1
+        size = None if function_of else size
         self.minimum, self.above, self.maximum = minimum, above, maximum
         self.size, self.integer, self.choices = size, integer, choices
         self.direction, self.turning, self.text = direction, turning, text
-        self.structural = structural or direction or integer or text or bool(choices)
+        self.structural = structural or direction or integer or text or bool(choices or function_of)
 
     def check(self, value: Any, where: str) -> Any:
         """Return a value in its own type and SI unit, or refuse it.
@@ -171,6 +176,8 @@ class ParameterSpec(Field):
             return self._check_expression(value, where)
         if value is None and self.default is None:
             return None
+        if self.function_of:
+            return make_function(value, tuple(self.function_of), self.results, self.unit, where)
         if self.choices:
             if not isinstance(value, str) or value not in self.choices:
                 advice = f"Choose from {', '.join(self.choices)}."
@@ -297,6 +304,7 @@ _BOUND = optional(number())
     direction=FLAG,
     turning=FLAG,
     text=FLAG,
+    function_of=optional(BY_PATH),
 )
 def parameter(
     default: Any = MISSING,
@@ -313,6 +321,7 @@ def parameter(
     direction: bool = False,
     turning: bool = False,
     text: bool = False,
+    function_of: Mapping[str, str] | None = None,
 ) -> Any:
     """Declare a parameter in the class body of a component.
 
@@ -345,6 +354,10 @@ def parameter(
         Whether it is a direction about which something turns; in a plane it can only be the plane's normal.
     text
         Whether it is text, as the path of a file is.
+    function_of
+        For a parameter that is a function: the names of its arguments with their units, ``{"x": "m", "t": "s"}``. It is
+        given as a number, a formula (``"0.5*x**2"``), or a function in plain arithmetic of some of these arguments, and
+        a law calls it with all of them. With ``size=3`` its value is a vector. It shapes the mechanism.
 
     Raises
     ------
@@ -365,6 +378,7 @@ def parameter(
         direction=direction or turning,
         turning=turning,
         text=text,
+        function_of=function_of,
     )
 
 

@@ -1,7 +1,8 @@
 """Functions of time: tried out on an expression, written as plain data, and read back.
 
-A function is written as a list of steps, each ``[operation, argument, ...]``. An argument is a number, ``"t"`` for
-the time, or ``"#3"`` for the value of step 3; the value of the function is that of the last step.
+A function is written as a list of steps, each ``[operation, argument, ...]``. An argument is a number, ``"t"`` for the
+time (or the name of another argument of the function), or ``"#3"`` for the value of step 3; the value of the function
+is that of the last step.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.operations import BINARY, UNARY
 
-__all__ = ["StoredFunction", "check_function", "write_function"]
+__all__ = ["StoredFunction", "check_function", "steps_of", "write_function"]
 
 _ADVICE = "Write it in plain arithmetic with Atwood's own functions (atwood.sin, atwood.select, ...)."
 Steps = Sequence[Sequence[Any]]
 
 
-def trace(function: Callable[[Any], Any], where: str) -> Expression:
-    """Return what a function of time gives for the symbol ``t`` of a graph of its own.
+def trace(function: Callable[..., Any], where: str, arguments: Sequence[str] = ("t",)) -> Expression:
+    """Return what a function gives for symbols of a graph of its own: ``t``, or those of other arguments.
 
     Raises
     ------
@@ -33,7 +34,7 @@ def trace(function: Callable[[Any], Any], where: str) -> Expression:
     """
     graph = Graph()
     try:
-        return graph.convert(function(graph.symbol("t")))
+        return graph.convert(function(*map(graph.symbol, arguments)))
     except RecursionError:
         reason = "it calls itself without end"
     except Exception as error:  # what a user's function raises is anything
@@ -66,19 +67,29 @@ def write_function(function: Callable[[Any], Any], where: str) -> list[list[Any]
     """
     if isinstance(function, StoredFunction):
         return [list(step) for step in function.steps]
-    result = trace(function, where)
+    return steps_of(trace(function, where), where)
+
+
+def steps_of(result: Expression, where: str) -> list[list[Any]]:
+    """Return an expression as steps; symbols go by their names.
+
+    Raises
+    ------
+    ParameterError
+        If it calls an external function, or has an infinite constant.
+    """
     written: dict[int, Any] = {}
     steps: list[list[Any]] = []
     for node in live([result]):
         if node.is_symbol:
-            written[node.index] = "t"
+            written[node.index] = node.name
             continue
         if node.is_constant and math.isfinite(node.value):
             written[node.index] = node.value
             continue
         if node.operation not in _EVALUATE:
             raise ParameterError(
-                f"this function of time cannot be stored, because of {node!r}",
+                f"this function cannot be stored, because of {node!r}",
                 where=where,
                 advice="External functions and infinite constants cannot be written to a file; set it after loading.",
             )
@@ -91,14 +102,16 @@ def write_function(function: Callable[[Any], Any], where: str) -> list[list[Any]
 
 
 class StoredFunction:
-    """A function of time that was read back; works on floats and expressions alike.
+    """A function that was read back; works on floats and expressions alike.
 
     Parameters
     ----------
     steps
         As written by `write_function`.
     where
-        The path of the input that it drives.
+        The path of the input that it drives, or of the parameter that it is.
+    arguments
+        The names of its arguments; the time alone if not given.
 
     Raises
     ------
@@ -106,16 +119,22 @@ class StoredFunction:
         If the steps do not make sense.
     """
 
-    def __init__(self, steps: Steps, where: str = "") -> None:
+    def __init__(self, steps: Steps, where: str = "", arguments: Sequence[str] = ("t",)) -> None:
         if not isinstance(steps, (list, tuple)) or not steps:
             raise ParameterError("a stored function needs a list of steps", where=where)
-        self.steps = tuple(_checked_step(step, number, where) for number, step in enumerate(steps))
-        check = trace(self._evaluate, where)
+        self.arguments = tuple(arguments)
+        self.steps = tuple(_checked_step(step, number, where, self.arguments) for number, step in enumerate(steps))
+        check = trace(self, where, self.arguments)
         self.__name__ = f"stored function of {len(live([check]))} operations"
 
-    def __call__(self, t: Any) -> Any:
-        """Return the value at a time."""
-        return self._evaluate(t)
+    def __call__(self, *given: Any) -> Any:
+        """Return the value, of the time or of the arguments that it has."""
+        known = dict(zip(self.arguments, given, strict=True))
+        values: list[Any] = []
+        for name, *arguments in self.steps:
+            read = (_operand(one, known, values) for one in arguments)
+            values.append(_EVALUATE[name](*read))
+        return values[-1]
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, StoredFunction) and self.steps == other.steps
@@ -126,15 +145,14 @@ class StoredFunction:
     def __repr__(self) -> str:
         return f"StoredFunction({[list(step) for step in self.steps]!r})"
 
-    def _evaluate(self, t: Any) -> Any:
-        values: list[Any] = []
-        for name, *arguments in self.steps:
-            read = (t if one == "t" else values[int(one[1:])] if isinstance(one, str) else one for one in arguments)
-            values.append(_EVALUATE[name](*read))
-        return values[-1]
+
+def _operand(one: Any, known: Mapping[str, Any], values: Sequence[Any]) -> Any:
+    if not isinstance(one, str):
+        return one
+    return known[one] if one in known else values[int(one[1:])]
 
 
-def _checked_step(step: Any, number: int, where: str) -> tuple[Any, ...]:
+def _checked_step(step: Any, number: int, where: str, arguments: Sequence[str]) -> tuple[Any, ...]:
     problem = ""
     if not isinstance(step, (list, tuple)) or not step or not isinstance(step[0], str) or step[0] not in _EVALUATE:
         problem = f"{step!r} is no operation that Atwood knows"
@@ -143,7 +161,7 @@ def _checked_step(step: Any, number: int, where: str) -> tuple[Any, ...]:
     else:
         for one in step[1:]:
             if isinstance(one, str):
-                if one != "t" and not (one[:1] == "#" and one[1:].isdecimal() and int(one[1:]) < number):
+                if one not in arguments and not (one[:1] == "#" and one[1:].isdecimal() and int(one[1:]) < number):
                     problem = f"{one!r} is not a value that is known at step {number}"
             elif isinstance(one, bool) or not isinstance(one, (int, float)) or not math.isfinite(one):
                 problem = f"{one!r} is not a finite number"

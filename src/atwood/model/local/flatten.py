@@ -14,6 +14,7 @@ from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import InputRef, OutputRef
 from atwood.model.declare.fields import LARGEST_ANGLE, FieldReference, ParameterExpression, too_large_an_angle
+from atwood.model.declare.function_values import Function
 from atwood.model.values.units import Unit, parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
 
 __all__ = ["FlatScene", "Part", "flatten", "unit_at"]
@@ -54,7 +55,11 @@ class FlatScene:
     line_axis
         Unit vector of the line.
     gravity
-        Acceleration of free fall along -z, m/s^2.
+        Acceleration of free fall, m/s^2.
+    gravity_direction
+        Unit vector along it.
+    gravity_potential
+        Energy of a kilogram as a function of x, y, z and t, besides that; None where there is none.
     t_start, t_end
         Time span, s.
     parts
@@ -71,6 +76,8 @@ class FlatScene:
     space: str
     line_axis: tuple[float, float, float]
     gravity: float
+    gravity_direction: tuple[float, float, float]
+    gravity_potential: Function | None
     t_start: float
     t_end: float
     parts: Mapping[str, Part]
@@ -116,6 +123,8 @@ def flatten(scene: Model, name: str | None = None) -> FlatScene:
         space=settings.space,
         line_axis=_unit_vector(settings.line_axis),
         gravity=settings.gravity,
+        gravity_direction=settings.gravity_direction,
+        gravity_potential=settings.gravity_potential,
         t_start=settings.t_start,
         t_end=settings.t_end,
         parts=leaves,

@@ -22,6 +22,7 @@ from atwood.model.declare.contributions import BodyInertia, Load, Placement, Poi
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import FlatScene, Part
+from atwood.model.local.gravity_field import energies_in
 from atwood.model.local.joint_coordinates import (
     JointReference,
     counting_constraints,
@@ -215,6 +216,7 @@ def _localize_part(
     potentials, switched = laws.scalars(acting, "potential"), laws.scalars(acting, "potential", only_in_modes=True)
     constraints = [one for law in laws.of("constraint") for one in _local_constraints(part, law, acting, graph)]
     inertias, lagrangians = laws.listed(bound, "inertia"), laws.scalars(acting, "lagrangian")
+    potentials += energies_in(flat.gravity_potential, inertias, time, graph)
     check_lagrangians(part.path, lagrangians, own, linked)
     joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws.of("joint"))
     coordinates = [symbol for joint in joints for symbol in joint.coordinates]
@@ -320,7 +322,7 @@ def _listed(bound: Any, law: Law) -> list[Any]:
 
 def _parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
     value, name = part.values[spec.name], f"{part.path}.{spec.name}"
-    if value is None or spec.integer or spec.choices or spec.text:
+    if value is None or spec.integer or spec.choices or spec.text or spec.function_of:
         return value
     if spec.turning and table.space == "plane" and (value[0] != 0.0 or value[2] != 0.0):
         advice = "Leave its x and z components zero: (0, -1, 0) turns counter-clockwise."

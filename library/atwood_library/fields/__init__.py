@@ -1,0 +1,1 @@
+"""Fields and interactions: charges, potentials, attraction of pairs, laws of joint coordinates."""

@@ -1,0 +1,369 @@
+"""Parameters that are functions: of places, of angles, of time; a law calls them like any function.
+
+A function is given as a number, as a formula in text or in sympy, or as a Python function in plain arithmetic. It is
+traced once, on a graph of its own, so that it can be differentiated, compared, written to a file and read again.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+import operator
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from atwood.arguments import show
+from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion
+from atwood.expr.core import algebra, functions
+from atwood.expr.core.analysis import evaluate, live
+from atwood.expr.core.derivatives import jvp
+from atwood.expr.core.functions import Scalar, graph_of
+from atwood.expr.core.graph import Expression, Graph
+from atwood.model.declare.time_functions import StoredFunction, steps_of
+from atwood.model.values.units import Unit, parse_quantity, split_quantity
+from atwood.model.values.vector import Vector
+
+__all__ = ["Function", "make_function", "read_function"]
+
+
+class Function:
+    """A function of named arguments with one value, or with the three components of a vector.
+
+    Attributes
+    ----------
+    arguments
+        The names of its arguments, in the order in which they are given.
+    text
+        What it was given as, for people to read.
+    """
+
+    def __init__(self, arguments: Sequence[str], results: Sequence[Expression], text: str) -> None:
+        self.arguments, self.text = tuple(arguments), text
+        self._results = tuple(results)
+        self._graph = results[0].graph
+        self._nodes = live(self._results)
+
+    def __call__(self, *values: Scalar) -> Any:
+        """Return the value, a scalar or a `Vector`; on numbers, on expressions and on sympy terms alike.
+
+        Parameters
+        ----------
+        *values
+            One for each argument.
+        """
+        if len(values) != len(self.arguments):
+            names = ", ".join(self.arguments)
+            raise AtwoodError(f"the function {self.text} takes {names}, which are not {len(values)} values")
+        graph = graph_of(*values)
+        if graph is not None:
+            found: list[Any] = list(self._rebuilt(graph, values))
+        elif all(isinstance(value, (int, float)) for value in values):
+            known = {self._symbol(name): float(value) for name, value in zip(self.arguments, values, strict=True)}
+            found = evaluate(self._results, known)
+        else:
+            found = [one(*values) for one in self._stored("")]
+        return found[0] if len(found) == 1 else Vector(*found)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (isinstance(other, Function) and self._key() == other._key())
+
+    def __hash__(self) -> int:
+        return hash(self.arguments)
+
+    def __repr__(self) -> str:
+        return self.text
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return read_function, (self.steps(""), self.arguments, self.text, "")
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it is zero everywhere."""
+        return all(one.is_zero for one in self._results)
+
+    def depends_on(self, name: str) -> bool:
+        """Return whether an argument is read."""
+        return self._symbol(name) in self._nodes
+
+    def derivative(self, name: str) -> Function:
+        """Return the partial derivative by an argument."""
+        slopes = jvp(self._results, {self._symbol(name): 1.0})
+        return Function(self.arguments, slopes, f"d({self.text})/d{name}")
+
+    def scaled(self, arguments: Sequence[float], result: float) -> Function:
+        """Return the same function where its arguments, and its value, are counted in other units.
+
+        Parameters
+        ----------
+        arguments
+            By how much the number for each argument grows.
+        result
+            By how much the number for the value grows.
+        """
+        symbols = [self._symbol(name) / size for name, size in zip(self.arguments, arguments, strict=True)]
+        made = [one * result for one in self._rebuilt(self._graph, symbols)]
+        return Function(self.arguments, made, self.text)
+
+    def steps(self, where: str) -> list[Any]:
+        """Return it as plain data: a list of steps for each result."""
+        return [steps_of(one, where) for one in self._results]
+
+    def corners(self) -> list[Function]:
+        """Return functions with zeros wherever it, or a derivative of it, may jump: what its choices compare."""
+        found = []
+        for node in self._nodes:
+            if node.operation in ("absolute", "sign"):
+                found.append(node.arguments[0])
+            elif node.operation in ("minimum", "maximum", "less", "less_equal"):
+                found.append(algebra.subtract(*node.arguments))
+        return [Function(self.arguments, [one], self.text) for one in dict.fromkeys(found)]
+
+    def _symbol(self, name: str) -> Expression:
+        return self._graph.symbol(name)
+
+    def _rebuilt(self, graph: Graph, values: Sequence[Scalar]) -> Sequence[Expression]:
+        given = zip(self.arguments, values, strict=True)
+        made = {self._symbol(name): graph.convert(value) for name, value in given}
+        for node in self._nodes:
+            if node.is_constant:
+                made[node] = graph.constant(node.value)
+            elif node not in made:
+                made[node] = algebra.build(graph, node.operation, [made[a] for a in node.arguments], node.payload)
+        return [made[one] for one in self._results]
+
+    def _stored(self, where: str) -> list[StoredFunction]:
+        return [StoredFunction(steps, where, self.arguments) for steps in self.steps(where)]
+
+    def _key(self) -> Any:
+        try:
+            return self.arguments, self.steps("")
+        except ParameterError:  # it calls an external function, and is like no other
+            return id(self)
+
+
+def read_function(written: Any, arguments: Any, text: Any, where: str) -> Function:
+    """Return the function that `Function.steps` wrote.
+
+    Parameters
+    ----------
+    written
+        A list of steps for each result.
+    arguments
+        The names of the arguments.
+    text
+        What it was given as.
+    where
+        The path of the parameter.
+
+    Raises
+    ------
+    ParameterError
+        If the data make no function.
+    """
+    names_are_right = isinstance(arguments, (list, tuple)) and all(isinstance(name, str) for name in arguments)
+    if not isinstance(written, list) or len(written) not in (1, 3) or not names_are_right:
+        raise ParameterError("the stored function cannot be read", where=where, advice="Save the scene again.")
+    stored = [StoredFunction(steps, where, arguments) for steps in written]
+    graph = Graph()
+    symbols = [graph.symbol(name) for name in arguments]
+    return Function(arguments, [graph.convert(one(*symbols)) for one in stored], str(text))
+
+
+def make_function(value: Any, arguments: Sequence[str], size: int, unit: Unit, where: str) -> Function:
+    """Return what is given for a parameter as a function.
+
+    Parameters
+    ----------
+    value
+        A number, a quantity (``"2 V"``), a formula in text or sympy, or a Python function; for a vector three of them,
+        or a function that returns three numbers.
+    arguments
+        The names of the arguments.
+    size
+        1, or 3 for a vector.
+    unit
+        The unit of the value.
+    where
+        The path of the parameter.
+
+    Raises
+    ------
+    ParameterError
+        If it is none of these, or reads what is no argument.
+    """
+    if isinstance(value, Function) and value.arguments == tuple(arguments) and len(value._results) == size:
+        return value
+    graph = Graph()
+    symbols = {name: graph.symbol(name) for name in arguments}
+    if size > 1 and not callable(value):
+        if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != size:
+            raise ParameterError(
+                f"{show(value)} is not {size} functions",
+                where=where,
+                advice=f"Give {size} formulas of {', '.join(arguments)} in brackets, or a function that returns them.",
+            )
+        found = [_traced(one, symbols, unit, where) for one in value]
+        text = f"({', '.join(_said(one) for one in value)})"
+    else:
+        whole = _traced(value, symbols, unit, where)
+        found = list(whole) if isinstance(whole, (Vector, Sequence)) else [whole]
+        text = _said(value)
+    if len(found) != size:
+        raise ParameterError(f"it gives {len(found)} numbers and not {size}", where=where)
+    try:
+        results = [graph.convert(one) for one in found]
+    except AtwoodError:
+        raise ParameterError(f"{show(value)} does not give numbers", where=where, advice=_PLAIN) from None
+    return Function(arguments, results, text)
+
+
+_PLAIN = "Write it in plain arithmetic with Atwood's own functions (atwood.sin, atwood.select, ...)."
+
+
+def _said(value: Any) -> str:
+    name = getattr(value, "__name__", "")
+    return name if callable(value) and name else str(value)
+
+
+def _traced(value: Any, symbols: Mapping[str, Expression], unit: Unit, where: str) -> Any:
+    """Return what a function gives for symbols."""
+    try:
+        if isinstance(value, str):
+            return _of_text(value, symbols, unit, where)
+        if _is_sympy(value):
+            return _from_sympy(value, symbols, where)
+        if callable(value):
+            return _called(value, symbols, where)
+        if isinstance(value, bool) or not math.isfinite(float(value)):
+            raise TypeError
+        return float(value)
+    except ParameterError:
+        raise
+    except RecursionError:
+        reason = "it calls itself without end"
+    except Exception as error:  # what a user's function raises is anything
+        reason = error.message if isinstance(error, AtwoodError) else f"{type(error).__name__}: {error}"
+        reason = reason if callable(value) or isinstance(value, str) else "it is no number and no function"
+    raise ParameterError(
+        f"{show(value)} cannot be evaluated as a function of {', '.join(symbols)} ({reason})",
+        where=where,
+        advice=_PLAIN,
+    )
+
+
+def _called(value: Callable[..., Any], symbols: Mapping[str, Expression], where: str) -> Any:
+    """Call a Python function: with the arguments that it names, or with all of them in order."""
+    try:
+        kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+        given = inspect.signature(value).parameters.values()
+        names = [one.name for one in given if one.kind in kinds and one.default is inspect.Parameter.empty]
+    except (TypeError, ValueError):
+        names = []
+    if names and set(names) <= set(symbols):
+        return value(**{name: symbols[name] for name in names})
+    if names and len(names) != len(symbols):
+        raise ParameterError(
+            f"the function takes {', '.join(names)}",
+            where=where,
+            advice=f"Its arguments are {', '.join(symbols)}: name those that it needs.",
+        )
+    return value(*symbols.values())
+
+
+def _is_sympy(value: Any) -> bool:
+    sympy = sys.modules.get("sympy")
+    return sympy is not None and isinstance(value, sympy.Basic)
+
+
+def _from_sympy(value: Any, symbols: Mapping[str, Expression], where: str) -> Expression:
+    from atwood.expr.formulas.sympy_bridge import from_sympy
+
+    for one in value.free_symbols:
+        if one.name not in symbols:
+            raise _unknown_name(one.name, symbols, where)
+    graph = next(iter(symbols.values())).graph
+    return graph.convert(from_sympy(value, graph, {one: symbols[one.name] for one in value.free_symbols}))
+
+
+# -- formulas in text --------------------------------------------------------------------------------------------
+
+_NAMES: Mapping[str, Any] = {
+    "pi": math.pi,
+    "abs": functions.absolute,
+    "min": functions.minimum,
+    "max": functions.maximum,
+    **{
+        name: getattr(functions, name)
+        for name in (
+            *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sqrt"),
+            *("hypot", "absolute", "minimum", "maximum", "sign", "floor", "select"),
+        )
+    },
+}
+_OPERATORS: Mapping[type, Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
+
+
+def _of_text(text: str, symbols: Mapping[str, Any], unit: Unit, where: str) -> Any:
+    """Return the value of a quantity, or of a formula."""
+    quantity_error: ParameterError | None = None
+    if split_quantity(text):
+        try:
+            return parse_quantity(text, unit, where)
+        except ParameterError as error:
+            quantity_error = error
+    try:
+        tree = ast.parse(text.strip().replace("^", "**"), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError):
+        advice = f"Write it as '0.5*{next(iter(symbols))}**2', with {', '.join(symbols)}, pi and functions such as sin."
+        raise quantity_error or ParameterError(f"{show(text)} is no formula", where=where, advice=advice) from None
+    return _value_of(tree, symbols, where)
+
+
+def _unknown_name(name: str, symbols: Mapping[str, Any], where: str) -> ParameterError:
+    known = [*symbols, *_NAMES]
+    advice = suggestion(name, known) if near_matches(name, known) else f"It is a function of {', '.join(symbols)}."
+    return ParameterError(f"the formula reads {name!r}, which is no argument of it", where=where, advice=advice)
+
+
+def _value_of(node: ast.expr, symbols: Mapping[str, Any], where: str) -> Any:
+    """Return the value of a formula; nothing in it is run that is not arithmetic."""
+
+    def value(one: ast.expr) -> Any:
+        return _value_of(one, symbols, where)
+
+    if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)) and not isinstance(node.value, bool):
+        return float(node.value)
+    if isinstance(node, ast.Name):
+        if node.id in symbols:
+            return symbols[node.id]
+        if node.id != "pi":
+            raise _unknown_name(node.id, symbols, where)
+        return math.pi
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        return _OPERATORS[type(node.op)](value(node.left), value(node.right))
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
+        return _OPERATORS[type(node.op)](value(node.operand))
+    if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in _OPERATORS:
+        return _OPERATORS[type(node.ops[0])](value(node.left), value(node.comparators[0]))
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+        if node.func.id not in _NAMES or node.func.id == "pi":
+            raise _unknown_name(node.func.id, symbols, where)
+        return _NAMES[node.func.id](*map(value, node.args))
+    raise ParameterError(f"{ast.unparse(node)!r} has no place in a formula", where=where, advice=_ARITHMETIC)
+
+
+_ARITHMETIC = "A formula has numbers, its arguments, + - * / **, brackets and functions such as sin."
