@@ -20,7 +20,7 @@ from atwood.expr import Expression, Graph
 from atwood.expr.core.relations import TimeRelations
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
-from atwood.forms.source import Source
+from atwood.forms.source import Kind, Source
 from atwood.forms.starting import with_places
 from atwood.mechanics.build import Mechanism, check_closures, make_gravity
 from atwood.mechanics.constraints.idle_spin import hold_idle_spins
@@ -155,7 +155,7 @@ def _find_places(assembly: Assembly) -> dict[str, dict[Expression, float]]:
 
 def _assemble_like(
     flat: FlatScene,
-    like: Assembly,
+    like: Kind,
     modes: Mapping[str, str] | None = None,
     line_signs: Mapping[tuple[str, str, str], float] | None = None,
 ) -> Assembly:

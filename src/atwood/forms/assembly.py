@@ -28,6 +28,7 @@ from atwood.forms.program import (
     state_groups,
 )
 from atwood.forms.reduced import reduced_form
+from atwood.forms.restoring import recipe
 from atwood.forms.shared import Shared
 from atwood.forms.source import Source, no_start_quantity
 from atwood.forms.starting import moved_to
@@ -90,6 +91,15 @@ class Assembly:
     orientation: Orientation = field(default_factory=Orientation)
     given_relations: tuple[float, ...] | None = None
     _kernels: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    def __copy__(self) -> Assembly:
+        return self
+
+    def __deepcopy__(self, memory: object) -> Assembly:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return recipe(self)
 
     def __repr__(self) -> str:
         flat, mechanism = self.flat, self.mechanism

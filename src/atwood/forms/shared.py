@@ -44,6 +44,9 @@ class Shared:
         self._made: dict[Any, Any] = {}
         self.lock = threading.RLock()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Shared, ()  # what was made belongs to the process; who shared it does so again
+
     def get(self, key: Any, make: Callable[[], T]) -> T:
         """Return what was made under a key, making it if it is not there.
 

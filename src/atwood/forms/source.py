@@ -11,12 +11,29 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene
 from atwood.model.local.flatten import FlatScene
+from atwood.topology.orientation_coordinates import Orientation
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
     from atwood.mechanics.outputs.observables import Observable
 
-__all__ = ["Assemble", "Source", "no_start_quantity"]
+__all__ = ["Assemble", "Kind", "Source", "no_start_quantity"]
+
+
+class Kind(Protocol):
+    """In which form a scene is assembled; an `Assembly` says it of itself."""
+
+    @property
+    def form(self) -> str:
+        """``"reduced"`` or ``"dae"``."""
+
+    @property
+    def level(self) -> str:
+        """Level of the dae form; empty for the reduced form."""
+
+    @property
+    def orientation(self) -> Orientation:
+        """In which coordinates the reduced form has orientations in space."""
 
 
 class Assemble(Protocol):
@@ -25,7 +42,7 @@ class Assemble(Protocol):
     def __call__(
         self,
         flat: FlatScene,
-        like: Assembly,
+        like: Kind,
         modes: Mapping[str, str] | None = None,
         line_signs: Mapping[tuple[str, str, str], float] | None = None,
     ) -> Assembly:

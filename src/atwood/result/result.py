@@ -6,6 +6,7 @@ import os
 from collections.abc import ItemsView, Iterable, Iterator, Mapping, ValuesView
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,9 @@ class Result(Trajectories):
     def __init__(self, run: Run) -> None:
         self.run = run
         self._cache: dict[str, FloatArray] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Result, (self.run,)
 
     # -- what it is of --------------------------------------------------------------------------------------------
 

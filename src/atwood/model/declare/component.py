@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
@@ -400,11 +399,15 @@ class Component:
 
     def copy(self) -> Self:
         """Return a component with the same settings, that belongs to no model."""
-        twin = copy.copy(self)
+        twin = object.__new__(type(self))
+        vars(twin).update(vars(self))
         object.__setattr__(twin, "_parent", None)
         object.__setattr__(twin, "_name", "")
         object.__setattr__(twin, "_declared", "")
         return twin
+
+    def __copy__(self) -> Self:
+        return self.copy()  # parts that two models share would belong to one of them
 
 
 def bind(component: Component, binding: Binding) -> Any:

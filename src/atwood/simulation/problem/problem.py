@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +80,11 @@ class Plan:
     _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
     _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
     _null_space: CompiledNullSpace | None = field(default=None, repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        sizes = self.scales, self.sizes, self.coordinate_sizes
+        state = self.dependent, self.dependent_speeds, self.switches, self.not_compilable
+        return _restored, (self.assembly, self.finding, *sizes, *state)
 
     @property
     def kept(self) -> NDArray[np.intp] | None:
@@ -287,6 +292,23 @@ class Plan:
         program = self.program
         loose = np.full(program.multipliers + program.extra, 1e3 * max(self.scales.force, 1.0))
         return np.concatenate([relative * self.coordinate_sizes, relative * (self.sizes / self.scales.time), loose])
+
+
+def _restored(
+    assembly: Assembly,
+    finding: RankFinding,
+    scales: Scales,
+    sizes: FloatArray,
+    coordinate_sizes: FloatArray,
+    dependent: tuple[int, ...],
+    dependent_speeds: tuple[int, ...],
+    switches: int,
+    not_compilable: str,
+) -> Plan:
+    """Return a plan from what a pickle has of it."""
+    program = assembly.form_program(_kept_or_none(finding), dependent, dependent_speeds)
+    parts = assembly, balance_of(assembly, assembly.form), finding, scales, sizes, coordinate_sizes, program
+    return Plan(*parts, dependent, dependent_speeds, switches, not_compilable)
 
 
 def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceProgram:

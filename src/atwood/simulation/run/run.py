@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -87,6 +90,10 @@ class Run:
     coordinate_switches: tuple[CoordinateSwitch, ...] = ()
     again: Callable[[RunOptions, FloatArray], Run] | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Whoever watched the run is not there where it is read.
+        return {**vars(self), "options": replace(self.options, progress=None, on_step=None)}
+
     @property
     def singular_crossings(self) -> tuple[SingularCrossing, ...]:
         """Singular positions that it passed through, or came too close to, in order."""
@@ -128,30 +135,35 @@ def run(
     SolveError
         If the solver fails; what came before is in its `run` attribute.
     """
-    t = start.time
-    check_span(t, options.t_end, options.max_step)
+    check_span(start.time, options.t_end, options.max_step)
     check_solver(options.solver)
     options = allowed(options)
     clock = Clock(options.max_seconds) if clock is None else clock
 
-    def prepared(options: RunOptions, between: FloatArray) -> _Walk:
-        samples = sample_times(t, options)
-        schedule = find_schedule(assembly, t, options.t_end).at_samples(samples.times)
-        _check_prescribed(schedule.rows(assembly, samples.times), samples.times)
-        walk = _Walk(assembly, start, options, reassemble, samples.with_more(between), again)
-        walk.prepare()
-        return walk
-
-    def again(options: RunOptions, between: FloatArray) -> Run:
-        return prepared(options, between).go()
-
     try:
         with clock.kept(GRACE):
-            walk = prepared(options, np.zeros(0))
+            walk = _prepared(assembly, start, reassemble, options, np.zeros(0))
     except TimeIsUp:
         return run_out_of_time(assembly, start, options)
     with clock.kept():
         return walk.go()
+
+
+def _prepared(
+    assembly: Assembly, start: Start, reassemble: Reassemble, options: RunOptions, between: FloatArray
+) -> _Walk:
+    """Return a run that is ready to go, with samples in between that change nothing."""
+    samples = sample_times(start.time, options)
+    schedule = find_schedule(assembly, start.time, options.t_end).at_samples(samples.times)
+    _check_prescribed(schedule.rows(assembly, samples.times), samples.times)
+    again = partial(_again, assembly, start, reassemble)
+    walk = _Walk(assembly, start, options, reassemble, samples.with_more(between), again)
+    walk.prepare()
+    return walk
+
+
+def _again(assembly: Assembly, start: Start, reassemble: Reassemble, options: RunOptions, between: FloatArray) -> Run:
+    return _prepared(assembly, start, reassemble, options, between).go()
 
 
 def run_out_of_time(assembly: Assembly, start: Start | None, options: RunOptions) -> Run:
