@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.cli.output import console
+from atwood.cli.output import writer
 from atwood.cli.running import RunRequest, degrees_of_freedom, multiplier_labels
 from atwood.result.about import solver_name
 from atwood.showing import count_of
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from atwood.forms.assembly import Assembly
     from atwood.result.result import Result
 
@@ -36,55 +34,41 @@ def print_summary(result: Result, request: RunRequest) -> None:
     request
         What was asked for.
     """
-    from rich.table import Table
-    from rich.text import Text
-
-    out = console()
+    out = writer()
     form = f"{result.form} form" + (f" ({result.level})" if result.form == "dae" else "")
-    out.print(Text.assemble((result.assembly.flat.name, "bold"), f", {form}"))
-    facts = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    facts.add_column(style="cyan", no_wrap=True)
-    facts.add_column()
-    for label, text in _facts(result):
-        facts.add_row(label, Text(text))
-    out.print(facts)
-    out.print()
+    out.line((result.assembly.flat.name, "bold"), (f", {form}", ""))
+    out.pairs(list(_facts(result)))
+    out.line()
     paths = main_quantities(result)
-    out.print(_quantities(result, paths[:_ROWS], out.width))
+    out.table(*_quantities(result, paths[:_ROWS], out.width))
     hidden = len(result.paths) - min(len(paths), _ROWS)
     if hidden:
-        out.print(
-            f"{count_of(hidden, 'more quantity', 'more quantities')}: --json or --save FILE shows all", style="dim"
-        )
+        more = count_of(hidden, "more quantity", "more quantities")
+        out.line((f"{more}: --json or --save FILE shows all", "dim"))
     for option, file in (("saved", request.save), ("plotted", request.plot), ("drawn", request.draw)):
         if file is not None:
-            out.print(f"{option}: {file}", style="dim", soft_wrap=True)
+            out.line((f"{option}: {file}", "dim"))
 
 
-def _quantities(result: Result, paths: list[str], width: int) -> Table:
+def _quantities(result: Result, paths: list[str], width: int) -> tuple[list[str], list[list[str]]]:
     """Return the table of quantities, with a small picture of each curve where there is room for it."""
-    from rich.table import Table
-
-    headings = ("quantity", "start", "end", "smallest", "largest", "unit")
+    headings = ["quantity", "start>", "end>", "smallest>", "largest>", "unit"]
     rows = []
     for path in paths:
         values = result.array(path)
         low, high = float(np.min(values)), float(np.max(values))
         ends = [f"{_clean(v, values):.6g}" for v in (values[0], values[-1])]
-        rows.append((path, *ends, *(f"{_clean(v, values):.4g}" for v in (low, high)), result.unit(path)))
-    left = width - 2 - sum(max(map(len, column)) + 2 for column in zip(headings, *rows, strict=True))
-    table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
-    for heading in headings:
-        is_number = heading not in ("quantity", "unit")
-        table.add_column(heading, justify="right" if is_number else "left", no_wrap=True)
-    if left < _NARROWEST:
-        for row in rows:
-            table.add_row(*row)
-        return table
-    table.add_column("over time", no_wrap=True)
-    for path, texts in zip(paths, rows, strict=True):
-        table.add_row(*texts, sparkline(result.array(path), min(left, _WIDEST)))
-    return table
+        rows.append([path, *ends, *(f"{_clean(v, values):.4g}" for v in (low, high)), result.unit(path)])
+    left = (
+        width
+        - 2
+        - sum(max(map(len, column)) + 2 for column in zip((name.strip(">") for name in headings), *rows, strict=True))
+    )
+    if left >= _NARROWEST:
+        headings.append("over time")
+        for path, row in zip(paths, rows, strict=True):
+            row.append(sparkline(result.array(path), min(left, _WIDEST)))
+    return headings, rows
 
 
 def _facts(result: Result) -> Iterator[tuple[str, str]]:
