@@ -39,7 +39,6 @@ from atwood.expr.core.functions import (
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import InputGroup, OutputGroup, Program
-from atwood.expr.formulas.sympy_bridge import from_sympy, to_sympy, to_sympy_shared
 from atwood.expr.simplify.collect import collect
 
 __all__ = [
@@ -67,7 +66,6 @@ __all__ = [
     "exp",
     "external",
     "floor",
-    "from_sympy",
     "hypot",
     "is_zero",
     "jacobian",
@@ -86,7 +84,5 @@ __all__ = [
     "sweeps_exceed",
     "tan",
     "tanh",
-    "to_sympy",
-    "to_sympy_shared",
     "vjp",
 ]

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from atwood.integrators.ida.library import available, library
 from atwood.result.result import Result
 
 __all__ = ["describe_run", "solver_name", "versions"]
@@ -16,6 +15,8 @@ __all__ = ["describe_run", "solver_name", "versions"]
 def versions() -> dict[str, str]:
     """Return the versions of what a run depends on."""
     from importlib.metadata import PackageNotFoundError, version
+
+    from atwood.integrators.ida.library import available, library
 
     found = {"python": platform.python_version()}
     for name in ("atwood", "numpy", "scipy", "scikit-sundae"):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
@@ -65,6 +64,8 @@ def _spline(t: FloatArray, values: FloatArray) -> FloatArray:
 
 def nodes_between(times: FloatArray, count: int) -> FloatArray:
     """Return so many points between each two of the times, in order."""
+    from numpy.polynomial import legendre
+
     middle, half = 0.5 * (times[1:] + times[:-1]), 0.5 * np.diff(times)
     nodes: FloatArray = (middle[:, None] + half[:, None] * legendre.leggauss(count)[0]).ravel()
     return nodes
@@ -80,6 +81,8 @@ def integral_in_steps(times: FloatArray, values: FloatArray) -> tuple[FloatArray
     values
         At the points that `nodes_between` gives, shape (times - 1, points).
     """
+    from numpy.polynomial import legendre
+
     count, half = values.shape[1], 0.5 * np.diff(times)
     points, weights = legendre.leggauss(count)
     to_coefficients = (np.arange(count) + 0.5)[:, None] * (legendre.legvander(points, count - 1) * weights[:, None]).T

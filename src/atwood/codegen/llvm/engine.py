@@ -7,7 +7,6 @@ to addresses when code is loaded, so that object code holds nothing of the proce
 from __future__ import annotations
 
 import ctypes
-import ctypes.util
 import itertools
 import os
 import sys
@@ -181,7 +180,9 @@ def _linker(_: int) -> binding.LLJIT:
 @cache
 def _libraries() -> tuple[ctypes.CDLL, ...]:
     """Return the libraries in which the C library's functions can be, where the process itself does not export them."""
-    names = ["ucrtbase", "msvcrt"] if sys.platform == "win32" else [ctypes.util.find_library("m") or ""]
+    from ctypes.util import find_library
+
+    names = ["ucrtbase", "msvcrt"] if sys.platform == "win32" else [find_library("m") or ""]
     found: list[ctypes.CDLL] = []
     for name in names:
         try:

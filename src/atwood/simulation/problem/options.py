@@ -93,6 +93,8 @@ class Samples:
 
     def with_more(self, times: FloatArray) -> Samples:
         """Return the same with more in between."""
+        if not len(times):
+            return self
         more = np.setdiff1d(times, self.times)
         order = np.argsort(np.concatenate([self.times, more]))
         no, yes = np.zeros(len(more), dtype=bool), np.ones(len(more), dtype=bool)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,7 +32,9 @@ from atwood.simulation.run.session import SolverRequest, open_explicit_session, 
 from atwood.simulation.run.stuck import explain_stuck
 from atwood.simulation.run.tolerances import too_tight
 from atwood.simulation.singular.crossing import SingularCrossing, events_on
-from atwood.simulation.singular.monitor import SingularityMonitor, singularity_monitor_of
+
+if TYPE_CHECKING:
+    from atwood.simulation.singular.monitor import SingularityMonitor
 
 __all__ = ["Outcome", "Segment", "run_segment"]
 
@@ -286,6 +289,8 @@ class _Runner:
             ),
         )
         if choice.solver.startswith("ida"):
+            from atwood.simulation.singular.monitor import singularity_monitor_of
+
             here = StepResult(t, y, yp, Status.REACHED)
             self.request = request
             self.monitor = singularity_monitor_of(segment.plan, options.relative_tolerance, segment.end, here)

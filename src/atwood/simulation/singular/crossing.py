@@ -7,6 +7,7 @@ mechanism goes on is not determined by where it is. Its motion until then goes o
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,9 @@ from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.problem import Plan
-from atwood.simulation.singular.collocation import Path
+
+if TYPE_CHECKING:
+    from atwood.simulation.singular.collocation import Path
 
 __all__ = ["SingularCrossing", "events_on", "stuck_at"]
 
