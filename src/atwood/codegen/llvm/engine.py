@@ -179,10 +179,11 @@ def _linker(_: int) -> binding.LLJIT:
 
 @cache
 def _libraries() -> tuple[ctypes.CDLL, ...]:
-    """Return the libraries in which the C library's functions can be, where the process itself does not export them."""
-    from ctypes.util import find_library
-
-    names = ["ucrtbase", "msvcrt"] if sys.platform == "win32" else [find_library("m") or ""]
+    """Return the libraries in which the C library's functions can be, where LLVM does not find them in the process."""
+    if sys.platform == "win32":
+        names: list[str | None] = ["ucrtbase", "msvcrt"]
+    else:
+        names = [None, "libm.so.6"]  # the process itself, by the dynamic linker
     found: list[ctypes.CDLL] = []
     for name in names:
         try:

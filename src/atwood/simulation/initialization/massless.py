@@ -76,7 +76,7 @@ def _sizes_of_inertia(mass: Matrix, sizes: FloatArray) -> FloatArray:
     if not np.any(has):
         return sizes
     even = np.where(has, 1.0 / np.sqrt(np.where(has, own, 1.0)), 0.0)
-    return np.where(has, even, sizes * np.median(even[has] / sizes[has]))
+    return np.where(has, even, sizes * _median(even[has] / sizes[has]))
 
 
 def _massless_directions(assembly: Assembly, moving: FloatArray) -> StartError:
@@ -112,3 +112,9 @@ def _acting_on(assembly: Assembly, where: str) -> list[str]:
         if bodies.body_of[node] in own and (local.loads or local.potentials or local.dissipations or local.lagrangians):
             found[path] = None
     return list(found)
+
+
+def _median(values: FloatArray) -> float:
+    """Return the median; NumPy's loads its masked arrays, which takes longer than many a run."""
+    ordered, half = np.sort(values), len(values) // 2
+    return float(0.5 * (ordered[half] + ordered[-half - 1]))
