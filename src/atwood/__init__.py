@@ -58,6 +58,7 @@ from atwood.model.declare.contributions import BodyInertia, Load, Placement, Poi
 from atwood.model.declare.fields import parameter, signal
 from atwood.model.declare.laws import (
     constraint,
+    derivative,
     dissipation,
     event,
     force,
@@ -66,7 +67,9 @@ from atwood.model.declare.laws import (
     lagrangian,
     observable,
     potential,
+    update,
 )
+from atwood.model.declare.states import discrete_state, state
 from atwood.model.values.outline import Outline
 from atwood.model.values.rotation import FREE, Rotation, normals, turn
 from atwood.model.values.vector import Vector, as_vector, cross, dot, norm
@@ -146,6 +149,8 @@ __all__ = [
     "cos",
     "cosh",
     "cross",
+    "derivative",
+    "discrete_state",
     "dissipation",
     "dot",
     "event",
@@ -185,11 +190,13 @@ __all__ = [
     "sinh",
     "solve_linear",
     "sqrt",
+    "state",
     "sweep",
     "tan",
     "tanh",
     "to_data",
     "turn",
+    "update",
 ]
 
 _LATER = {

@@ -84,6 +84,26 @@ def _in_law(component: Component, law: Law) -> Iterator[tuple[str, str]]:
         yield from _named("an observable", (options.rate,), observables)
     elif law.kind == "event":
         yield from _wrong_target(component, law)
+    elif law.kind == "derivative":
+        yield from _named("a continuous state", options.states, _states(cls, is_discrete=False))
+    elif law.kind == "update":
+        yield from _wrong_update(cls, law)
+
+
+def _states(cls: type[Component], is_discrete: bool) -> list[str]:
+    return [name for name, spec in cls.state_specs().items() if spec.is_discrete == is_discrete]
+
+
+def _wrong_update(cls: type[Component], law: Law) -> Iterator[tuple[str, str]]:
+    """Yield errors in what an update sets and reads, and in when it is called."""
+    options = law.options
+    yield from _named("a state", options.sets, cls.state_specs())
+    yield from _named("an input", options.reads or (), cls.signal_specs())
+    for given in (options.every, options.offset):
+        yield from _named("a parameter", (given,) if isinstance(given, str) else (), cls.parameter_specs())
+    yield from _named("an event", (options.at,) if options.at else (), [one.name for one in cls.laws("event")])
+    if (options.every is None) == (not options.at):
+        yield "it says neither a sample time nor an event, or both", "Give every=, or at= with the name of an event."
 
 
 def _wrong_arguments(cls: type[Component], law: Law) -> Iterator[tuple[str, str]]:
@@ -105,7 +125,7 @@ def _wrong_arguments(cls: type[Component], law: Law) -> Iterator[tuple[str, str]
 
 
 def _wrong_target(component: Component, law: Law) -> Iterator[tuple[str, str]]:
-    target, known = law.options.target, (*type(component).modes, "stop")
+    target, known = law.options.target, ("", *type(component).modes, "stop")
     if target in known:
         return
     spec = component.parameter_specs().get(target)

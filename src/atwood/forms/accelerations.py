@@ -208,7 +208,7 @@ def _is_tree(assembly: Assembly) -> bool:
         not reduced.eliminated
         and not reduced.solved_speeds
         and not reduced.forest.loop_joints
-        and (len(maximal.constraints) > 0 or not rates_are_speeds(maximal))
+        and bool(maximal.constraints or maximal.orientation_coordinates)
         and len(reduced.speeds) == len(maximal.speeds) - len(maximal.constraints)
     )
 
@@ -222,7 +222,7 @@ class _Tree:
         self.parameters = assembly.parameters
         self.u = self.reduced.speeds
         self.differences = True
-        self.rewrites = rates_are_speeds(self.maximal)
+        self.rewrites = not self.maximal.orientation_coordinates
         self.angles = [q for q, c in zip(self.reduced.coordinates, self.reduced.names, strict=True) if c.unit == "rad"]
         outputs = to_maximal(assembly).outputs
         symbols = (*self.maximal.coordinates, *self.maximal.speeds)

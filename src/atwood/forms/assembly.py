@@ -35,9 +35,12 @@ from atwood.forms.starting import moved_to
 from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism, build_equations
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.kinematics.mechanism import discrete_states_of
 from atwood.mechanics.outputs.observables import Observable, Reaction, energies, list_reactions
 from atwood.mechanics.outputs.reading import observe
 from atwood.model.local.flatten import FlatScene, flatten
+from atwood.model.local.parts import DiscreteState
+from atwood.model.local.states import declared_starts
 from atwood.showing import count_of, fitted
 from atwood.topology.orientation_coordinates import Orientation
 from atwood.topology.spanning_forest import grow_spanning_forest
@@ -47,6 +50,9 @@ __all__ = ["Assembly", "FormName"]
 FormName = Literal["reduced", "dae"]
 Coordinates = Literal["reduced", "regular", "dae"]
 """Those of the reduced form, the same with quaternions for orientations, and those of the dae form."""
+
+_BOUND = 64
+"""So many kernels with other parameters are kept ready."""
 
 _BY_HAND = 12
 """Up to so many coordinates the equations are rewritten; beyond, the recursion is shorter than any closed form."""
@@ -78,6 +84,8 @@ class Assembly:
         In which coordinates the reduced form has orientations in space.
     given_relations
         See `relation_values`; None for those that hold just after the scene's start.
+    held
+        Values of the discrete states of its parts; None for those that the parts declare.
     """
 
     flat: FlatScene
@@ -90,6 +98,7 @@ class Assembly:
     shared: Shared = field(default_factory=Shared, repr=False)
     orientation: Orientation = field(default_factory=Orientation)
     given_relations: tuple[float, ...] | None = None
+    held: tuple[float, ...] | None = None
     _kernels: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __copy__(self) -> Assembly:
@@ -193,15 +202,34 @@ class Assembly:
         """Return the same in another piece of a run, with the same programs."""
         return replace(self, given_relations=tuple(map(float, values)), _kernels={})
 
+    @property
+    def discrete_states(self) -> tuple[DiscreteState, ...]:
+        """The states of its parts that change at moments only, whose values are among the parameters."""
+        return self.shared.get("discrete states", lambda: discrete_states_of(self.mechanism))
+
+    @property
+    def held_at_start(self) -> tuple[float, ...]:
+        """Values of the discrete states before their first update."""
+        if not self.discrete_states:
+            return ()
+        declared, flat = declared_starts(self.flat.parts, is_discrete=True), self.flat
+        return tuple({**declared, **flat.guess, **flat.start}[one.path] for one in self.discrete_states)
+
+    def with_held(self, values: Sequence[float]) -> Assembly:
+        """Return the same with other values of the discrete states, with the same programs."""
+        return replace(self, held=tuple(values), _kernels={})
+
     @cached_property
     def parameters(self) -> tuple[Expression, ...]:
-        """The symbols of the parameters, of relations of functions of time last."""
-        return (*self.mechanism.table.values, *(one.symbol for one in self.relations))
+        """The symbols of the parameters: discrete states after the scene's own, relations of functions of time last."""
+        held = (one.symbol for one in self.discrete_states)
+        return (*self.mechanism.table.values, *held, *(one.symbol for one in self.relations))
 
     @cached_property
     def parameter_values(self) -> FloatArray:
         """The values of the parameters."""
-        return np.array([*self.mechanism.table.values.values(), *self.relation_values], dtype=float)
+        held = self.held_at_start if self.held is None else self.held
+        return np.array([*self.mechanism.table.values.values(), *held, *self.relation_values], dtype=float)
 
     @takes(values=optional(BY_PATH), start=optional(BY_PATH), guess=optional(BY_PATH))
     def with_values(
@@ -281,7 +309,7 @@ class Assembly:
         mechanism, reason = moved_to(self, flat)
         if mechanism is None:
             return None, reason
-        fresh: dict[str, Any] = {"source": source, "why_new": "", "given_relations": None, "_kernels": {}}
+        fresh: dict[str, Any] = {"source": source, "why_new": "", "given_relations": None, "held": None, "_kernels": {}}
         return replace(self, flat=flat, mechanism=mechanism, **fresh), ""
 
     def other_mode(
@@ -363,6 +391,16 @@ class Assembly:
             self._kernels[key] = self.compiled(program, vectorized).bind(self.parameter_values)
         found: BoundKernel = self._kernels[key]
         return found
+
+    def known_kernel(self, program: Program, values: FloatArray) -> BoundKernel:
+        """Return a program whose parameters are others than those of this scene, with their values, ready to run."""
+        key = (id(program), values.tobytes())
+        known: dict[Any, BoundKernel] = self.shared.get("bound kernels", dict)
+        if key not in known:
+            if len(known) >= _BOUND:
+                known.clear()
+            known[key] = self.compiled(program).bind(values)
+        return known[key]
 
     def compiled(self, program: Program, vectorized: bool = False) -> CompiledProgram:
         """Return a program as Python code, for any parameter values of this structure."""

@@ -51,7 +51,7 @@ def _places(reduced: Equations, maximal: Equations) -> tuple[list[Expression], l
     for symbol, (coordinate, speed) in forest.counted.items():
         positions[coordinate] = kinematics.placements.joint_coordinates[symbol]
         speeds[speed] = kinematics.joint_rates[symbol]
-    return positions, speeds
+    return [*positions, *maximal.coordinates[maximal.placing :]], speeds
 
 
 def with_reactions(reduced: Equations, maximal: Equations) -> Equations:

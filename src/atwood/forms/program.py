@@ -174,7 +174,7 @@ class BalanceProgram:
 
 @dataclass(frozen=True)
 class RatesProgram:
-    """How coordinates move with the speeds: ``q' = B(q, t) u + b(q, t)``.
+    """How coordinates move with the speeds: ``q' = B(q, t) u + b(q, t)``; states of parts do not move with these.
 
     Attributes
     ----------
@@ -248,7 +248,9 @@ def rows_along_speeds(equations: Equations) -> list[Expression]:
         more.append(_sum([equations.coordinates[i] * symbols[i] for i in orientation.coordinates]))
     in_orientations = {i for orientation in equations.orientation_coordinates for i in orientation.coordinates}
     for i, (symbol, rate) in enumerate(zip(symbols, equations.rates, strict=True)):
-        if i not in in_orientations:
+        if i >= equations.placing:
+            more.append(symbol - rate)
+        elif i not in in_orientations:
             rows[number[rate]] = symbol - rate
     return [*(rows[i] for i in range(len(equations.speeds))), *more]
 
@@ -270,8 +272,8 @@ def kinematic_rows(equations: Equations, shift: Sequence[Expression] | None = No
     symbols = rate_symbols(equations)
     number = {speed: i for i, speed in enumerate(equations.speeds)}
     rows = []
-    for symbol, rate in zip(symbols, equations.rates, strict=True):
-        if shift is None:
+    for i, (symbol, rate) in enumerate(zip(symbols, equations.rates, strict=True)):
+        if shift is None or i >= equations.placing:
             rows.append(symbol - rate)
         elif rate in number:
             rows.append(symbol - rate + shift[number[rate]])
@@ -402,7 +404,7 @@ def rates_program(name: str, equations: Equations, parameters: Collection[Expres
     if rates_are_speeds(equations):
         everyone = np.arange(sizes[0], dtype=np.intp)
         return RatesProgram(None, everyone, everyone, *sizes, equations.orientation_coordinates)
-    tangent = jacobian(list(equations.rates), list(equations.speeds))
+    tangent = jacobian(list(equations.rates[: equations.placing]), list(equations.speeds))
     outputs = (OutputGroup("rates", equations.rates), OutputGroup("matrix", tuple(tangent.entries)))
     return RatesProgram(
         Program(f"{name} rates", state_groups(equations), tuple(parameters), outputs),

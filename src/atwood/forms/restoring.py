@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from atwood.errors import UsageError
 from atwood.forms.shared import Shared
@@ -41,8 +41,8 @@ class _Recipe(NamedTuple):
         The scene, how it is assembled, and in which form.
     modes, line_signs
         See `atwood.forms.source.Assemble`; no line_signs where the start tells them.
-    relations, why_new
-        See `Assembly.given_relations` and `Assembly.why_new`.
+    relations, held, why_new
+        See `Assembly.given_relations`, `Assembly.held` and `Assembly.why_new`.
     coordinates
         Names of the coordinates, which must come out again.
     """
@@ -53,6 +53,7 @@ class _Recipe(NamedTuple):
     modes: Mapping[str, str]
     line_signs: Signs | None
     relations: tuple[float, ...] | None
+    held: tuple[float, ...] | None
     why_new: str
     coordinates: tuple[str, ...]
 
@@ -84,6 +85,7 @@ def recipe(assembly: Assembly) -> tuple[Callable[..., Assembly], tuple[Shared, _
         assembly.modes,
         line_signs,
         assembly.given_relations,
+        assembly.held,
         assembly.why_new,
     )
     return _restored, (assembly.shared, _Recipe(*parts, tuple(one.name for one in assembly.equations.names)))
@@ -95,8 +97,13 @@ def _restored(shared: Shared, made_from: _Recipe) -> Assembly:
     found: Assembly | None = first
     if first.flat is not made_from.flat:
         found, _ = first.follow(made_from.flat, made_from.source)
-    fresh: dict[str, Any] = {"given_relations": made_from.relations, "why_new": made_from.why_new, "_kernels": {}}
-    made = replace(_assembled(made_from) if found is None else found, **fresh)
+    made = replace(
+        _assembled(made_from) if found is None else found,
+        given_relations=made_from.relations,
+        held=made_from.held,
+        why_new=made_from.why_new,
+        _kernels={},
+    )
     names = tuple(one.name for one in made.equations.names)
     if names != made_from.coordinates or len(made_from.relations or made.relations) != len(made.relations):
         raise UsageError(

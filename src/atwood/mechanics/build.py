@@ -21,9 +21,10 @@ from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.mechanics.kinematics.positions import Kinematics, shapes
 from atwood.model.declare.component import bind
 from atwood.model.local.laws import LocalConstraint
-from atwood.model.local.parts import multiplier_symbol
+from atwood.model.local.parts import LocalState, multiplier_symbol
+from atwood.model.returned import law_value
 from atwood.model.values.vector import Vector
-from atwood.topology.spanning_forest import SpanningForest
+from atwood.topology.spanning_forest import Coordinate, SpanningForest
 
 __all__ = ["Mechanism", "build_equations", "check_closures", "extent", "make_gravity", "resolve_signals"]
 
@@ -78,6 +79,7 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         *levels(mechanism, site, state, held, [value for _, _, value in values]),
         *velocity_levels(mechanism, site, state, rolling, signals, integrals),
     )
+    parts = _states(mechanism, site, state.kinematics, signals)
     made = Equations(
         graph=graph,
         forest=forest,
@@ -87,12 +89,12 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         shapes=shape_of,
         kinematics=state.kinematics,
         time=mechanism.time,
-        coordinates=state.coordinates,
+        coordinates=(*state.coordinates, *(one.symbol for one in parts)),
         speeds=state.speeds,
         accelerations=state.accelerations,
-        names=state.names,
+        names=(*state.names, *(Coordinate(one.path, one.unit) for one in parts)),
         speed_names=state.speed_names,
-        rates=state.rates,
+        rates=(*state.rates, *(one.rate for one in parts)),
         rows=tuple(rows),
         constraint_rows=tuple(forces),
         constraints=constraints,
@@ -101,12 +103,26 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         orientation_coordinates=state.orientation_coordinates,
         solved_speeds=tuple(s.name.removeprefix("u:") for s in taken.speeds),
         integrals=(*taken.integrals, *integrals.values()),
+        states=parts,
     )
     read = _read_multipliers(mechanism, signals) if mechanism.can_read_multipliers else []
     if forest.form == "reduced":
         return replace(made, read=dict(zip(read, read, strict=True)))
     with mechanism.relations.reading(False):
         return with_known(made, known_multipliers(mechanism, made, read)) if read else made
+
+
+def _states(
+    mechanism: Mechanism, site: Site, kinematics: Kinematics, signals: Mapping[Expression, Expression]
+) -> tuple[LocalState, ...]:
+    """Return the continuous states of all parts, with their rates where the parts are."""
+    found: list[LocalState] = []
+    for local in mechanism.locals_.values():
+        if local.states:
+            rates, _ = in_joint_coordinates(local, kinematics, [one.rate for one in local.states])
+            placed = substitute(rates, {**local_map(site, local, kinematics), **signals})
+            found += (replace(one, rate=rate) for one, rate in zip(local.states, placed, strict=True))
+    return tuple(found)
 
 
 def _multiplier(graph: Graph, path: str, one: LocalConstraint) -> Expression:
@@ -157,7 +173,7 @@ def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[
         inputs = replace(local.binding, values={**local.binding.values, **local.signal_symbols})
         bound = bind(local.part.component, inputs)
         is_reaction = observable in local.binding.reactions
-        value = bound.reaction(observable) if is_reaction else getattr(bound, law)()
+        value = bound.reaction(observable) if is_reaction else law_value(bound, law)
         if isinstance(value, Vector):
             if axis not in ("x", "y", "z"):
                 raise DeclarationError(
@@ -169,12 +185,41 @@ def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[
         (value,), _ = in_joint_coordinates(local, kinematics, [site.graph.convert(value)])
         placed = put_in_place(value, local_map(site, local, kinematics))
         raw[mechanism.locals_[path].signal_symbols[name]] = placed
-    for _ in range(len(raw)):
-        pending = [s for s, e in raw.items() if depends_on(e, list(raw))]
-        if not pending:
-            return raw
-        raw = {s: substitute([e], raw)[0] for s, e in raw.items()}
-    if any(depends_on(e, list(raw)) for e in raw.values()):
-        names = ", ".join(f"{path}.{name}" for path, name in mechanism.links)
-        raise DeclarationError(f"inputs and outputs feed each other in a circle: {names}")
-    return raw
+    return _in_turn(mechanism, raw)
+
+
+def _in_turn(mechanism: Mechanism, raw: Mapping[Expression, Expression]) -> dict[Expression, Expression]:
+    """Return what inputs stand for without other inputs in it.
+
+    Raises
+    ------
+    DeclarationError
+        If some feed each other in a circle, with these alone.
+    """
+    reads = {symbol: [other for other in raw if depends_on(value, [other])] for symbol, value in raw.items()}
+    found: dict[Expression, Expression] = {}
+    while len(found) < len(raw):
+        ready = [one for one in raw if one not in found and all(other in found for other in reads[one])]
+        if not ready:
+            raise _circle(mechanism, {one: reads[one] for one in raw if one not in found})
+        for one in ready:
+            found[one] = substitute([raw[one]], found)[0] if reads[one] else raw[one]
+    return {one: found[one] for one in raw}
+
+
+def _circle(mechanism: Mechanism, reads: Mapping[Expression, list[Expression]]) -> DeclarationError:
+    """Return the error that names inputs that feed each other in a circle, in the order in which they do."""
+    way = [next(iter(reads))]
+    while way.count(way[-1]) < 2:
+        way.append(next(one for one in reads[way[-1]] if one in reads))
+    circle = way[way.index(way[-1]) : -1][::-1]
+    ends = {
+        mechanism.locals_[path].signal_symbols.get(name): (".".join(source), f"{path}.{name}")
+        for (path, name), source in mechanism.links.items()
+    }
+    steps = ", ".join(" -> ".join(ends[one]) for one in circle)
+    return DeclarationError(
+        f"inputs and outputs feed each other in a circle: {steps}",
+        where=ends[circle[0]][1],
+        advice="Put something with a state into it, as a filter or a delay, or solve the loop within one part.",
+    )

@@ -11,7 +11,13 @@ from atwood.model.declare.contributions import Load, Placement, PointInertia
 from atwood.model.declare.laws import Law
 from atwood.model.values.vector import Vector
 
-__all__ = ["call_law", "listed", "not_evaluated", "one_scalar"]
+__all__ = ["call_law", "law_value", "listed", "not_evaluated", "one_scalar"]
+
+
+def law_value(bound: Any, name: str) -> Any:
+    """Return what a law of a bound component gives that is called with nothing; a state is read, and not called."""
+    found = getattr(bound, name)
+    return found() if callable(found) else found
 
 
 def call_law(path: str, law: Law, function: Callable[[], Any]) -> Any:

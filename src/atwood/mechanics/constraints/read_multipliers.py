@@ -220,5 +220,6 @@ def _fixed_point(
 
 def with_known(equations: Equations, read: Mapping[Expression, Expression]) -> Equations:
     """Return equations with functions of the state in place of the multipliers that forces read."""
-    rows = tuple(substitute(list(equations.rows), dict(read)))
-    return replace(equations, rows=rows, read=dict(read), rows_with_multipliers=equations.rows)
+    known = substitute([*equations.rows, *equations.rates], dict(read))
+    rows, rates = tuple(known[: len(equations.rows)]), tuple(known[len(equations.rows) :])
+    return replace(equations, rows=rows, rates=rates, read=dict(read), rows_with_multipliers=equations.rows)

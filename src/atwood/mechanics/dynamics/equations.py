@@ -18,6 +18,7 @@ from atwood.mechanics.kinematics.orientation import inertial_torque, torque_comp
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.laws import LocalConstraint, LocalPart
+from atwood.model.local.parts import LocalState
 from atwood.model.values.vector import cross
 from atwood.topology.orientation_coordinates import OrientationCoordinates
 from atwood.topology.spanning_forest import Coordinate, SpanningForest
@@ -133,6 +134,8 @@ class Equations:
         Constraints on velocities that turned out to be ones on positions.
     read
         The multipliers that laws of force read, as functions of the state; `rows` has these in their place.
+    states
+        Continuous states of parts: the last of the coordinates, which no speed moves.
     rows_with_multipliers
         In maximal coordinates, the rows as they are: with the multipliers themselves; empty if they have none.
     """
@@ -161,6 +164,12 @@ class Equations:
     integrals: tuple[Integral, ...] = ()
     read: Mapping[Expression, Expression] = field(default_factory=dict)
     rows_with_multipliers: tuple[Expression, ...] = ()
+    states: tuple[LocalState, ...] = ()
+
+    @property
+    def placing(self) -> int:
+        """Number of the coordinates that say where bodies are; those after them are states of parts."""
+        return len(self.coordinates) - len(self.states)
 
     @property
     def multipliers(self) -> tuple[Expression, ...]:

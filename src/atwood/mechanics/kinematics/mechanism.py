@@ -13,13 +13,24 @@ from atwood.expr.core.relations import TimeRelations, values_just_after
 from atwood.late import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, plain, rotate
 from atwood.model.local.laws import LocalPart, ParameterTable
+from atwood.model.local.parts import DiscreteState
 from atwood.model.values.rotation import as_rotation, compose
 from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector, as_vector
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import Joint, MechanismGraph
 
-__all__ = ["CLOSES", "Mechanism", "check_closures", "decide", "extent", "from_start", "make_gravity", "started_at"]
+__all__ = [
+    "CLOSES",
+    "Mechanism",
+    "check_closures",
+    "decide",
+    "discrete_states_of",
+    "extent",
+    "from_start",
+    "make_gravity",
+    "started_at",
+]
 
 T = TypeVar("T")
 
@@ -95,6 +106,11 @@ class Mechanism:
         """Whether forces read reactions: of their own part, or perhaps through inputs that are linked to one."""
         feeding = (self.locals_[source] for source, _ in self.links.values())
         return any(one.reads for one in self.locals_.values()) or any(one.binding.reactions for one in feeding)
+
+
+def discrete_states_of(mechanism: Mechanism) -> tuple[DiscreteState, ...]:
+    """Return the states of all parts that change at moments only, in the order of the parts."""
+    return tuple(one for local in mechanism.locals_.values() for one in local.discrete_states)
 
 
 def decide(mechanism: Mechanism, how: Callable[[Mechanism], T]) -> T:

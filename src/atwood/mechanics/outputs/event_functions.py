@@ -16,7 +16,11 @@ from atwood.model.declare.component import bind
 from atwood.model.declare.laws import Law
 from atwood.model.returned import call_law, one_scalar
 
-__all__ = ["EventFunction", "list_event_functions"]
+__all__ = ["UPDATE", "EventFunction", "list_event_functions"]
+
+
+UPDATE = "update"
+"""Target of an event that changes states of its part, and no mode."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,7 @@ class EventFunction:
     direction
         +1, -1 or 0.
     target
-        The mode it leads to, or ``"stop"``.
+        The mode it leads to, ``"stop"``, or `UPDATE` where states change; empty where it is only noted.
     message
         What has happened, in words.
     unit
@@ -49,6 +53,11 @@ class EventFunction:
     message: str
     unit: str
     impact: bool
+
+    @property
+    def is_noted(self) -> bool:
+        """Whether only the passing of zero counts, and not on which side a run starts."""
+        return self.target in ("", UPDATE) or not self.part
 
 
 def list_event_functions(
@@ -71,7 +80,9 @@ def list_event_functions(
             if value.is_constant or value in mechanism.table.values:
                 continue
             options, target = law.options, law.options.target
-            if target not in (*component.modes, "stop"):  # then it is the choice that says which
+            if not target and any(other.options.at == law.name for other in component.laws("update")):
+                target = UPDATE
+            elif target and target not in (*component.modes, "stop"):  # then it is the choice that says which
                 target = local.part.values.get(target, target)
             found.append(
                 EventFunction(

@@ -18,7 +18,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable, Reaction, add_up, make_binding, part_energies, take
 from atwood.model.declare.component import Binding, bind
 from atwood.model.local.laws import LocalPart
-from atwood.model.returned import call_law, not_evaluated, one_scalar
+from atwood.model.returned import call_law, law_value, not_evaluated, one_scalar
 from atwood.model.values.vector import Vector
 
 __all__ = ["Observables", "Reader", "observe"]
@@ -110,11 +110,15 @@ def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, 
         if not law.holds_in(mechanism.space.name):
             continue
         try:
-            value = getattr(bound, law.name)()
+            value = law_value(bound, law.name)
         except (AtwoodError, ArithmeticError):
             continue  # it asks for an orientation that nothing determines, or that never leaves a pole
         except Exception as error:  # whatever a law of somebody's own can raise
             raise not_evaluated(path, law, error) from error
+        if isinstance(value, tuple) and law.name in local.part.component.state_specs():
+            for i, one in enumerate(value):
+                take(mechanism, found, f"{path}.{law.name}[{i}]", one, law.options.unit, law.options.doc, False)
+            continue
         if not isinstance(value, Vector):
             value = call_law(path, law, partial(one_scalar, mechanism.table.graph, value))
         options = law.options

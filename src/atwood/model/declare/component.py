@@ -10,10 +10,11 @@ from atwood.errors import DeclarationError, MissingNameError, ParameterError, Us
 from atwood.expr import Scalar
 from atwood.model.declare.binding import Binding
 from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
-from atwood.model.declare.declaring import check_field_name, merge_inherited, with_checked_default
+from atwood.model.declare.declaring import ComponentType, check_field_name, merge_inherited, with_checked_default
 from atwood.model.declare.fields import MISSING, Field, ParameterExpression, ParameterSpec, SignalSpec
-from atwood.model.declare.laws import Kind, Law
+from atwood.model.declare.laws import Kind, Law, ObservableOptions
 from atwood.model.declare.quantities import Quantity
+from atwood.model.declare.states import StateSpec, discrete_state, state
 from atwood.model.values.outline import Outline
 from atwood.model.values.vector import Vector, dot, norm
 from atwood.showing import field_text, fitted, html_table
@@ -21,14 +22,14 @@ from atwood.showing import field_text, fitted, html_table
 __all__ = ["Binding", "Component", "bind"]
 
 
-@dataclass_transform(kw_only_default=True, field_specifiers=(connector,))
-class Component:
+@dataclass_transform(kw_only_default=True, field_specifiers=(connector, state, discrete_state))
+class Component(metaclass=ComponentType):
     """A part: it has parameters, connectors and laws, and sees neither the graph nor the solver.
 
-    Subclasses declare their fields in the class body with `parameter`, `connector` and `signal`, and their laws as
-    methods marked with `inertia`, `potential`, `dissipation`, `force`, `constraint`, `joint`, `observable` and
-    `event`. Within a law, ``self.stiffness`` is the parameter, ``self.a.position`` what the connector knows,
-    ``self.time`` the time.
+    Subclasses declare their fields in the class body with `parameter`, `connector`, `signal`, `state` and
+    `discrete_state`, and their laws as methods marked with `inertia`, `potential`, `dissipation`, `force`,
+    `constraint`, `joint`, `observable`, `event`, `derivative` and `update`. Within a law, ``self.stiffness`` is the
+    parameter, ``self.a.position`` what the connector knows, ``self.time`` the time.
 
     Parameters
     ----------
@@ -54,6 +55,7 @@ class Component:
     _parameters: ClassVar[dict[str, ParameterSpec]] = {}
     _signals: ClassVar[dict[str, SignalSpec]] = {}
     _connectors: ClassVar[dict[str, ConnectorSpec]] = {}
+    _states: ClassVar[dict[str, StateSpec]] = {}
     _laws: ClassVar[dict[str, Law]] = {}
 
     _parent: Component | None
@@ -74,6 +76,10 @@ class Component:
                 cls._parameters[name] = with_checked_default(value, cls)
             elif isinstance(value, SignalSpec):
                 cls._signals[name] = with_checked_default(value, cls)
+            elif isinstance(value, StateSpec):
+                cls._states[name] = with_checked_default(value, cls)
+                options = ObservableOptions(value.unit.text, value.doc, False, "", ("line", "plane", "space"))
+                cls._laws[name] = Law("observable", name, options)
             elif isinstance(value, ConnectorSpec):
                 cls._connectors[name] = value
             elif isinstance(law, Law):
@@ -362,6 +368,11 @@ class Component:
     def signal_specs(cls) -> Mapping[str, SignalSpec]:
         """Return the declared inputs by name."""
         return cls._signals
+
+    @classmethod
+    def state_specs(cls) -> Mapping[str, StateSpec]:
+        """Return the declared states by name."""
+        return cls._states
 
     @classmethod
     def connector_specs(cls) -> Mapping[str, ConnectorSpec]:

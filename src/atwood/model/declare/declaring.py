@@ -8,12 +8,40 @@ from atwood.errors import DeclarationError
 from atwood.model.declare.connectors import ConnectorSpec
 from atwood.model.declare.fields import MISSING, Field
 
-__all__ = ["check_field_name", "check_reserved", "merge_inherited", "with_checked_default"]
+__all__ = ["ComponentType", "check_field_name", "check_reserved", "merge_inherited", "with_checked_default"]
+
+
+class _Body(dict[str, Any]):
+    """The names of a class body; what is declared there is not declared again."""
+
+    def __init__(self, kind: str) -> None:
+        super().__init__()
+        self._kind = kind
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        if _is_declared(self.get(name)) and _is_declared(value):
+            raise DeclarationError(
+                f"{name!r} is declared twice", where=self._kind, advice="Give one of the two another name."
+            )
+        super().__setitem__(name, value)
+
+
+def _is_declared(value: Any) -> bool:
+    return isinstance(value, (Field, ConnectorSpec)) or hasattr(value, "_atwood_law")
+
+
+class ComponentType(type):
+    """The type of components: in their class bodies no name is declared twice."""
+
+    @classmethod
+    def __prepare__(cls, name: str, bases: tuple[type, ...], /, **_: Any) -> _Body:
+        """Return what takes up the names of a class body."""
+        return _Body(name)
 
 
 def merge_inherited(cls: type) -> None:
     """Give a class what all its bases declare, in the order in which Python looks names up."""
-    for table in ("_parameters", "_signals", "_connectors", "_laws"):
+    for table in ("_parameters", "_signals", "_connectors", "_states", "_laws"):
         merged: dict[str, Any] = {}
         for base in reversed(cls.__mro__[1:]):
             merged.update(vars(base).get(table, {}))

@@ -11,7 +11,21 @@ import functools
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, TypeVar, overload
 
-from atwood.arguments import CALLBACK, DOC, FLAG, NAME, TEXT, check, each, number, one_of, takes, whole
+from atwood.arguments import (
+    CALLBACK,
+    DOC,
+    FLAG,
+    NAME,
+    TEXT,
+    check,
+    each,
+    either,
+    number,
+    one_of,
+    optional,
+    takes,
+    whole,
+)
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.late import dataclass
@@ -21,6 +35,7 @@ from atwood.model.values.vector import Vector
 
 __all__ = [
     "constraint",
+    "derivative",
     "dissipation",
     "event",
     "force",
@@ -29,10 +44,21 @@ __all__ = [
     "lagrangian",
     "observable",
     "potential",
+    "update",
 ]
 
 Kind = Literal[
-    "potential", "dissipation", "force", "inertia", "lagrangian", "constraint", "joint", "observable", "event"
+    "potential",
+    "dissipation",
+    "force",
+    "inertia",
+    "lagrangian",
+    "constraint",
+    "joint",
+    "observable",
+    "event",
+    "derivative",
+    "update",
 ]
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -110,6 +136,25 @@ class EventOptions:
     unit: str
     impact: bool
     spaces: tuple[str, ...] = ("line", "plane", "space")
+
+
+@dataclass(frozen=True)
+class DerivativeOptions:
+    """See `derivative`."""
+
+    states: tuple[str, ...]
+    modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class UpdateOptions:
+    """See `update`."""
+
+    sets: tuple[str, ...]
+    every: str | float | None
+    offset: str | float
+    at: str
+    reads: tuple[str, ...] | None
 
 
 def _mark(function: _F, law: Law) -> _F:
@@ -340,7 +385,7 @@ def observable(
 
 @takes(
     DeclarationError,
-    target=NAME,
+    target=TEXT,
     message=DOC,
     unit=TEXT,
     modes=_NAMES,
@@ -350,7 +395,7 @@ def observable(
 )
 def event(
     *,
-    target: str,
+    target: str = "",
     message: str,
     unit: str = "1",
     modes: Sequence[str] = (),
@@ -358,12 +403,13 @@ def event(
     impact: bool = False,
     spaces: Sequence[str] = ("line", "plane", "space"),
 ) -> Callable[[_F], _F]:
-    """Mark a method whose zero crossing changes the mode of the component or ends the run.
+    """Mark a method whose zero crossing changes the mode of the component, ends the run, or is noted.
 
     Parameters
     ----------
     target
-        The mode to go to, ``"stop"``, or the name of a choice parameter that says which of these.
+        The mode to go to, ``"stop"``, or the name of a choice parameter that says which of these; empty for an event
+        that is noted, and calls the updates that name it.
     message
         What has happened, in words.
     unit
@@ -380,6 +426,67 @@ def event(
     parse_si_unit(unit)
     options = EventOptions(tuple(modes), direction, target, message, unit, impact, tuple(spaces))
     return lambda function: _mark(function, Law("event", function.__name__, options))
+
+
+def derivative(*states: str, modes: Sequence[str] = ()) -> Callable[[_F], _F]:
+    """Mark a method that returns the rates of states, each in its unit a second.
+
+    It may read parameters, inputs, connectors with their velocities, states and time.
+
+    Parameters
+    ----------
+    *states
+        Names of the states; the method returns one scalar for each number in them, in this order.
+    modes
+        The modes of the component in which it holds; all when empty. In others these states stay as they are.
+    """
+    names = check(each(NAME, "the name of a state, or several", 1), states, "states", "derivative", DeclarationError)
+    options = DerivativeOptions(tuple(names), tuple(check(_NAMES, modes, "modes", "derivative", DeclarationError)))
+    return lambda function: _mark(function, Law("derivative", function.__name__, options))
+
+
+_MOMENT = either(NAME, number())
+
+
+@takes(
+    DeclarationError,
+    sets=each(NAME, "the name of a state, or several", 1),
+    every=optional(_MOMENT),
+    offset=_MOMENT,
+    at=TEXT,
+    reads=optional(_NAMES),
+)
+def update(
+    *,
+    sets: str | Sequence[str],
+    every: str | float | None = None,
+    offset: str | float = 0.0,
+    at: str = "",
+    reads: Sequence[str] | None = None,
+) -> Callable[[_F], _F]:
+    """Mark a method that is called at moments, on numbers, and returns new values of states.
+
+    It is plain Python: parameters, inputs, states and the time are floats, and whatever Python can do with them may
+    be done. At one moment, a method that reads an input comes after those that set what feeds it.
+
+    Parameters
+    ----------
+    sets
+        Names of the states, continuous or discrete, that it gives new values; it returns one number for each of
+        theirs, in this order.
+    every
+        Its sample time, s: a number, or the name of a parameter.
+    offset
+        When it is called first, after the start of the run, s: a number, or the name of a parameter.
+    at
+        In place of a sample time, the name of an event of the component: it is called just after that.
+    reads
+        The inputs that it reads; all when None. A method that passes on only what was stored before reads none, ``()``,
+        and comes first.
+    """
+    names = (sets,) if isinstance(sets, str) else tuple(sets)
+    options = UpdateOptions(names, every, offset, at, None if reads is None else tuple(reads))
+    return lambda function: _mark(function, Law("update", function.__name__, options))
 
 
 def scalars(value: Any) -> list[Scalar]:

@@ -33,7 +33,8 @@ from atwood.model.local.joint_coordinates import (
 from atwood.model.local.joint_references import JointCoordinateUse, find_joint_coordinate_uses
 from atwood.model.local.moving_mass import check_lagrangians, find_varying
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart, multiplier_symbol
-from atwood.model.returned import call_law, listed, one_scalar
+from atwood.model.local.states import discrete_states, local_states, state_values
+from atwood.model.returned import call_law, law_value, listed, one_scalar
 from atwood.model.values.space import FIXED_AXES, Space, planar_axes
 from atwood.model.values.vector import Vector
 
@@ -170,6 +171,7 @@ def _bind_part(
     signal_symbols: dict[str, Expression] = {}
     for name, given in part.signals.items():
         values[name] = _signal(part, name, given, flat, time, table, signal_symbols)
+    values |= state_values(part, graph)
     connectors = {
         name: _local_connector(f"{part.path}.{name}", isinstance(one, Frame), space, graph)
         for name, one in component.connectors().items()
@@ -225,7 +227,8 @@ def _localize_part(
     binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
     acting = bind(component, binding)
     dissipations, loads = laws.scalars(acting, "dissipation"), laws.listed(acting, "force")
-    forces: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components)]
+    states = local_states(part, laws.of("derivative"), acting, graph)
+    forces: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components), *(x.rate for x in states)]
     acted = [*potentials, *lagrangians, *(graph.convert(one) for one in forces)]
     acted += _linked_outputs(part, flat, acting, graph) if formulas else []
     turns = turns_read(part, formulas, acted)
@@ -250,6 +253,8 @@ def _localize_part(
         lagrangians=lagrangians,
         varying=find_varying(part.path, inertias, own, linked, graph),
         reads=_multipliers_read(part, constraints, forces, graph),
+        states=states,
+        discrete_states=discrete_states(part, graph),
     )
 
 
@@ -260,7 +265,7 @@ def _linked_outputs(part: Part, flat: FlatScene, acting: Any, graph: Graph) -> l
     for law in part.component.laws("observable"):
         if law.name in wanted:
             with suppress(AtwoodError):  # of reactions that are not readable, which is said where it is read
-                found += [graph.convert(c) for c in scalars(getattr(acting, law.name)())]
+                found += [graph.convert(c) for c in scalars(law_value(acting, law.name))]
     return found
 
 
@@ -290,7 +295,7 @@ def _multipliers_read(
 
 
 def _scalar(bound: Any, law: Law, graph: Graph) -> Expression:
-    return one_scalar(graph, getattr(bound, law.name)())
+    return one_scalar(graph, law_value(bound, law.name))
 
 
 def _check_reads(
@@ -366,7 +371,9 @@ def _signal(
 
 def _is_source(part: Part, flat: FlatScene) -> bool:
     """Return whether a part's outputs are functions of time and parameters alone."""
-    return not part.component.connectors() and not any((part.path, name) in flat.links for name in part.signals)
+    own = part.component
+    is_linked = any((part.path, name) in flat.links for name in part.signals)
+    return not own.connectors() and not own.state_specs() and not is_linked
 
 
 def _source_value(source: Part, observable: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:

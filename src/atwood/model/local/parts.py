@@ -15,7 +15,15 @@ from atwood.model.local.flatten import Part
 from atwood.model.values.rotation import Axes
 from atwood.model.values.vector import Vector
 
-__all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "multiplier_symbol"]
+__all__ = [
+    "DiscreteState",
+    "LocalConnector",
+    "LocalConstraint",
+    "LocalJoint",
+    "LocalPart",
+    "LocalState",
+    "multiplier_symbol",
+]
 
 
 @dataclass(frozen=True)
@@ -79,6 +87,25 @@ class LocalConstraint:
     counts: Expression | None = None
 
 
+@dataclass(frozen=True)
+class LocalState:
+    """A continuous state of a part: its path, its symbol, its rate on the part's symbols, its unit and usual size."""
+
+    path: str
+    symbol: Expression
+    rate: Expression
+    unit: str
+    nominal: float | None
+
+
+@dataclass(frozen=True)
+class DiscreteState:
+    """A state of a part that changes at moments only: its path and its symbol."""
+
+    path: str
+    symbol: Expression
+
+
 def multiplier_symbol(graph: Graph, path: str, law: str, index: int) -> Expression:
     """Return the symbol of a constraint's multiplier: of the part's path, its law, and the number within the law."""
     return graph.symbol(f"lambda:{path}.{law}[{index}]")
@@ -109,6 +136,8 @@ class LocalPart:
         Those of a joint's own coordinates whose turns count for its laws of force, its events and links to it.
     reads
         The multipliers that its laws of force read.
+    states, discrete_states
+        Its states, one for each number.
     lagrangians
         What its laws of that kind returned.
     varying
@@ -135,6 +164,8 @@ class LocalPart:
     reads: tuple[Expression, ...] = ()
     lagrangians: tuple[Expression, ...] = ()
     varying: tuple[PointInertia | BodyInertia, ...] = ()
+    states: tuple[LocalState, ...] = ()
+    discrete_states: tuple[DiscreteState, ...] = ()
 
     @property
     def asks(self) -> list[str]:

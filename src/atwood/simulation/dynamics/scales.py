@@ -56,6 +56,8 @@ def scene_length(assembly: Assembly) -> float:
 def coordinate_scales(equations: Equations, length: float) -> FloatArray:
     """Return the size of each coordinate: the extent for a length, one radian for an angle, else one."""
     sizes = np.array([length if one.unit == "m" else 1.0 for one in equations.names])
+    for i, one in enumerate(equations.states, start=equations.placing):
+        sizes[i] = one.nominal or sizes[i]
     for orientation in equations.orientation_coordinates:
         if orientation.kind == "rodrigues":
             sizes[list(orientation.coordinates)] = 0.25  # the tangent of a quarter of an angle
@@ -82,7 +84,7 @@ def multiplier_sizes(assembly: Assembly, form: FormName) -> FloatArray:
 
 def motion_names(equations: Equations) -> tuple[str, ...]:
     """Return what moves with each speed: a coordinate, or the speed's own name where none does so alone."""
-    alone = dict(zip(equations.rates, equations.names, strict=True))
+    alone = dict(zip(equations.rates[: equations.placing], equations.names, strict=False))
     return tuple(
         alone[speed].name if speed in alone else one.name
         for speed, one in zip(equations.speeds, equations.speed_names, strict=True)

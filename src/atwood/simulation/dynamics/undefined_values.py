@@ -150,7 +150,7 @@ def _quantities(local: LocalPart, mode: str) -> Iterator[tuple[str, list[Express
             yield f"the input {name!r}", [value]
     component = local.part.component
     bound = bind(component, local.binding)
-    for kind in ("potential", "dissipation", "force", "constraint"):
+    for kind in ("potential", "dissipation", "force", "constraint", "derivative"):
         for law in component.laws(kind):
             if not (law.holds_in(local.binding.space) and law.acts_in(mode or (component.modes or ("",))[0])):
                 continue
@@ -159,7 +159,7 @@ def _quantities(local: LocalPart, mode: str) -> Iterator[tuple[str, list[Express
             found = [value for value in values if isinstance(value, Expression)]
             if found:
                 yield f"the law {law.name!r}", found
-            if found and kind != "force":
+            if found and kind not in ("force", "derivative"):
                 yield f"the force of the law {law.name!r}", _slopes(local, found, kind == "dissipation")
 
 

@@ -130,10 +130,15 @@ class EventProbe:
         self._shift = np.zeros(len(small))
         values = np.asarray(self.values(t, q, u)) if self.event_functions else np.zeros(0)
         self.broken = next(
-            (one for one, v, s in zip(self.event_functions, values, small, strict=True) if one.direction * v > s), None
+            (
+                one
+                for one, v, s in zip(self.event_functions, values, small, strict=True)
+                if one.direction * v > s and not one.is_noted
+            ),
+            None,
         )
         for i, (one, value) in enumerate(zip(self.event_functions, values, strict=True)):
-            if abs(value) <= small[i]:
+            if abs(value) <= small[i] and not one.is_noted:
                 self._shift[i] = -one.direction * small[i]
 
     @property
@@ -218,9 +223,14 @@ class EventProbe:
         return self._record(*min(found, key=lambda one: one[0])) if found else None
 
     def name(self, t: float, events: Sequence[int]) -> EventRecord:
-        """Return what happened when the driver reports an event."""
-        function = next(one for one, sign in zip(self.event_functions, events, strict=True) if sign)
-        return self._record(t, function)
+        """Return what happened when the driver reports an event: of several, first what does not go on as before."""
+        fired = [one for one, sign in zip(self.event_functions, events, strict=True) if sign]
+        return self._record(t, next((one for one in fired if one.target), fired[0]))
+
+    def noted(self, t: float, events: Sequence[int]) -> list[EventRecord]:
+        """Return what changes nothing among what the driver reports."""
+        fired = (one for one, sign in zip(self.event_functions, events, strict=True) if sign)
+        return [self._record(t, one) for one in fired if not one.target]
 
     def _record(self, t: float, function: EventFunction) -> EventRecord:
         return EventRecord(t, function.part, function.law, function.message, function.target, function.impact)

@@ -10,6 +10,7 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.linalg.matrices import Matrix
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.model.local.states import declared_starts
 from atwood.simulation.dynamics.kinematic_map import (
     KinematicMap,
     best_rough_orientation,
@@ -74,9 +75,10 @@ def solve_positions(
     StartError
         If a loop cannot close, or what is fixed contradicts itself or the constraints.
     """
+    level, start = _without_states(assembly, equations, level)
     every = [*level.guessed, *level.fixed]
     kinematic_map = kinematic_map_of(assembly, "regular")
-    q, is_direct = said(equations.coordinates, every, reference_coordinates(equations))
+    q, is_direct = said(equations.coordinates, every, start)
     q = near_to = _turned(equations, kinematic_map, q)
     if not is_direct:
         system = System(assembly, equations, every, False)
@@ -100,8 +102,23 @@ def solve_positions(
     ) in equations.orientation_coordinates:  # what turns at all has no orientation, whichever coordinate shows it here
         assert tangent is not None
         tangent[list(orientation.coordinates)] = np.max(np.abs(tangent[list(orientation.coordinates)]), axis=0)
-    names = [one.name for one in equations.names]
+    names = [one.name for one in equations.names[: equations.placing]]
+    tangent = None if tangent is None else tangent[: equations.placing]
     return Positions(q, rough, *counted(names, tangent, level.fixed, system.constraints, matrix, errors))
+
+
+def _without_states(assembly: Assembly, equations: Equations, level: Level) -> tuple[Level, FloatArray]:
+    """Return what is said of places alone, and coordinates at rest in which the states of parts have their starts."""
+    q = reference_coordinates(equations)
+    known = declared_starts(assembly.flat.parts) if equations.states else {}
+    q[equations.placing :] = [known[one.path] for one in equations.states]
+    symbols = {one.symbol: i for i, one in enumerate(equations.states, start=equations.placing)}
+    for one in (*level.guessed, *level.fixed) if symbols else ():
+        if one.observable.value in symbols:
+            q[symbols[one.observable.value]] = one.value
+    symbols |= {one.symbol: -1 for one in assembly.discrete_states}
+    kept = ([one for one in ones if one.observable.value not in symbols] for ones in (level.fixed, level.guessed))
+    return Level(*kept), q
 
 
 def _is_met(residual: FloatArray) -> bool:

@@ -20,7 +20,7 @@ from atwood.model.values.vector import Vector
 
 __all__ = ["announce", "find_not_compilable"]
 
-_PLAIN = ("potential", "dissipation", "force", "inertia", "lagrangian")
+_PLAIN = ("potential", "dissipation", "force", "inertia", "lagrangian", "derivative")
 
 
 def find_not_compilable(assembly: Assembly, program: Program) -> str:

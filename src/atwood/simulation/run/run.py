@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -16,6 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
 from atwood.late import dataclass
+from atwood.mechanics.outputs.event_functions import UPDATE
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
     CoordinateSwitch,
@@ -27,6 +28,7 @@ from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.dynamics.undefined_values import undefined_value_at
 from atwood.simulation.events.impacts_in_time import pass_time_event
 from atwood.simulation.events.modes import EventProbe, EventRecord, enter_mode
+from atwood.simulation.events.sampling import Updated, find_sampler
 from atwood.simulation.events.time_events import Schedule, find_schedule
 from atwood.simulation.initialization.mobility import refuse_immobile
 from atwood.simulation.initialization.start import Start, settle
@@ -150,20 +152,36 @@ def run(
 
 
 def _prepared(
-    assembly: Assembly, start: Start, reassemble: Reassemble, options: RunOptions, between: FloatArray
+    assembly: Assembly,
+    start: Start,
+    reassemble: Reassemble,
+    options: RunOptions,
+    between: FloatArray,
+    known: Sequence[Updated] | None = None,
 ) -> _Walk:
-    """Return a run that is ready to go, with samples in between that change nothing."""
+    """Return a run that is ready to go, with samples in between that change nothing.
+
+    Where it is made again, it is known what updates have made of its states, and nobody is asked twice.
+    """
     samples = sample_times(start.time, options)
     schedule = find_schedule(assembly, start.time, options.t_end).at_samples(samples.times)
     _check_prescribed(schedule.rows(assembly, samples.times), samples.times)
-    again = partial(_again, assembly, start, reassemble)
-    walk = _Walk(assembly, start, options, reassemble, samples.with_more(between), again)
+    log: list[Updated] = []
+    again = partial(_again, assembly, start, reassemble, log)
+    walk = _Walk(assembly, start, options, reassemble, samples.with_more(between), again, log, known)
     walk.prepare()
     return walk
 
 
-def _again(assembly: Assembly, start: Start, reassemble: Reassemble, options: RunOptions, between: FloatArray) -> Run:
-    return _prepared(assembly, start, reassemble, options, between).go()
+def _again(
+    assembly: Assembly,
+    start: Start,
+    reassemble: Reassemble,
+    log: Sequence[Updated],
+    options: RunOptions,
+    between: FloatArray,
+) -> Run:
+    return _prepared(assembly, start, reassemble, options, between, log).go()
 
 
 def run_out_of_time(assembly: Assembly, start: Start | None, options: RunOptions) -> Run:
@@ -189,11 +207,13 @@ class _Walk:
         reassemble: Reassemble,
         samples: Samples,
         again: Callable[[RunOptions, FloatArray], Run],
+        log: list[Updated],
+        known: Sequence[Updated] | None = None,
     ) -> None:
         self.start, self.options, self._other = start, options, reassemble
         self.samples, self.again = samples, again
         self._schedules: dict[int, tuple[Shared, Schedule]] = {}
-        self._plans: dict[tuple[float, ...], Plan] = {}
+        self._plans: dict[tuple[tuple[float, ...], tuple[float, ...] | None], Plan] = {}
         self._piece_start = start.time
         self.segments: list[SegmentRecord] = []
         self.events: list[EventRecord] = []
@@ -201,6 +221,9 @@ class _Walk:
         self.statistics = Statistics(error_test_failures=0, convergence_failures=0)
         self.t = start.time
         self.assembly, self.q, self.u = settle(assembly, start, reassemble)
+        self.held = self.assembly.held_at_start
+        self.sampler = find_sampler(self.assembly, start.time, options.t_end, samples.own)
+        self._sampled, self.log, self._known = -np.inf, log, known
         self.assembly = self.first = self._in_piece(self.assembly)
         self.coordinate_switches: list[CoordinateSwitch] = []
         self.impact, self.show = False, bool(samples.shown[0])
@@ -225,6 +248,7 @@ class _Walk:
             before = self.t
             recorder, outcome = self._segment()
             self.t = outcome.t
+            self.events += outcome.noted
             chatter = chatter + 1 if outcome.t - before < 1e-9 * (self.options.t_end - self.start.time) else 0
             if outcome.event is None:
                 if outcome.status == "finished" and outcome.t < self.options.t_end:
@@ -251,11 +275,16 @@ class _Walk:
         after_time_event = schedule.piece(self.t) != schedule.piece(self._piece_start)
         if after_time_event:
             self._pass_time_event()
+        due = self.sampler.due_at(self.t) if self.t > self._sampled else ()
+        if due:
+            after_time_event = True
+            self._sampled = self.t
+            self._update(due)
         t, q, u = self.t, self.q, self.u
         self.prepare()
         assert self.plan is not None
         assert self.probe is not None
-        limit = schedule.next(t, options.t_end)
+        limit = min(schedule.next(t, options.t_end), self.sampler.next(t, options.t_end))
         ahead = self.samples.until(t, limit)
         if limit < options.t_end:  # the state just after it is shown
             ahead = ahead.without_last_shown()
@@ -281,11 +310,12 @@ class _Walk:
         plan = self.plan
         if plan is None:
             plan = self._plan()
-            if not self.segments and not options.structure:
+            has_states = bool(plan.assembly.equations.states or self.sampler.updates)
+            if not self.segments and not options.structure and not has_states:
                 refuse_immobile(self.assembly, len(plan.assembly.equations.speeds) - plan.finding.rank, self.start)
             self._plans, self.probe = {}, None
             self.choice = choose(plan, options, t, q, u)
-        self._plans.setdefault(self.assembly.relation_values, plan)
+        self._plans.setdefault(self._piece, plan)
         if self.probe is None:
             self.probe = EventProbe(plan, t, q, u, options.relative_tolerance)
         self.plan = plan
@@ -312,14 +342,21 @@ class _Walk:
         """Return the time events of a scene in one mode."""
         key = id(assembly.shared)
         if key not in self._schedules:
-            schedule = find_schedule(assembly, self.start.time, self.options.t_end).at_samples(self.samples.own)
+            moments = np.union1d(self.samples.own, self.sampler.times) if len(self.sampler.times) else self.samples.own
+            schedule = find_schedule(assembly, self.start.time, self.options.t_end).at_samples(moments)
             self._schedules[key] = assembly.shared, schedule  # kept, so that its identity stays its own
         return self._schedules[key][1]
 
     def _in_piece(self, assembly: Assembly) -> Assembly:
         """Return a scene with the relations of functions of time that hold in the present piece of the run."""
         schedule = self._schedule(assembly)
-        return schedule.applied(assembly, schedule.piece(self._piece_start))
+        found = schedule.applied(assembly, schedule.piece(self._piece_start))
+        return found.with_held(self.held) if self.held else found
+
+    @property
+    def _piece(self) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
+        """What tells the parameters of pieces of a run apart."""
+        return self.assembly.relation_values, self.assembly.held
 
     def _reassemble(
         self,
@@ -342,10 +379,30 @@ class _Walk:
             self.segments[-1].shown[-1] = True
         if self.plan is not None:
             self.probe = None
-            known = self._plans.get(self.assembly.relation_values)
+            known = self._plans.get(self._piece)
             self.plan = self.plan.in_piece(self.assembly) if known is None else known
             self.assembly = self.plan.assembly
             self.plan.review_partitioning(self.t, self.q)
+
+    def _update(self, due: Sequence[int]) -> None:
+        """Go on with what updates make of the state."""
+        before = self.assembly
+        if self._known is not None and len(self.log) < len(self._known):
+            made = self._known[len(self.log)]
+        else:
+            made = self.sampler.call(due, before, self.t, self.q, self.u)
+        self.log.append(made)
+        self.q, self.held = made.coordinates, made.held
+        self.assembly = before.with_held(self.held) if self.held else before
+        length = self.start.length
+        self.q, self.u, impacts = pass_time_event(before, self.assembly, self.t, self.q, self.u, length)
+        self.show = self.show or self.samples.shows(self.t)
+        if impacts:
+            self.events += impacts
+            self.impact = self.show = True
+        if self.plan is not None:
+            self.probe, self._plans = None, {}
+            self.plan = self.plan.in_piece(self.assembly)
 
     def _switch_coordinates(self, event: EventRecord, recorder: Recorder) -> None:
         """Go on in other coordinates of an orientation."""
@@ -357,10 +414,17 @@ class _Walk:
     def _enter(self, event: EventRecord, recorder: Recorder) -> None:
         """Enter the mode that an event leads to."""
         _, q, u, _ = recorder.last()
-        self.assembly, self.q, self.u = enter_mode(
-            (self.t, q, u), self.assembly, event, self._reassemble, self.start.length
-        )
-        self.plan, self.impact, self.show = None, event.impact, True
+        self.impact, self.show = event.impact, True
+        if event.target == UPDATE:
+            self.q, self.u = q, u
+        else:
+            self.assembly, self.q, self.u = enter_mode(
+                (self.t, q, u), self.assembly, event, self._reassemble, self.start.length
+            )
+            self.plan = None
+        due = self.sampler.due_after(event.part, event.law)
+        if due:
+            self._update(due)
 
     def _made(self, status: str, message: str, outcome: Outcome) -> Run:
         """Return the run, or raise with it what made it fail."""

@@ -96,6 +96,8 @@ class Outcome:
         What went wrong, where that names a part.
     switched
         Orientations that went on in other coordinates.
+    noted
+        Events on the way that change nothing.
     """
 
     t: float
@@ -106,6 +108,7 @@ class Outcome:
     event: EventRecord | None = None
     error: SolveError | None = None
     coordinate_switches: tuple[CoordinateSwitch, ...] = ()
+    noted: tuple[EventRecord, ...] = ()
 
 
 def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u: FloatArray) -> Outcome:
@@ -136,21 +139,30 @@ def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u
 def _follow(segment: Segment, recorder: Recorder, t: float) -> Outcome:
     """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen."""
     nothing, last, options = np.zeros(0), t, segment.options
+    noted: list[EventRecord] = []
+
+    def ended(t: float, status: str, message: str = "", event: EventRecord | None = None) -> Outcome:
+        return Outcome(t, status, message, Statistics(), (segment.choice,), event, noted=tuple(noted))
+
     try:
         for moment, show in zip(segment.samples.times, segment.samples.shown, strict=True):
             check_time()
             event = segment.probe.between(last, float(moment))
+            while event is not None and not event.target:
+                noted.append(event)
+                recorder.take(event.time, nothing, True)
+                event = segment.probe.between(event.time, float(moment))
             if event is not None:
                 recorder.take(event.time, nothing, True)
-                return Outcome(event.time, "event", "", Statistics(), (segment.choice,), event)
+                return ended(event.time, "event", event=event)
             last = float(moment)
             recorder.take(last, nothing, bool(show))
             if options.progress is not None:
                 options.progress(last)
     except TimeIsUp:
         last = recorder.close()
-        return Outcome(last, "time_limit", options.out_of_time(last), Statistics(), (segment.choice,))
-    return Outcome(last, "finished", "", Statistics(), (segment.choice,))
+        return ended(last, "time_limit", options.out_of_time(last))
+    return ended(last, "finished")
 
 
 class _Runner:
@@ -164,6 +176,7 @@ class _Runner:
         self.monitor: SingularityMonitor | None = None
         self.request: SolverRequest | None = None
         self.coordinate_switches: list[CoordinateSwitch] = []
+        self.noted: list[EventRecord] = []
 
     def run(self, t: float, y: FloatArray, yp: FloatArray) -> Outcome:
         """Go from sample to sample; change the solver where the scene turns out stiff."""
@@ -178,7 +191,9 @@ class _Runner:
                     session = self.session or session
                 if step_result is not None and step_result.status is Status.STIFF:
                     session = self._open(*self._change_solver(step_result))
-                elif step_result is None or not self._switches_coordinates(session, step_result):
+                elif step_result is None or not (
+                    self._notes(step_result) or self._switches_coordinates(session, step_result)
+                ):
                     break
             return self._outcome(step_result)
         except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
@@ -195,7 +210,13 @@ class _Runner:
 
     def _ended(self, t: float, status: str, message: str) -> Outcome:
         return Outcome(
-            t, status, message, self._cost(), tuple(self.choices), coordinate_switches=tuple(self.coordinate_switches)
+            t,
+            status,
+            message,
+            self._cost(),
+            tuple(self.choices),
+            coordinate_switches=tuple(self.coordinate_switches),
+            noted=tuple(self.noted),
         )
 
     def _cost(self) -> Statistics:
@@ -228,6 +249,16 @@ class _Runner:
             message = self.segment.options.out_of_steps(step_result.t)
         ended = self._ended(step_result.t, step_result.status.value, message)
         return ended if step_result.status is not Status.FAILED else replace(ended, error=self._explain(step_result))
+
+    def _notes(self, step_result: StepResult) -> bool:
+        """After an event that changes nothing, note it: the solver then goes on as if nothing had happened."""
+        if step_result.status is not Status.EVENT:
+            return False
+        self.noted += self.segment.probe.noted(step_result.t, step_result.events)
+        if self.segment.probe.name(step_result.t, step_result.events).target:
+            return False
+        self.recorder.take(step_result.t, step_result.y, True)
+        return True
 
     def _switches_coordinates(self, session: Session, step_result: StepResult) -> bool:
         """After an event, go on in other coordinates of an orientation, if that is all that has happened."""

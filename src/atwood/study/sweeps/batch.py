@@ -53,6 +53,8 @@ def why_not_batched(request: SweepRequest) -> str:
     if equations.constraints or not equations.coordinates:
         is_free = not equations.constraints
         return "nothing is free to move" if is_free else "constraints are left among its coordinates"
+    if equations.states or assembly.discrete_states:
+        return "parts of it have states of their own"
     if find_event_functions(assembly):
         return "events are watched"
     if assembly.relations or equations.prescribed:

@@ -1,0 +1,391 @@
+"""Updates of states at moments: sample times that are known beforehand, and events.
+
+A run stops at each sample time, as it does at a time event, and goes on with other values of the parameters that stand
+for discrete states: no equation, program or kernel is made for it. Updates are called on numbers, so that they may be
+any Python.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import AtwoodError, DeclarationError, ParameterError, SolveError
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
+from atwood.forms.assembly import Assembly
+from atwood.forms.program import state_groups
+from atwood.late import dataclass
+from atwood.mechanics.build import resolve_signals
+from atwood.model.declare.binding import Binding
+from atwood.model.declare.component import bind
+from atwood.model.declare.laws import Law
+
+__all__ = ["Sampler", "Updated", "find_sampler"]
+
+_ROUNDING = 16.0
+"""Times that are so many units of rounding apart are one moment."""
+
+_MOST = 10_000_000
+"""More sample times than these are no run."""
+
+
+@dataclass(frozen=True)
+class Updated:
+    """What updates have made of a state.
+
+    Attributes
+    ----------
+    held
+        Values of the discrete states.
+    coordinates
+        Those of the form.
+    """
+
+    held: tuple[float, ...]
+    coordinates: FloatArray
+
+
+@dataclass(frozen=True)
+class _Update:
+    """One update law of a part.
+
+    Attributes
+    ----------
+    path, law
+        Whose it is.
+    every, offset
+        Its sample time, and when it is called first after the start, s; None where an event calls it.
+    sets
+        Paths of the numbers that it sets.
+    reads
+        The inputs that it reads.
+    """
+
+    path: str
+    law: Law
+    every: float | None
+    offset: float
+    sets: tuple[str, ...]
+    reads: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        """Its path."""
+        return f"{self.path}.{self.law.name}"
+
+
+@dataclass(frozen=True, eq=False)
+class Sampler:
+    """The sample times of a scene in a run, and what happens then.
+
+    Attributes
+    ----------
+    updates
+        Its update laws.
+    times
+        When there is something to do, s, in order.
+    due
+        For each of these, which updates.
+    """
+
+    updates: tuple[_Update, ...]
+    times: FloatArray
+    due: Sequence[tuple[int, ...]]
+
+    def next(self, t: float, end: float) -> float:
+        """Return the next sample time after a time, or the end of the run."""
+        number = int(np.searchsorted(self.times, t, side="right"))
+        return float(self.times[number]) if number < len(self.times) else end
+
+    def due_at(self, t: float) -> tuple[int, ...]:
+        """Return which updates are due at a time."""
+        number = int(np.searchsorted(self.times, t, side="left"))
+        return self.due[number] if number < len(self.times) and self.times[number] == t else ()
+
+    def due_after(self, part: str, event: str) -> tuple[int, ...]:
+        """Return which updates an event calls."""
+        return tuple(i for i, one in enumerate(self.updates) if one.path == part and one.law.options.at == event)
+
+    def call(self, chosen: Iterable[int], assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Updated:
+        """Return what updates make of a state, one after the other.
+
+        Parameters
+        ----------
+        chosen
+            Which of them.
+        assembly
+            The scene with the values that are held so far.
+        t, q, u
+            The state, in the coordinates of the form.
+
+        Raises
+        ------
+        SolveError
+            If one of them raises something, or returns what is no number for each state that it sets.
+        """
+        reading = _reading_of(assembly)
+        held = list(assembly.held_at_start if assembly.held is None else assembly.held)
+        q, values = q.copy(), None
+        order = _ordered([self.updates[i] for i in chosen], reading)
+        for one in order:
+            if values is None:
+                values = reading.values(assembly, t, q, u, held)
+            given = _evaluated(one, assembly, t, values, reading)
+            for path, value in zip(one.sets, given, strict=True):
+                if path in reading.held:
+                    held[reading.held[path]] = value
+                else:
+                    q[reading.states[path]] = value
+            values = None
+        return Updated(tuple(held), q)
+
+
+@dataclass(frozen=True, eq=False)
+class _Reading:
+    """What updates read, as one program.
+
+    Attributes
+    ----------
+    program
+        Of (t, q, u, held), with the inputs of all parts that have updates.
+    inputs
+        Part and name of each of its results.
+    feeds
+        For each of these, the paths of the states that it depends on.
+    held, states
+        Numbers of discrete states among the assembly's, and of continuous ones among the coordinates, by path.
+    """
+
+    program: Program
+    inputs: tuple[tuple[str, str], ...]
+    feeds: Mapping[tuple[str, str], frozenset[str]]
+    held: Mapping[str, int]
+    states: Mapping[str, int]
+
+    def values(
+        self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray, held: Sequence[float]
+    ) -> dict[str, dict[str, Any]]:
+        """Return what the laws of parts read: inputs by part and name, and states by path under an empty name."""
+        kernel = assembly.known_kernel(self.program, self._known(assembly))
+        (results,) = kernel([t], q, u, held)
+        found: dict[str, dict[str, Any]] = {"": {path: float(q[i]) for path, i in self.states.items()}}
+        found[""] |= {path: held[i] for path, i in self.held.items()}
+        for (part, name), value in zip(self.inputs, results, strict=True):
+            found.setdefault(part, {})[name] = float(value)
+        return found
+
+    @staticmethod
+    def _known(assembly: Assembly) -> FloatArray:
+        """Return the values of all parameters but the discrete states."""
+        first = len(assembly.mechanism.table.values)
+        values = assembly.parameter_values
+        return np.concatenate([values[:first], values[first + len(assembly.discrete_states) :]])
+
+
+def _reading_of(assembly: Assembly) -> _Reading:
+    return assembly.shared.get("update inputs", lambda: _make_reading(assembly))
+
+
+def _make_reading(assembly: Assembly) -> _Reading:
+    mechanism, equations, graph = assembly.mechanism, assembly.equations, assembly.equations.graph
+    signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
+    places, expressions = [], []
+    for path, local in mechanism.locals_.items():
+        for name in local.part.signals if local.part.component.laws("update") else ():
+            symbol = local.signal_symbols.get(name)
+            places.append((path, name))
+            expressions.append(graph.convert(local.binding.values[name] if symbol is None else signals[symbol]))
+    late = [*equations.accelerations, *equations.multipliers, *(one.symbol for one in assembly.reactions)]
+    for (path, name), value in zip(places, expressions, strict=True):
+        if depends_on(value, late):
+            raise DeclarationError(
+                "it is sampled, and reads accelerations or reactions that no force reads",
+                where=f"{path}.{name}",
+                advice="Sample positions, velocities and states.",
+            )
+    symbols: dict[Expression, str] = {one.symbol: one.path for one in assembly.discrete_states}
+    symbols |= {one.symbol: one.path for one in equations.states}
+    feeds = {
+        place: frozenset(path for symbol, path in symbols.items() if depends_on(value, [symbol]))
+        for place, value in zip(places, expressions, strict=True)
+    }
+    held = tuple(one.symbol for one in assembly.discrete_states)
+    rest = tuple(one for one in assembly.parameters if one not in set(held))
+    groups = (*state_groups(equations), InputGroup("held", held))
+    program = Program(
+        f"{assembly.flat.name} sampled inputs", groups, rest, (OutputGroup("inputs", tuple(expressions)),)
+    )
+    return _Reading(
+        program,
+        tuple(places),
+        feeds,
+        {one.path: i for i, one in enumerate(assembly.discrete_states)},
+        {one.path: i for i, one in enumerate(equations.states, start=equations.placing)},
+    )
+
+
+def _ordered(updates: Sequence[_Update], reading: _Reading) -> list[_Update]:
+    """Return updates of one moment, each after those that set what its inputs are made of.
+
+    Raises
+    ------
+    DeclarationError
+        If there is no such order.
+    """
+    if len(updates) < 2:
+        return list(updates)
+    before: dict[str, set[str]] = {one.label: set() for one in updates}
+    last: dict[str, str] = {}
+    for one in updates:
+        for other in updates:
+            fed = {path for name in one.reads for path in reading.feeds[one.path, name]}
+            if other is not one and other.path != one.path and fed & set(other.sets):
+                before[one.label].add(other.label)
+        if one.path in last:  # those of one part in the order in which they are declared
+            before[one.label].add(last[one.path])
+        last[one.path] = one.label
+    waiting, found = {one.label: one for one in updates}, []
+    while waiting:
+        ready = [label for label in waiting if not before[label] & set(waiting)]
+        if not ready:
+            raise DeclarationError(
+                f"sampled parts feed each other in a circle within one moment: {' -> '.join(_circle(waiting, before))}",
+                where=next(iter(waiting)),
+                advice="Put a delay by one sample somewhere in it.",
+            )
+        found.append(waiting.pop(ready[0]))
+    return found
+
+
+def _circle(waiting: Mapping[str, _Update], before: Mapping[str, set[str]]) -> list[str]:
+    """Return a circle among updates that wait for each other, from one that feeds to the one that is fed."""
+    way = [next(iter(waiting))]
+    while way.count(way[-1]) < 2:
+        way.append(min(before[way[-1]] & set(waiting)))
+    return way[way.index(way[-1]) :][::-1]
+
+
+def _evaluated(
+    one: _Update, assembly: Assembly, t: float, values: Mapping[str, Mapping[str, Any]], reading: _Reading
+) -> list[float]:
+    """Return the numbers that one update returns."""
+    part, space = assembly.flat.parts[one.path], assembly.mechanism.space
+    known: dict[str, Any] = {**part.values, **values.get(one.path, {})}
+    for name, spec in part.component.state_specs().items():
+        numbers = [values[""][f"{one.path}.{own}"] for own in spec.names(part.values)]
+        known[name] = numbers[0] if spec.count is None else tuple(numbers)
+    bound = bind(part.component, Binding(values=known, time=t, space=space.name, line=space.line))
+    try:
+        given = _flat(getattr(bound, one.law.name)())
+    except AtwoodError:
+        raise
+    except Exception as error:  # whatever somebody's own Python can raise
+        raise SolveError(
+            f"at t = {t:.9g} the update raises {type(error).__name__}: {error}",
+            where=one.label,
+            advice="It is called on numbers: parameters, inputs, states and the time.",
+        ) from error
+    if len(given) != len(one.sets) or not np.all(np.isfinite(given)):
+        raise SolveError(
+            f"at t = {t:.9g} it returns {given}, which is no finite number for each of {', '.join(one.sets)}",
+            where=one.label,
+        )
+    return given
+
+
+def _flat(value: Any) -> list[float]:
+    """Return the numbers in what an update returned."""
+    if isinstance(value, np.ndarray):
+        return [float(number) for number in value.ravel()]
+    if isinstance(value, Iterable) and not isinstance(value, str):
+        return [number for one in value for number in _flat(one)]
+    return [float(value)]
+
+
+def find_sampler(assembly: Assembly, start: float, end: float, moments: FloatArray) -> Sampler:
+    """Return the updates of a scene, and when they are due in a run.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    start, end
+        The run, s.
+    moments
+        Outputs: a sample time that is at one of these but for rounding is at it.
+
+    Raises
+    ------
+    ParameterError
+        If a sample time is not above zero.
+    DeclarationError
+        If parts feed each other in a circle within one moment.
+    """
+    updates = tuple(_updates(assembly))
+    times: dict[float, list[int]] = {}
+    for number, one in enumerate(updates):
+        for t in _times(one, start, end):
+            times.setdefault(t, []).append(number)
+    order = sorted(times)
+    merged: list[float] = []
+    due: list[tuple[int, ...]] = []
+    for t in order:
+        if merged and t - merged[-1] <= _ROUNDING * np.spacing(abs(t)):
+            due[-1] = tuple(sorted({*due[-1], *times[t]}))
+        else:
+            merged.append(t)
+            due.append(tuple(times[t]))
+    if updates:
+        reading = _reading_of(assembly)
+        for chosen in set(due):
+            _ordered([updates[i] for i in chosen], reading)
+    return Sampler(updates, _snapped(np.array(merged), moments), due)
+
+
+def _updates(assembly: Assembly) -> Iterable[_Update]:
+    for path, part in assembly.flat.parts.items():
+        specs = part.component.state_specs()
+        for law in part.component.laws("update"):
+            options = law.options
+            sets = tuple(f"{path}.{own}" for name in options.sets for own in specs[name].names(part.values))
+            reads = tuple(part.signals) if options.reads is None else options.reads
+            every = None if options.every is None else _seconds(part, law, "every")
+            if every is not None and not every > 0.0:
+                where = f"{path}.{options.every}" if isinstance(options.every, str) else f"{path}.{law.name}"
+                raise ParameterError(
+                    f"its sample time is {every:g} s", where=where, advice="Give a sample time above zero."
+                )
+            yield _Update(path, law, every, _seconds(part, law, "offset"), sets, reads)
+
+
+def _seconds(part: Any, law: Law, option: str) -> float:
+    given = getattr(law.options, option)
+    return float(part.values[given] if isinstance(given, str) else given)
+
+
+def _times(one: _Update, start: float, end: float) -> list[float]:
+    """Return when an update is due; not at the very end of a run, at which values are those before it."""
+    if one.every is None:
+        return []
+    span = end - start - one.offset
+    if span / one.every > _MOST:
+        raise ParameterError(
+            f"its sample time {one.every:g} s asks for more than {_MOST} updates in this run", where=one.label
+        )
+    count = max(0, int(np.ceil(span / one.every)) + 1)
+    times = start + (one.offset + one.every * np.arange(count))
+    last = end - _ROUNDING * np.spacing(abs(end))
+    return [float(t) for t in times[times < last]]
+
+
+def _snapped(times: FloatArray, moments: FloatArray) -> FloatArray:
+    """Return times, those that are as good as one of some moments put there."""
+    if not len(times) or not len(moments):
+        return times
+    after = np.clip(np.searchsorted(moments, times), 1, max(1, len(moments) - 1))
+    low, high = moments[after - 1], moments[np.minimum(after, len(moments) - 1)]
+    nearest = np.where(times - low < high - times, low, high)
+    return np.where(np.abs(nearest - times) <= _ROUNDING * np.spacing(np.abs(times)), nearest, times)
