@@ -27,6 +27,7 @@ __all__ = [
     "ImplicitProblem",
     "IndexArray",
     "LinearSolver",
+    "Lookout",
     "NativeCallbacks",
     "OpenSession",
     "Session",
@@ -103,6 +104,33 @@ class NativeCallbacks:
     last_rate: Callable[[], float] | None = None
     keep: object = None
     data_bytes: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Lookout:
+    """Compiled functions that look at a motion now and then, and say when somebody else should.
+
+    Parameters
+    ----------
+    drive
+        Address of ``int (solve, steps, memory, double t_out, double *reached, y, yp, double *y_at, double *yp_at, long
+        allowed, data)``: sends a solver on to a time from look to look, with the addresses of its functions that go
+        on and that count steps.
+    noticed
+        The flag that it then returns; else it returns the solver's, or -1 after as many steps as were allowed.
+    data
+        Its last argument.
+    due
+        When the next look is to be taken.
+    keep
+        Whatever must live as long as the addresses are used.
+    """
+
+    drive: int
+    noticed: int
+    data: int
+    due: Callable[[], float]
+    keep: object = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,9 +272,10 @@ class Budget:
 
 
 class Status(Enum):
-    """Why an advance ended; `STIFF` where another method was asked to take over."""
+    """Why an advance ended; `STIFF` where another method was asked to take over, `NOTICED` by a `Lookout`."""
 
     REACHED = "reached"
+    NOTICED = "noticed"
     EVENT = "event"
     FAILED = "failed"
     STEP_LIMIT = "step_limit"

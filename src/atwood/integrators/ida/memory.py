@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import weakref
+from collections.abc import Callable
 from ctypes import c_double, c_int, c_long, c_void_p
 from typing import Any
 
@@ -13,7 +14,7 @@ from atwood.errors import UsageError
 from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.ida.signatures import JACOBIAN
 from atwood.integrators.ida.sparse import SparseSolver
-from atwood.integrators.protocol import FloatArray, LinearSolver
+from atwood.integrators.protocol import FloatArray, LinearSolver, Lookout
 from atwood.late import dataclass
 
 __all__ = ["ONE_STEP", "ROOT_RETURN", "STOPPED_BY_WEIGHTS", "TOO_MUCH_WORK", "TO_TIME", "Counts", "IdaMemory"]
@@ -205,6 +206,22 @@ class IdaMemory:
         """Go on; return IDA's flag and the time that belongs to `y` and `yp`."""
         flag = self.library.IDASolve(self._ida, t_out, self._time_place, self._y, self._yp, task)
         return flag, self._time.value
+
+    def look_out(self, lookout: Lookout) -> Callable[[float, int], tuple[int, float]]:
+        """Return what goes on to a time with at most so many steps, and looks at the motion on its way."""
+        library, place = self.library, c_void_p()
+        drive = ctypes.CFUNCTYPE(c_int, c_void_p, c_void_p, c_void_p, c_double, *[c_void_p] * 5, c_long, c_void_p)
+        call = drive(lookout.drive)
+        solve, steps = (ctypes.cast(getattr(library, name), c_void_p).value for name in ("IDASolve", "IDAGetNumSteps"))
+        reached, y, yp = ctypes.addressof(self._time), self.y.ctypes.data, self.yp.ctypes.data
+        place.value = lookout.data
+        self.keep(lookout)
+
+        def go(t_out: float, allowed: int) -> tuple[int, float]:
+            flag = call(solve, steps, self._ida, t_out, reached, self._y, self._yp, y, yp, allowed, place)
+            return flag, self._time.value
+
+        return go
 
     def interpolate(self, t: float) -> int:
         """Put the solution at a time inside the last step into `y` and `yp`; return IDA's flag."""

@@ -30,6 +30,7 @@ from atwood.integrators.protocol import (
     Budget,
     FloatArray,
     ImplicitProblem,
+    Lookout,
     SolverOptions,
     Statistics,
     Status,
@@ -53,6 +54,7 @@ def open_session(
     yp: FloatArray,
     budget: Budget | None = None,
     tuning: IdaTuning | None = None,
+    lookout: Lookout | None = None,
 ) -> NativeSession:
     """Start a run with SUNDIALS' own IDA.
 
@@ -68,6 +70,8 @@ def open_session(
         Limits of the session.
     tuning
         What only this driver can set.
+    lookout
+        What looks at the motion; see `NativeSession.looks_out`.
 
     Returns
     -------
@@ -79,7 +83,7 @@ def open_session(
     ~atwood.integrators.ida.library.SundialsMissing
         If the libraries cannot be used; `available` tells beforehand.
     """
-    return NativeSession(problem, options, t, y, yp, budget, tuning)
+    return NativeSession(problem, options, t, y, yp, budget, tuning, lookout)
 
 
 class NativeSession:
@@ -89,8 +93,13 @@ class NativeSession:
 
     Parameters
     ----------
-    problem, options, t, y, yp, budget, tuning
+    problem, options, t, y, yp, budget, tuning, lookout
         As in `open_session`.
+
+    Attributes
+    ----------
+    looks_out
+        Whether the lookout is used: not where single steps are taken.
     """
 
     def __init__(
@@ -102,6 +111,7 @@ class NativeSession:
         yp: FloatArray,
         budget: Budget | None = None,
         tuning: IdaTuning | None = None,
+        lookout: Lookout | None = None,
     ) -> None:
         self.budget = budget or Budget()
         self._opened = 0.0  # when it first went on
@@ -119,6 +129,11 @@ class NativeSession:
         self._locator = EventLocator(problem, options.horizon) if problem.events is not None else None
         # Whether IDA itself can tell in which steps something happens.
         self._finds_events = self._native is not None and self._native.events != 0
+        self._by_steps = self.budget.poll is not None or (self._locator is not None and not self._finds_events)
+        self.looks_out = lookout is not None and not self._by_steps
+        self._look_out = None if lookout is None or self._by_steps else self._memory.look_out(lookout)
+        self._noticed_flag = None if lookout is None else lookout.noticed
+        self._due = lookout.due if lookout is not None and self.looks_out else lambda: inf
         self._no_events = (0,) * problem.event_count
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
         self._starts = 0
@@ -244,14 +259,14 @@ class NativeSession:
     def _run(self, t_out: float) -> StepResult:
         if self._stale:
             self._restart(self._here)
-        by_steps = self.budget.poll is not None or (self._locator is not None and not self._finds_events)
+        by_steps = self._by_steps
         while True:
             is_known = self._looks_on and not self._searched < t_out <= self._reached
             root = None if is_known else self._find_root()
             if root is not None and root.state[0] <= t_out:
                 self._root, self._here = None, root.state
                 return StepResult(*copied(root.state), Status.EVENT, root.events)
-            if t_out <= self._reached:
+            if t_out <= self._reached and not self._due() <= t_out:
                 return self._arrive(t_out)
             if by_steps:
                 self._here = self._end_of_step()
@@ -334,12 +349,19 @@ class NativeSession:
         pace.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
         if flag >= 0:
             self._reached = self._memory.time()
+            if flag == self._noticed_flag:
+                if not is_finite(self._memory.y, self._memory.yp):
+                    self._stale = True
+                    return self._stopped(Status.FAILED, "the solution is no longer finite")
+                self._here = t, self._memory.y.copy(), self._memory.yp.copy()
             if self._locator is not None:
                 # IDA has looked for events: up to where it was sent, or not up to the end of a step that has one.
                 begin = self._memory.begin_of_step()
                 self._searched = max(self._searched, begin if flag == ROOT_RETURN else t)
                 self._looks_on = flag != ROOT_RETURN
-            return None
+            return (
+                StepResult(*copied(self._here), Status.NOTICED, self._no_events) if flag == self._noticed_flag else None
+            )
         failure = self._judge(0 if flag == TOO_MUCH_WORK else flag, t)
         if failure is None:
             self._reached = self._searched = t
@@ -348,14 +370,19 @@ class NativeSession:
 
     def _solve(self, t_out: float, task: int) -> tuple[int, float]:
         with self._guard:
-            flag, t = self._memory.solve(t_out, task)
+            flag, t = self._go_on(t_out, task)
             while (flag == STOPPED_BY_WEIGHTS and self._attend(t)) or (flag == NO_EVENT_VALUE and self._noticed()):
                 if flag == NO_EVENT_VALUE and task == TO_TIME:
                     flag = ROOT_RETURN
                     break
-                flag, t = self._memory.solve(t_out, task)
+                flag, t = self._go_on(t_out, task)
         self._is_first = False
         return flag, t
+
+    def _go_on(self, t_out: float, task: int) -> tuple[int, float]:
+        if self._look_out is None or task != TO_TIME:
+            return self._memory.solve(t_out, task)
+        return self._look_out(t_out, self._pace.allowed)
 
     def _noticed(self) -> bool:
         """Tell whether the functions of events only said that something may have happened within a step."""

@@ -325,7 +325,7 @@ class _Runner:
             here = StepResult(t, y, yp, Status.REACHED)
             self.request = request
             self.monitor = singularity_monitor_of(segment.plan, options.relative_tolerance, segment.end, here)
-            self.session = open_implicit_session(request, choice.solver, t, y, yp)
+            self.session = open_implicit_session(request, choice.solver, t, y, yp, self.monitor)
         else:
             leave = self._is_stiff if options.solver == "auto" else None
             self.session = open_explicit_session(request, choice.solver, t, y, leave)
@@ -382,8 +382,10 @@ class _Runner:
             step_result = session.advance(target)
             if step_result.status is Status.FAILED and self._repartitioned(session, step_result):
                 step_result = session.advance(target)
+            noticed = step_result.status is Status.NOTICED
+            between = between or noticed
             turned = self._turned(step_result) if between or monitor is None else None
-            at_end = moment >= segment.end or turned is not None
+            at_end = (moment >= segment.end and not noticed) or turned is not None
             crossing = None if monitor is None else monitor.look(step_result, between, at_end)
             if crossing is not None:
                 done, stopped = self._pass_over(session, crossing)
@@ -396,7 +398,7 @@ class _Runner:
                     if one.path is None:
                         warnings.warn(one.describe(), stacklevel=2)
                 monitor.agreed.clear()
-            if step_result.status is not Status.REACHED:
+            if step_result.status not in (Status.REACHED, Status.NOTICED):
                 return done, step_result
             if turned is not None:
                 session = self._keep(turned, step_result)
@@ -447,7 +449,8 @@ class _Runner:
         """Return which constraints are better kept from here on, if those that are have become a poor choice."""
         plan = self.segment.plan
         q, _ = plan.program.split(step_result.y)
-        return plan.better_kept(step_result.t, q) if step_result.status is Status.REACHED else None
+        is_there = step_result.status in (Status.REACHED, Status.NOTICED)
+        return plan.better_kept(step_result.t, q) if is_there else None
 
     def _keep(self, finding: RankFinding, step_result: StepResult) -> Session:
         """Go on with other constraints kept, from the same state."""

@@ -22,6 +22,7 @@ from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.options import SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
+from atwood.simulation.singular.monitor import SingularityMonitor
 
 __all__ = ["SolverRequest", "open_explicit_session", "open_implicit_session"]
 
@@ -61,7 +62,14 @@ class SolverRequest:
         )
 
 
-def open_implicit_session(request: SolverRequest, solver: str, t: float, y: FloatArray, yp: FloatArray) -> Session:
+def open_implicit_session(
+    request: SolverRequest,
+    solver: str,
+    t: float,
+    y: FloatArray,
+    yp: FloatArray,
+    monitor: SingularityMonitor | None = None,
+) -> Session:
     """Start IDA, driven directly or through scikit-sundae.
 
     Parameters
@@ -72,6 +80,8 @@ def open_implicit_session(request: SolverRequest, solver: str, t: float, y: Floa
         ``"ida"`` or ``"ida-sundae"``.
     t, y, yp
         Consistent start values.
+    monitor
+        What looks out for singular positions; a session looks itself, if it can.
     """
     plan, probe, settings = request.plan, request.probe, request.settings(t)
     if solver == "ida":
@@ -79,7 +89,13 @@ def open_implicit_session(request: SolverRequest, solver: str, t: float, y: Floa
         from atwood.integrators.ida import native as ida_native
 
         tuning = ida_native.IdaTuning(angle_like=plan.angles, stop_time=request.end)
-        return ida_native.open_session(problem, settings, t, y, yp, request.budget, tuning)
+        lookout = None if monitor is None else monitor.lookout
+        session = ida_native.open_session(problem, settings, t, y, yp, request.budget, tuning, lookout)
+        if monitor is not None and not session.looks_out:
+            monitor.look_in_python()
+        return session
+    if monitor is not None:
+        monitor.look_in_python()
     from atwood.integrators.ida.sundae import open_session
 
     return open_session(_implicit_problem(request), settings, t, y, yp, request.budget)

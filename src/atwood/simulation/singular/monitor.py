@@ -13,24 +13,19 @@ import time
 import numpy as np
 
 from atwood.errors import AtwoodError, SolveError
-from atwood.integrators.protocol import FloatArray, Status, StepResult
-from atwood.late import dataclass
+from atwood.integrators.protocol import FloatArray, Lookout, Status, StepResult
+from atwood.simulation.dynamics.rank import TRUSTED
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely, project_states
 from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow
 from atwood.simulation.singular.crossing import SingularCrossing, stuck_at
+from atwood.simulation.singular.looks import Look, as_lookout, compiled_looks, cubic, stride_from
 from atwood.simulation.singular.rank_measure import RankMeasure, find_crossing, find_loss, nearly_lost
 
 __all__ = ["SingularityMonitor", "singularity_monitor_of"]
 
-_MOVE = 0.3
-"""Between two looks nothing moves by more of its size; an angle by so many radians."""
-
-_SHARE = 0.01
-"""What rests is looked at after this share of a run: it may be set in motion."""
-
 _REVIEW = 8
-"""So many looks are judged together."""
+"""So many looks are judged together where they are not compiled."""
 
 _LOW = 0.3
 """Only where the measure is so small, relative to the largest so far, is it looked at more closely."""
@@ -79,17 +74,11 @@ def singularity_monitor_of(
     return SingularityMonitor(plan, tolerance, end, step_result)
 
 
-@dataclass(frozen=True, eq=False)
-class _Look:
-    t: float
-    y: FloatArray
-    yp: FloatArray
-
-
 class SingularityMonitor:
     """Looks out for singular positions while a scene runs.
 
-    When it looks depends on the motion alone, so that outputs change nothing.
+    When it looks depends on the motion alone, so that outputs change nothing. Where a session can do so it looks by
+    itself, compiled, and comes back only where something is low.
 
     Parameters
     ----------
@@ -108,6 +97,10 @@ class SingularityMonitor:
         Time spent.
     agreed
         Passages that the solver made by itself, and well; whoever takes them into a record empties the list.
+    lookout
+        What a session may look with; None where nothing can be compiled.
+    next
+        When somebody should look next, s; infinite where a session does.
     trouble
         Where the solver failed at a singular position that it could not be helped over: its time, and the number of
         the constraint that nearly follows from the others there; None elsewhere.
@@ -121,38 +114,54 @@ class SingularityMonitor:
         self.seconds = 0.0
         self.agreed: list[SingularCrossing] = []
         self._n, self._m = plan.program.coordinates, len(plan.sizes)
-        self._looks: list[_Look] = []
+        self._looks: list[Look] = []
         self._away: list[float] = []
         self._judged = -np.inf
         self._largest = 0.0
         self._measures = RankMeasure(plan)
-        self.restart(step_result)
+        self._compiled = compiled_looks(plan, self._whole)
+        if self._compiled is not None:
+            errors = plan.balance.errors.near(step_result.t, step_result.y[: self._n], plan.sizes)
+            self._compiled.rows[:] = TRUSTED * errors
+            self._measures.rows = self._compiled.rows
+        self._start, self._is_behind = step_result, False
+        self._begin_looks()
+
+    @property
+    def lookout(self) -> Lookout | None:
+        """See the attributes."""
+        return None if self._compiled is None else as_lookout(self._compiled)
+
+    def look_in_python(self) -> None:
+        """Look step by step, since the session cannot."""
+        if self._compiled is not None:
+            self._compiled = None
+            self._begin_looks()
 
     def restart(self, step_result: StepResult, is_behind: bool = False) -> None:
         """Begin again from a state, perhaps behind a singular position."""
-        self._is_behind = is_behind
+        self._start, self._is_behind = step_result, is_behind
+        self._begin_looks()
+
+    def _begin_looks(self) -> None:
         self._looks, self._away = [], []
         self._judged = -np.inf
         self.trouble = None
-        self.note(step_result)
+        if self._compiled is None:
+            self.note(self._start)
+            return
+        self.next = np.inf
+        self._compiled.restart()
+        self._compiled.note(self._start.t, self._start.y, self._start.yp)
+        self._compiled.settle()
 
     def note(self, step_result: StepResult) -> None:
         """Take up a state, and decide when to look again."""
         if self._looks and step_result.t <= self._looks[-1].t:
             return
-        self._looks.append(_Look(step_result.t, step_result.y, step_result.yp))
-        self.next = step_result.t + self._stride(step_result)
-
-    def _stride(self, step_result: StepResult) -> float:
-        """Return the time in which something moves as far as it may; never beyond the end."""
-        u, a = step_result.y[self._n : self._n + self._m], step_result.yp[self._n : self._n + self._m]
-        speed, pull = float(np.max(np.abs(u) / self.plan.sizes)), float(np.max(np.abs(a) / self.plan.sizes))
-        if not np.isfinite(speed + pull):
-            return _SHARE * self._whole
-        # the root of pull/2 h^2 + speed h = move, without cancellation
-        below = speed + np.sqrt(speed * speed + 2.0 * pull * _MOVE)
-        stride = 2.0 * _MOVE / below if below > 0.0 else np.inf
-        return stride if stride < self._whole else _SHARE * self._whole
+        one = Look(step_result.t, step_result.y, step_result.yp)
+        self._looks.append(one)
+        self.next = step_result.t + stride_from(self.plan, one, self._whole)
 
     def look(self, step_result: StepResult, between: bool, at_end: bool) -> SingularCrossing | None:
         """Take up what a solver gave, and return the first singular position over which it must be helped.
@@ -162,15 +171,14 @@ class SingularityMonitor:
         step_result
             Where the solver is, or where and why it ended.
         between
-            Whether this is where the guard wanted to look, and not an output.
+            Whether this is where the guard wanted to look, or a session noticed something, and not an output.
         at_end
             Whether the run is to end here.
         """
-        ended = step_result.status is not Status.REACHED
+        ended = step_result.status not in (Status.REACHED, Status.NOTICED)
         if step_result.status is Status.INTERRUPTED or not (between or at_end or ended):
             return None
-        self.note(step_result)
-        if len(self._looks) - len(self._away) < _REVIEW and not (at_end or ended):
+        if not self._take(step_result, at_end, ended):
             return None
         began = time.perf_counter()
         try:
@@ -183,6 +191,22 @@ class SingularityMonitor:
             return found
         finally:
             self.seconds += time.perf_counter() - began
+
+    def _take(self, step_result: StepResult, at_end: bool, ended: bool) -> bool:
+        """Take up what has been noted; return whether it is to be looked at."""
+        compiled = self._compiled
+        if compiled is None:
+            self.note(step_result)
+            return at_end or ended or len(self._looks) - len(self._away) >= _REVIEW
+        if at_end or ended:
+            compiled.note(step_result.t, step_result.y, step_result.yp)
+        compiled.settle()
+        if not compiled.has_seen_low and not ended:
+            return False
+        self._looks, self._away = [Look(*one) for one in compiled.take()], []
+        t, q = compiled.best
+        self._largest = max(self._largest, float(self._measures.learn(np.array([t]), q[:, None])[0]))
+        return True
 
     def _ahead(self) -> SingularCrossing | None:
         """Return the singular position towards which the motion was going when a solver failed; None if to none."""
@@ -203,7 +227,7 @@ class SingularityMonitor:
         Behind a passage rounding can be too large for a solver at first; there the motion goes away from the place.
         """
         first = self._looks[0]
-        stride = self._stride(StepResult(first.t, first.y, first.yp, Status.REACHED))
+        stride = stride_from(self.plan, first, self._whole)
         begin = self._state(first)
         if begin is None or not near < first.t + 0.1 * stride:
             return None
@@ -298,7 +322,7 @@ class SingularityMonitor:
             if first == 0:  # perhaps it starts quite near
                 s = np.unique(np.concatenate([s, np.geomspace(1e-5, 0.05, _FINE)]))
             a, b, v, w = (part[: self._n, None] for part in (one.y, other.y, h * one.yp, h * other.yp))
-            places.append(_cubic(s, (a, b), (v, w)))
+            places.append(cubic(s, (a, b), (v, w)))
             times.append(one.t + h * s)
         if not times:
             return None
@@ -369,7 +393,7 @@ class SingularityMonitor:
             one = self._looks[0]
         return None if one is None else self._state(one)
 
-    def _state(self, one: _Look) -> tuple[float, FloatArray, FloatArray] | None:
+    def _state(self, one: Look) -> tuple[float, FloatArray, FloatArray] | None:
         """Return a state that fulfils the constraints; None if there is none."""
         q, u = one.y[: self._n], one.y[self._n : self._n + self._m]
         made = project_states(self.plan, np.array([one.t]), q[:, None], u[:, None])
@@ -412,7 +436,7 @@ class SingularityMonitor:
         y, yp = (np.stack([getattr(one, name)[: self._n + self._m] for one in looks], axis=1) for name in ("y", "yp"))
         after = np.clip(np.searchsorted(times, t), 1, len(times) - 1)
         h = times[after] - times[after - 1]
-        both = _cubic(
+        both = cubic(
             (t - times[after - 1]) / h, (y[:, after - 1], y[:, after]), (h * yp[:, after - 1], h * yp[:, after])
         )
         return both[: self._n], both[self._n :]
@@ -425,10 +449,3 @@ class SingularityMonitor:
             if loss is None
             else SingularCrossing(t, loss.rank, *self._said(loss.constraints), Path((arc,)), loss.gap)
         )
-
-
-def _cubic(s: FloatArray, ends: tuple[FloatArray, FloatArray], slopes: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """Return the cubic through two states with their rates, at shares of the way from one to the other."""
-    (a, b), (v, w) = ends, slopes
-    found: FloatArray = a + s * v + s**2 * (3.0 * (b - a) - 2.0 * v - w) + s**3 * (2.0 * (a - b) + v + w)
-    return found

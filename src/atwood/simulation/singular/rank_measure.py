@@ -75,7 +75,7 @@ class RankMeasure:
     def learn(self, t: FloatArray, q: FloatArray) -> FloatArray:
         """Learn from states how much constraints change, and return the measure there; see `at`."""
         now = self._constraints(t, q)
-        self.rows = np.maximum(self.rows, np.max(now.rows, axis=0))
+        np.maximum(self.rows, np.max(now.rows, axis=0), out=self.rows)
         return self._of(now)
 
     def at(self, t: FloatArray, q: FloatArray) -> FloatArray:

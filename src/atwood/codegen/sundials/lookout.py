@@ -1,0 +1,210 @@
+"""Looking at a motion now and then while SUNDIALS IDA goes on, as machine code.
+
+IDA is sent from look to look. At each the slopes of some conditions are worked out, and how much of each of those that
+are kept is left by the ones before it: the pivots of ``G G^T``, of which one vanishes where rank is lost. Nobody is
+asked anything as long as none of them has fallen to a small share of the most that it has been.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from atwood.codegen.llvm.build import Built, build_code, default_options
+from atwood.codegen.llvm.module import Part
+from atwood.codegen.sundials.lookout_text import AT, CAPACITY, CARRIED, FIELDS, NOTICED, STATE, Shape, lookout_text
+from atwood.errors import UsageError
+from atwood.expr.core.program import Program
+from atwood.late import dataclass
+
+__all__ = ["NOTICED", "LookoutCode", "LookoutData", "Pace", "compile_lookout"]
+_LOOK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
+_PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """When to look.
+
+    Attributes
+    ----------
+    move
+        Between two looks no speed, and no acceleration, moves anything by more of its size.
+    whole, idle
+        What takes longer than a time, s, rests, and is looked at after another.
+    low
+        The share of the most that it has been, below which what is left of a condition is low.
+    worn
+        The share of what it was when the choice of conditions was last looked at, below which that is asked for.
+    """
+
+    move: float
+    whole: float
+    idle: float
+    low: float
+    worn: float
+
+
+class LookoutCode:
+    """Functions that look at the motion of a mechanism, for any parameters and choice of conditions.
+
+    Parameters
+    ----------
+    program
+        See `compile_lookout`.
+    shape
+        How many there are of each.
+    built
+        The code.
+
+    Attributes
+    ----------
+    drive
+        Address of ``int (solve, steps, memory, double t_out, double *reached, y, yp, double *y_at, double *yp_at, long
+        allowed, data)``: sends IDA on to a time from look to look, with the addresses of ``IDASolve`` and
+        ``IDAGetNumSteps``. It returns `NOTICED`, or IDA's flag.
+    """
+
+    def __init__(self, program: Program, shape: Shape, built: Built) -> None:
+        self.program, self.shape, self.built = program, shape, built
+        self.drive = built.code.addresses["drive"]
+        self.look = _LOOK(built.code.addresses["look"])
+
+    def bind(self, parameter_values: ArrayLike, sizes: ArrayLike, kept: Sequence[int], pace: Pace) -> LookoutData:
+        """Return the data of one run; they must live as long as it goes on.
+
+        Parameters
+        ----------
+        parameter_values
+            The values in the order of the program's parameters.
+        sizes
+            The size of each speed.
+        kept
+            Numbers of the conditions that are looked at.
+        pace
+            When to look.
+        """
+        shape, program = self.shape, self.program
+        values = np.array(parameter_values, dtype=float)
+        arrays: dict[str, NDArray[Any]] = {
+            "derived": np.empty(len(program.prologue)),
+            "scratch": np.empty(self.built.scratch),
+            "sizes": np.array(sizes, dtype=float),
+            "values": np.empty(shape.conditions),
+            "slopes": np.empty(len(shape.places)),
+            "drifts": np.empty(shape.conditions),
+            "rows": np.zeros(shape.conditions),
+            "changes": np.empty(shape.conditions),
+            "matrix": np.empty(shape.conditions**2),
+            **{name: np.zeros(shape.conditions) for name in ("pivots", "first", "most", "least", "earlier", "known")},
+            "kept": np.array([len(kept), *kept], dtype=np.int64),
+            **shape.lists,
+            "notes": np.empty((CAPACITY, shape.note)),
+            "best": np.zeros(1 + shape.coordinates),
+            "state": np.zeros(len(STATE)),
+        }
+        prologue = _PROLOGUE(self.built.code.addresses["held_prologue"])
+        prologue(values.ctypes.data, arrays["derived"].ctypes.data, arrays["scratch"].ctypes.data)
+        numbers = {"move": pace.move, "whole": pace.whole, "idle": pace.idle, "low": pace.low**2}
+        numbers["worn"] = pace.worn**2
+        arrays["state"][[AT[name] for name in numbers]] = list(numbers.values())
+        return LookoutData(self, arrays)
+
+
+class LookoutData:
+    """What was noted on the way of one run.
+
+    Parameters
+    ----------
+    code
+        The functions.
+    arrays
+        Their data.
+
+    Attributes
+    ----------
+    rows
+        The most that each condition has changed so far with a displacement of the size that counts; starts where it is
+        set.
+    """
+
+    def __init__(self, code: LookoutCode, arrays: dict[str, NDArray[Any]]) -> None:
+        self.code, self._arrays = code, arrays
+        self.rows: NDArray[np.float64] = arrays["rows"]
+        self._state = arrays["state"]
+        pointers = [arrays[name].ctypes.data for name in FIELDS]
+        self._pointers = (ctypes.c_void_p * len(pointers))(*pointers)
+        self.address = ctypes.addressof(self._pointers)
+
+    def restart(self) -> None:
+        """Forget what was noted; not how much conditions have changed."""
+        self._state[[AT["count"], AT["is_low"], AT["later"]]] = 0.0
+        self._arrays["least"][:] = self._arrays["earlier"][:] = np.inf
+
+    def settle(self) -> None:
+        """Take the last look as that at which the choice of conditions was looked at."""
+        self._arrays["known"][:] = self._arrays["pivots"]
+
+    def note(self, t: float, y: NDArray[np.float64], yp: NDArray[np.float64]) -> None:
+        """Look at a state that the run starts from, or ends at, unless it has been."""
+        count = int(self._state[AT["count"]])
+        if count and t <= self._arrays["notes"][count - 1, 0]:
+            return
+        y, yp = np.ascontiguousarray(y), np.ascontiguousarray(yp)
+        self.code.look(t, y.ctypes.data, yp.ctypes.data, self.address)
+
+    def due(self) -> float:
+        """Return when the next look is to be taken."""
+        return float(self._state[AT["next"]])
+
+    @property
+    def has_seen_low(self) -> bool:
+        """Whether something was low among what was noted and not taken yet."""
+        return bool(self._state[AT["is_low"]])
+
+    def take(self) -> list[tuple[float, NDArray[np.float64], NDArray[np.float64]]]:
+        """Return what was noted, time, y and y' each; it is not asked about again."""
+        notes, count, size = self._arrays["notes"], int(self._state[AT["count"]]), self.code.shape.size
+        noted = notes[:count].copy()
+        carried = noted[-CARRIED:]
+        notes[: len(carried)] = carried
+        self._state[[AT["is_low"], AT["later"], AT["count"]]] = 0.0, 0.0, len(carried)
+        self._arrays["least"][:] = self._arrays["earlier"][:] = np.inf
+        return [(float(one[0]), one[1 : 1 + size], one[1 + size :]) for one in noted]
+
+    @property
+    def best(self) -> tuple[float, NDArray[np.float64]]:
+        """Time and coordinates of the look at which conditions were farthest from following from each other."""
+        return float(self._arrays["best"][0]), self._arrays["best"][1:]
+
+
+def compile_lookout(program: Program, speeds: int, size: int, places: tuple[ArrayLike, ArrayLike]) -> LookoutCode:
+    """Compile what looks at a motion.
+
+    Parameters
+    ----------
+    program
+        Program of (t, q, u) with values, slopes and drifts of conditions.
+    speeds, size
+        The length of u, and of the vector y that begins with q and u.
+    places
+        Row and column of each slope.
+
+    Raises
+    ------
+    UsageError
+        If the program has other inputs or outputs than these.
+    """
+    rows, columns = (np.asarray(one, dtype=np.int64).ravel().tolist() for one in places)
+    inputs, outputs = [len(one.symbols) for one in program.inputs], [len(one.expressions) for one in program.outputs]
+    if len(inputs) != 3 or inputs[2] != speeds or len(outputs) != 3 or outputs[1] != len(rows):
+        raise UsageError(f"needs a program of (t, q, u), not of {inputs} with {outputs}", where=program.name)
+    shape = Shape(inputs[1], speeds, size, outputs[0], tuple(zip(rows, columns, strict=True)))
+    part = Part("held", program)
+    text = lookout_text(shape)
+    built = build_code([part], default_options([part]), more=text, exports=["look", "drive"])
+    return LookoutCode(program, shape, built)

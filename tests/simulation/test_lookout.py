@@ -1,0 +1,111 @@
+"""Looking out for singular positions while IDA goes on, compiled: the same looks, at next to no cost."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from atwood import simulate
+from atwood.codegen.python.backend import BoundKernel
+from atwood.integrators.ida import library as sundials_library
+from atwood.linalg.matrices import to_array
+from atwood.simulation.singular.looks import Look
+from atwood.simulation.singular.monitor import SingularityMonitor
+from atwood_library.scenes import Bricard, FourBar, SliderCrank
+
+from ..helpers.runs import FORMS
+
+pytestmark = pytest.mark.skipif(not sundials_library.available(), reason="the SUNDIALS libraries are not here")
+
+
+def fast_slider_crank() -> SliderCrank:
+    scene = SliderCrank(crank_length=0.15, rod_length=0.35)
+    scene.start.update({"crank.angular_velocity": 30.0})
+    return scene
+
+
+@pytest.fixture
+def guards(monkeypatch: pytest.MonkeyPatch) -> list[SingularityMonitor]:
+    """Every guard of the runs that follow."""
+    made: list[SingularityMonitor] = []
+    begin = SingularityMonitor.__init__
+
+    def noted(self: SingularityMonitor, *arguments: Any) -> None:
+        begin(self, *arguments)
+        made.append(self)
+
+    monkeypatch.setattr(SingularityMonitor, "__init__", noted)
+    return made
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    "scene", [fast_slider_crank(), FourBar(), Bricard()], ids=["slider-crank", "four-bar", "bricard"]
+)
+def test_where_nothing_is_near_nothing_is_asked_in_python(
+    scene: Any, form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inside, calls, looks = [False], [0], [0]
+    call, look = BoundKernel.__call__, SingularityMonitor.look
+
+    def counted(self: BoundKernel, *groups: Any) -> Any:
+        calls[0] += inside[0]
+        return call(self, *groups)
+
+    def looking(self: SingularityMonitor, step_result: Any, between: bool, at_end: bool) -> Any:
+        inside[0], looks[0] = True, looks[0] + between
+        try:
+            return look(self, step_result, between, at_end)
+        finally:
+            inside[0] = False
+
+    monkeypatch.setattr(BoundKernel, "__call__", counted)
+    monkeypatch.setattr(SingularityMonitor, "look", looking)
+    assert simulate(scene, form=form, t_end=1.0).singular_crossings == ()
+    assert calls[0] == 0  # one for every eight looks before, and each look was a stop
+    assert looks[0] <= 2 * (scene.space == "space")  # where constraints are redundant, others may be kept
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_compiled_looks_are_those_of_python(
+    form: str, guards: list[SingularityMonitor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noted: list[Look] = []
+    note = SingularityMonitor.note
+
+    def in_python(self: SingularityMonitor, step_result: Any) -> None:
+        note(self, step_result)
+        noted.append(Look(step_result.t, step_result.y, step_result.yp))
+
+    compiled = simulate(fast_slider_crank(), form=form, t_end=0.1)
+    looks = guards[0]._compiled.take()
+    monkeypatch.setattr(SingularityMonitor, "note", in_python)
+    monkeypatch.setattr(SingularityMonitor, "lookout", property(lambda self: None))
+    plain = simulate(fast_slider_crank(), form=form, t_end=0.1)
+    assert len(looks) > 5
+    for (t, y, yp), one in zip(looks[:-1], noted, strict=False):
+        assert t == pytest.approx(one.t, rel=1e-9)  # IDA sums up y' in another order
+        assert np.allclose(y, one.y, rtol=1e-7, atol=1e-7 * np.max(np.abs(y)))
+        assert np.allclose(yp, one.yp, rtol=1e-6, atol=1e-6 * np.max(np.abs(yp)))
+    assert len(compiled.singular_crossings) == len(plain.singular_crossings)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_pivots_are_what_is_left_of_each_constraint(form: str, guards: list[SingularityMonitor]) -> None:
+    simulate(fast_slider_crank(), form=form, t_end=0.1)
+    monitor = guards[0]
+    plan, data = monitor.plan, monitor._compiled
+    t, y, _ = data.take()[-1]
+    slope = to_array(plan.balance.constraints_at(t, y[: monitor._n], np.zeros_like(plan.sizes)).jacobian) * plan.sizes
+    left = np.diag(np.linalg.qr(slope[list(plan.finding.kept)].T)[1]) ** 2
+    assert np.allclose(data._arrays["pivots"][list(plan.finding.kept)], left, rtol=1e-9)
+
+
+def test_outputs_between_looks_change_no_look(guards: list[SingularityMonitor]) -> None:
+    for outputs in (2, 1001, 3001):
+        simulate(fast_slider_crank(), t_end=0.1, outputs=outputs)
+    few, *others = ([one[0] for one in monitor._compiled.take()] for monitor in guards)
+    assert all(many == few for many in others)
+    assert len(few) > 3
