@@ -56,7 +56,7 @@ def _compare(mechanism: Mechanism, related: Related, way: Way, other: Way, words
     if first.status != second.status:
         said = f"{way}: {first.status} {first.message}\n{other}: {second.status} {second.message}\n{outline(mechanism)}"
         return Trial(words, (Finding("wrong", f"{relation}: the end", said),))
-    gaps = _closure_errors(first, second, related, mechanism)
+    gaps = _differences(first, second, related, mechanism)
     wrong = [(what, gap) for what, gap in gaps if not gap <= ALLOWED]
     if not wrong:
         return Trial((*words, f"compared {first.status}"))
@@ -76,7 +76,7 @@ def _other_way(random: np.random.Generator, mechanism: Mechanism) -> Way:
     return Way("reduced", "ggl", str(random.choice(["auto", "ida"])), orientation, "all")
 
 
-def _closure_errors(first: Result, second: Result, related: Related, mechanism: Mechanism) -> list[tuple[str, float]]:
+def _differences(first: Result, second: Result, related: Related, mechanism: Mechanism) -> list[tuple[str, float]]:
     matrix = np.eye(3) if related.matrix is None else related.matrix
     shift = np.zeros((3, 1)) if related.shift is None else related.shift[:, None]
     size = abs(np.linalg.det(matrix)) ** (1.0 / 3.0)

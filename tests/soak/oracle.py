@@ -188,15 +188,15 @@ class Oracle:
         a, b = frames[0], frames[-1]
         if spring_energy(tie, a.p, a.axes, b.p, b.axes) is None:
             return None
-        near = self._twist_near(tie, frames, place)
+        near, along = self._twist_near(tie, frames, place), self._sides.get(tie.name)
         total = np.zeros(self.size)
         for k in range(3):
             e = 1j * STEP * np.eye(3)[k]
             turn = np.eye(3) + cross_matrix(e)
-            total -= spring_energy(tie, a.p + e, a.axes, b.p, b.axes, near).imag / STEP * a.v[k]
-            total -= spring_energy(tie, a.p, a.axes, b.p + e, b.axes, near).imag / STEP * b.v[k]
-            total -= np.imag(spring_energy(tie, a.p, turn @ a.axes, b.p, b.axes, near)) / STEP * a.w[k]
-            total -= np.imag(spring_energy(tie, a.p, a.axes, b.p, turn @ b.axes, near)) / STEP * b.w[k]
+            total -= spring_energy(tie, a.p + e, a.axes, b.p, b.axes, near, along).imag / STEP * a.v[k]
+            total -= spring_energy(tie, a.p, a.axes, b.p + e, b.axes, near, along).imag / STEP * b.v[k]
+            total -= np.imag(spring_energy(tie, a.p, turn @ a.axes, b.p, b.axes, near, along)) / STEP * a.w[k]
+            total -= np.imag(spring_energy(tie, a.p, a.axes, b.p, turn @ b.axes, near, along)) / STEP * b.w[k]
         return total
 
     def _twist_near(self, tie: Tie, frames: Sequence[FrameState], place: Place) -> float | None:
@@ -204,6 +204,19 @@ class Oracle:
         if self.mechanism.space != "plane" or tie.sort not in ("torsion_spring", "bushing"):
             return None
         return self._count(tie.name, "twist", twist_in_plane(tie, frames[0].axes, frames[1].axes), place)
+
+    @cached_property
+    def _sides(self) -> dict[str, Array]:
+        """The direction from one end to the other of each spring on a line, at the start, which tells its sign."""
+        if self.mechanism.space != "line":
+            return {}
+        place, line = self.start()[0], self.mechanism.line
+        ends = {
+            tie.name: [self.frame(mount, place).p for mount in tie.mounts]
+            for tie in self.mechanism.ties
+            if tie.sort == "spring"
+        }
+        return {name: line * np.sign(line @ (b - a)) for name, (a, b) in ends.items()}
 
     def _load(self, tie: Tie, place: Place, speeds: Array, t: float) -> Array:
         """Return what acts on the coordinates of a joint."""
@@ -252,7 +265,8 @@ class Oracle:
                     potential += 0.5 * tie.values[stiffness] * stretch**2
             if frames:
                 a, b = frames[0], frames[-1]
-                potential += spring_energy(tie, a.p, a.axes, b.p, b.axes, self._twist_near(tie, frames, place)) or 0.0
+                near, along = self._twist_near(tie, frames, place), self._sides.get(tie.name)
+                potential += spring_energy(tie, a.p, a.axes, b.p, b.axes, near, along) or 0.0
         return 0.5 * float(speeds @ mass @ speeds), float(potential)
 
     # -- equations of motion ----------------------------------------------------------------------------------------

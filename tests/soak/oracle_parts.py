@@ -276,15 +276,19 @@ BALLS = ("spherical", "constant_velocity")
 """Joints with a spring against the whole turn, a damper against every turn, and three motors."""
 
 
-def spring_energy(tie: Tie, p: Array, axes: Array, q: Array, turned: Array, near: float | None = None) -> Any:
+def spring_energy(
+    tie: Tie, p: Array, axes: Array, q: Array, turned: Array, near: float | None = None, along: Array | None = None
+) -> Any:
     """Return the potential energy of a part between frame a (p, axes) and frame b (q, turned), or None without one.
 
-    In a plane the angle of a torsion spring or of a bushing counts turns, and is the one nearest to `near`.
+    In a plane the angle of a torsion spring or of a bushing counts turns, and is the one nearest to `near`. On a line
+    the length of a spring is signed: it is the component of its ends' distance in the direction `along`.
     """
     values, d = tie.values, q - p
     relative = axes.T @ turned
     if tie.sort == "spring":
-        stretch = np.sqrt(d @ d) - values["natural_length"] if values["natural_length"] else None
+        length = np.sqrt(d @ d) if along is None else d @ along
+        stretch = length - values["natural_length"] if values["natural_length"] else None
         return 0.5 * values["stiffness"] * (d @ d if stretch is None else stretch * stretch)
     if tie.sort in BALLS:
         return values.get("stiffness", 0.0) * (1.5 - 0.5 * np.trace(relative))
