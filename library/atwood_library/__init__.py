@@ -9,6 +9,19 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from atwood_library.blocks.add import Add as Add
+    from atwood_library.blocks.dead_zone import DeadZone as DeadZone
+    from atwood_library.blocks.first_order import FirstOrder as FirstOrder
+    from atwood_library.blocks.gain import Gain as Gain
+    from atwood_library.blocks.integrator import Integrator as Integrator
+    from atwood_library.blocks.limiter import Limiter as Limiter
+    from atwood_library.blocks.pi import PI as PI
+    from atwood_library.blocks.pid import PID as PID
+    from atwood_library.blocks.sample_and_hold import SampleAndHold as SampleAndHold
+    from atwood_library.blocks.sample_delay import SampleDelay as SampleDelay
+    from atwood_library.blocks.second_order import SecondOrder as SecondOrder
+    from atwood_library.blocks.state_space import StateSpace as StateSpace
+    from atwood_library.blocks.transfer_function import TransferFunction as TransferFunction
     from atwood_library.fields.charge import Charge as Charge
     from atwood_library.fields.coordinate_lagrangian import CoordinateLagrangian as CoordinateLagrangian
     from atwood_library.fields.lorentz_force import LorentzForce as LorentzForce
@@ -77,6 +90,7 @@ if TYPE_CHECKING:
     from atwood_library.sources.sine import Sine as Sine
 
 _MODULES = {
+    "Add": "blocks.add",
     "AngleSensor": "sensors.angle_sensor",
     "Bar": "parts.bar",
     "Box": "parts.box",
@@ -89,16 +103,21 @@ _MODULES = {
     "Cylinder": "parts.cylinder",
     "Cylindrical": "joints.cylindrical",
     "Damper": "forces.damper",
+    "DeadZone": "blocks.dead_zone",
     "Disc": "parts.disc",
     "Drag": "forces.drag",
     "Drive": "joints.drive",
     "EnergySensor": "sensors.energy_sensor",
+    "FirstOrder": "blocks.first_order",
     "Force": "forces.force",
     "ForceSensor": "sensors.force_sensor",
     "FrameSensor": "sensors.frame_sensor",
     "FreeJoint": "joints.free_joint",
+    "Gain": "blocks.gain",
     "Gear": "joints.gear",
     "Ground": "parts.ground",
+    "Integrator": "blocks.integrator",
+    "Limiter": "blocks.limiter",
     "Link": "parts.link",
     "LorentzForce": "fields.lorentz_force",
     "Mass1D": "parts.mass_1d",
@@ -106,6 +125,8 @@ _MODULES = {
     "MutualPotential": "fields.mutual_potential",
     "OrientationSensor": "sensors.orientation_sensor",
     "PairPotential": "fields.pair_potential",
+    "PI": "blocks.pi",
+    "PID": "blocks.pid",
     "Pivot": "joints.pivot",
     "Planar": "joints.planar",
     "PlanetaryGear": "joints.planetary_gear",
@@ -129,16 +150,21 @@ _MODULES = {
     "RollingSphere": "joints.rolling_sphere",
     "Rope": "ropes.rope",
     "RotaryDrive": "joints.rotary_drive",
+    "SampleAndHold": "blocks.sample_and_hold",
+    "SampleDelay": "blocks.sample_delay",
     "Screw": "joints.screw",
+    "SecondOrder": "blocks.second_order",
     "Sine": "sources.sine",
     "SlideGear": "joints.slide_gear",
     "Slider": "joints.slider",
     "Sphere": "parts.sphere",
     "Spherical": "joints.spherical",
     "Spring": "forces.spring",
+    "StateSpace": "blocks.state_space",
     "Torque": "forces.torque",
     "TorsionDamper": "forces.torsion_damper",
     "TorsionSpring": "forces.torsion_spring",
+    "TransferFunction": "blocks.transfer_function",
     "Tube": "parts.tube",
     "Universal": "joints.universal",
     "Weld": "joints.weld",

@@ -126,7 +126,7 @@ def _others(
     found: dict[str, Any] = {}
     for name, spec in specs.items():
         value = base.get(name, spec.default)
-        if spec.integer or spec.choices or spec.text or spec.turning:
+        if spec.integer or spec.choices or spec.text or spec.turning or spec.array:
             continue
         if spec.direction:
             raw = [draw.uniform(0.2, 1.0) for _ in range(3)]

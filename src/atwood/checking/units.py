@@ -129,11 +129,14 @@ def _bound(trial: Trial, units: Units) -> Any:
             value = value.scaled([units.of(one.exponents) for one in spec.function_of.values()], size)
         elif isinstance(value, Vector):
             value = value if spec.direction else value * size
-        elif isinstance(value, tuple):
+        elif isinstance(value, tuple) and not spec.array:
             value = tuple(one * size for one in value)
         elif isinstance(value, float) and not spec.integer:
             value = value * size
         values[name] = value
+    for name, state in component.state_specs().items():
+        value, size = trial.values[name], units.of(state.unit.exponents)
+        values[name] = tuple(one * size for one in value) if isinstance(value, tuple) else value * size
     for name, signal in component.signal_specs().items():
         values[name] = trial.inputs[name][0] * units.of(signal.unit.exponents)
     motions: dict[str, Motion] = {}
@@ -247,11 +250,23 @@ def _of_joint(trial: Trial, law: Law, made: Any) -> Iterator[tuple[float, Expone
             yield float(angle), NOTHING
 
 
+def _of_derivative(trial: Trial, law: Law, made: Any) -> Iterator[tuple[float, Exponents]]:
+    """Yield rates of states, in the unit of each a second."""
+    given = iter(scalars(made))
+    for name in law.options.states:
+        spec = trial.component.state_specs()[name]
+        mass, length, time, current = spec.unit.exponents
+        for one in [next(given) for _ in spec.names(trial.part.values)]:
+            if spec.unit.text != "any":
+                yield float(one), (mass, length, time - 1, current)
+
+
 def _of_event(trial: Trial, law: Law, made: Any) -> Iterator[tuple[float, Exponents]]:
     yield float(made), parse_unit(law.options.unit).exponents
 
 
 _UNITS: Mapping[str, Callable[[Trial, Law, Any], Iterator[tuple[float, Exponents]]]] = {
+    "derivative": _of_derivative,
     "potential": _said("J"),
     "lagrangian": _said("J"),
     "dissipation": _said("W"),

@@ -234,6 +234,8 @@ def _value(one: Any) -> str:
         return "none"
     if isinstance(one.default, ParameterExpression):
         return "follows"
+    if one.array:
+        return f"{len(one.default)} {'rows' if isinstance(one.default[0], tuple) else 'numbers'}"
     if isinstance(one.default, tuple):
         return f"({', '.join(f'{number:g}' for number in one.default)})"
     if one.function_of:

@@ -83,7 +83,7 @@ def _shape_of(part: Part, space: Space) -> Hashable:
     for name, value in part.values.items():
         if line and isinstance(value, tuple) and part.component.parameter_specs()[name].direction:
             shape.append(value)  # what points along the line, and what does not
-        elif isinstance(value, tuple):
+        elif isinstance(value, tuple) and not part.component.parameter_specs()[name].array:
             shape.append(tuple(one == 0.0 for one in value))
         else:
             shape.append(value == 0.0 if isinstance(value, float) else value)

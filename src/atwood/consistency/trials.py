@@ -310,7 +310,7 @@ def make_trial(part: Part, space: Space, seed: int) -> Trial:
     sizes = []
     for name, spec in component.parameter_specs().items():
         value = part.values[name]
-        if isinstance(value, tuple):
+        if isinstance(value, tuple) and not spec.array:
             value = Vector(*value) if len(value) == 3 else value
         values[name] = value
         if isinstance(value, float) and value and spec.unit.exponents == (0, 1, 0, 0):
@@ -348,6 +348,9 @@ def make_trial(part: Part, space: Space, seed: int) -> Trial:
     frames = frozenset(name for name, one in connectors.items() if isinstance(one, Frame) and space.has_rotation)
     line_signs = {(a, b): 1.0 if i < j else -1.0 for i, a in enumerate(free) for j, b in enumerate(free)}
     bodies = {name: _some_body(draw, length) for name in free}
+    for name, state in component.state_specs().items():
+        numbers = tuple(number() for _ in state.names(part.values))
+        values[name] = numbers if state.count else numbers[0]
     return Trial(
         part,
         space,

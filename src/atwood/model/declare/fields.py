@@ -9,12 +9,29 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from atwood.arguments import ANYTHING, BY_PATH, DOC, FLAG, NAME, TEXT, each, number, optional, real, show, takes, whole
+from atwood.arguments import (
+    ANYTHING,
+    BY_PATH,
+    CALLBACK,
+    DOC,
+    FLAG,
+    NAME,
+    TEXT,
+    each,
+    either,
+    number,
+    optional,
+    real,
+    show,
+    takes,
+    whole,
+)
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, near_matches, suggestion
+from atwood.model.declare.array_values import check_array
 from atwood.model.declare.function_values import make_function
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.time_functions import check_function
@@ -152,15 +169,17 @@ class ParameterSpec(Field):
         turning: bool = False,
         text: bool = False,
         function_of: Mapping[str, str] | None = None,
+        array: Callable[[Any, str], Any] | bool = False,
     ) -> None:
         super().__init__("parameter", default, unit, doc)
+        self.array = array
         self.function_of = {name: parse_si_unit(one) for name, one in (function_of or {}).items()}
         self.results = size or 1
         size = None if function_of else size
         self.minimum, self.above, self.maximum = minimum, above, maximum
         self.size, self.integer, self.choices = size, integer, choices
         self.direction, self.turning, self.text = direction, turning, text
-        self.structural = structural or direction or integer or text or bool(choices or function_of)
+        self.structural = structural or direction or integer or text or bool(choices or function_of or array)
 
     def check(self, value: Any, where: str) -> Any:
         """Return a value in its own type and SI unit, or refuse it.
@@ -178,6 +197,8 @@ class ParameterSpec(Field):
             return None
         if self.function_of:
             return make_function(value, tuple(self.function_of), self.results, self.unit, where)
+        if self.array:
+            return check_array(self.array(value, where) if callable(self.array) else value, where)
         if self.choices:
             if not isinstance(value, str) or value not in self.choices:
                 advice = f"Choose from {', '.join(self.choices)}."
@@ -305,6 +326,7 @@ _BOUND = optional(number())
     turning=FLAG,
     text=FLAG,
     function_of=optional(BY_PATH),
+    array=either(FLAG, CALLBACK),
 )
 def parameter(
     default: Any = MISSING,
@@ -322,6 +344,7 @@ def parameter(
     turning: bool = False,
     text: bool = False,
     function_of: Mapping[str, str] | None = None,
+    array: Callable[[Any, str], Any] | bool = False,
 ) -> Any:
     """Declare a parameter in the class body of a component.
 
@@ -358,6 +381,9 @@ def parameter(
         For a parameter that is a function: the names of its arguments with their units, ``{"x": "m", "t": "s"}``. It is
         given as a number, a formula (``"0.5*x**2"``), or a function in plain arithmetic of some of these arguments, and
         a law calls it with all of them. With ``size=3`` its value is a vector. It shapes the mechanism.
+    array
+        Whether it is numbers in a row, or in rows and columns, as tuples; a NumPy array and a data frame will do. A
+        function of a value and the path of the parameter may turn anything else that is given into numbers.
 
     Raises
     ------
@@ -379,6 +405,7 @@ def parameter(
         turning=turning,
         text=text,
         function_of=function_of,
+        array=array,
     )
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
-from atwood.arguments import ANYTHING, DOC, NAME, TEXT, number, optional, takes
+from atwood.arguments import ANYTHING, CALLBACK, DOC, NAME, TEXT, either, number, optional, takes
 from atwood.errors import DeclarationError, ParameterError
 from atwood.model.declare.fields import Field, FieldReference, ParameterExpression, ParameterSpec
 from atwood.model.declare.quantities import Quantity
 
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
+
+Count = str | Callable[[Mapping[str, Any]], int] | None
 
 __all__ = ["StateSpec", "discrete_state", "state"]
 
@@ -22,7 +25,13 @@ class StateSpec(Field):
     """
 
     def __init__(
-        self, start: Any, unit: str, doc: str, nominal: float | None, count: str | None, is_discrete: bool
+        self,
+        start: Any,
+        unit: str,
+        doc: str,
+        nominal: float | None,
+        count: Count,
+        is_discrete: bool,
     ) -> None:
         super().__init__("state", start, unit, doc)
         self.nominal, self.count, self.is_discrete = nominal, count, is_discrete
@@ -52,7 +61,9 @@ class StateSpec(Field):
 
     def size(self, values: Any) -> int | None:
         """Return how many numbers it is, where it is an array, for given values of the parameters."""
-        return None if self.count is None else int(values[self.count])
+        if self.count is None:
+            return None
+        return self.count(values) if callable(self.count) else int(values[self.count])
 
     def names(self, values: Any) -> list[str]:
         """Return the name of each of its numbers."""
@@ -75,7 +86,7 @@ _NOMINAL = optional(number("a number above 0", above=0.0))
     unit=TEXT,
     doc=DOC,
     nominal=_NOMINAL,
-    count=optional(NAME),
+    count=optional(either(NAME, CALLBACK)),
     init=ANYTHING,
 )
 def state(
@@ -84,7 +95,7 @@ def state(
     unit: str = "1",
     doc: str,
     nominal: float | None = None,
-    count: str | None = None,
+    count: Count = None,
     init: Literal[False] = False,
 ) -> Any:
     """Declare a continuous state in the class body of a component; a law marked `derivative` says its rate.
@@ -103,7 +114,8 @@ def state(
     nominal
         A usual size of it, in its unit, which says what is small; 1, or the size of the scene for a length.
     count
-        Name of the integer parameter that says how many numbers it is; then it is read as a tuple.
+        Name of the integer parameter that says how many numbers it is, or a function of the parameters by name that
+        does; then it is read as a tuple.
 
     Raises
     ------
@@ -113,9 +125,14 @@ def state(
     return StateSpec(start, unit, doc, nominal, count, is_discrete=False)
 
 
-@takes(DeclarationError, start=ANYTHING, unit=TEXT, doc=DOC, count=optional(NAME), init=ANYTHING)
+@takes(DeclarationError, start=ANYTHING, unit=TEXT, doc=DOC, count=optional(either(NAME, CALLBACK)), init=ANYTHING)
 def discrete_state(
-    start: Any = 0.0, *, unit: str = "1", doc: str, count: str | None = None, init: Literal[False] = False
+    start: Any = 0.0,
+    *,
+    unit: str = "1",
+    doc: str,
+    count: Count = None,
+    init: Literal[False] = False,
 ) -> Any:
     """Declare a state that changes at moments only; laws marked `update` say when, and to what.
 

@@ -327,7 +327,7 @@ def _listed(bound: Any, law: Law) -> list[Any]:
 
 def _parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
     value, name = part.values[spec.name], f"{part.path}.{spec.name}"
-    if value is None or spec.integer or spec.choices or spec.text or spec.function_of:
+    if value is None or spec.integer or spec.choices or spec.text or spec.function_of or spec.array:
         return value
     if spec.turning and table.space == "plane" and (value[0] != 0.0 or value[2] != 0.0):
         advice = "Leave its x and z components zero: (0, -1, 0) turns counter-clockwise."

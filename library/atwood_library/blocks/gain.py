@@ -1,0 +1,20 @@
+"""Gain: a multiple of a signal."""
+
+from __future__ import annotations
+
+from atwood import Component, Scalar, observable, parameter, signal
+
+
+class Gain(Component):
+    """A multiple of a signal, ``y = gain u + offset``."""
+
+    synonyms = ("Math.Gain", "P controller", "Proportional controller")
+
+    gain: float = parameter(1.0, unit="any", doc="What it is multiplied by.")
+    offset: float = parameter(0.0, unit="any", doc="What is added.")
+    u: float = signal(0.0, unit="any", doc="What is multiplied.")
+
+    @observable(unit="any", doc="The multiple.")
+    def y(self) -> Scalar:
+        """Return the multiple."""
+        return self.gain * self.u + self.offset

@@ -1,0 +1,21 @@
+"""Integrator: the integral of a signal."""
+
+from __future__ import annotations
+
+from atwood import Component, Scalar, derivative, parameter, signal, state
+
+
+class Integrator(Component):
+    """The integral of a signal over time, ``y' = gain u``."""
+
+    synonyms = ("Continuous.Integrator", "I controller")
+
+    gain: float = parameter(1.0, unit="any", doc="What the rate is of the input.")
+    start: float = parameter(0.0, unit="any", doc="Value at the start.")
+    u: float = signal(0.0, unit="any", doc="What is integrated.")
+    y: Scalar = state(start, unit="any", doc="The integral.")
+
+    @derivative("y")
+    def rate(self) -> Scalar:
+        """Return the rate."""
+        return self.gain * self.u
