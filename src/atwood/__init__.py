@@ -87,6 +87,7 @@ if TYPE_CHECKING:
     from atwood.result.files import SavedResult, load_result, save_result
     from atwood.result.result import Result
     from atwood.study.comparison.compare import Comparison, ComparisonRow, compare
+    from atwood.study.sweeps.files import load_sweep
     from atwood.study.sweeps.sweep import Sweep, sweep
 
     __version__: str
@@ -167,6 +168,7 @@ __all__ = [
     "lagrangian",
     "load_result",
     "load_scene",
+    "load_sweep",
     "log",
     "maximum",
     "minimum",
@@ -216,6 +218,7 @@ _LATER = {
     "formula": "atwood.expr.formulas.formula",
     "from_data": "atwood.model.compose.serialization",
     "load_result": "atwood.result.files",
+    "load_sweep": "atwood.study",
     "load_scene": "atwood.model.compose.serialization",
     "plot": "atwood.plotting",
     "plot_comparison": "atwood.plotting",

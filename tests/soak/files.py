@@ -18,7 +18,7 @@ from atwood import AtwoodError
 
 from .trial import Finding, Trial
 
-SUFFIXES = (".csv", ".nc", ".npz", ".json")
+SUFFIXES = (".csv", ".nc", ".npz", ".mat", ".json")
 
 
 def check(seed: int) -> Trial:

@@ -164,7 +164,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option(
     "--view", metavar="AZ,EL", help="From where a scene in space is drawn: azimuth and elevation, degrees.  [30,20]"
 )
-@click.option("--save", type=_FILE, help="Save all trajectories (.nc, .npz or .csv).")
+@click.option("--save", type=_FILE, help="Save all trajectories (.nc, .npz, .mat or .csv).")
 @click.option("--progress/--no-progress", default=True, help="Show progress where there is a terminal.")
 @reporting_errors
 def run_command(scene: str, as_json: bool, **options: Any) -> None:
@@ -235,7 +235,7 @@ def compare_command(scene: str, as_json: bool, **options: Any) -> None:
     "--threads", type=click.IntRange(min=1), help="How many threads share the runs.  [default: all processors]"
 )
 @click.option("--plot", type=_FILE, help="Save a picture of the ends; the suffix says how (.png, .svg, .pdf).")
-@click.option("--save", type=_FILE, help="Save all quantities of all runs (.csv, .nc or .json).")
+@click.option("--save", type=_FILE, help="Save all quantities of all runs (.nc, .npz, .mat, .csv or .json).")
 @click.option("--progress/--no-progress", default=True, help="Show progress where there is a terminal.")
 @reporting_errors
 def sweep_command(scene: str, as_json: bool, **options: Any) -> None:

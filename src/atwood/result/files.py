@@ -1,7 +1,8 @@
-"""Results in files: NetCDF-3, NPZ and CSV.
+"""Results in files: NetCDF-3, NPZ, MATLAB and CSV.
 
-A file appears under its name only once it is complete. NetCDF and NPZ keep numbers exactly, with units, meanings and
-everything that is known about the run; CSV keeps numbers, paths and units, so that any program can read it.
+A file appears under its name only once it is complete. NetCDF, NPZ and MATLAB keep numbers exactly, with units,
+meanings and everything that is known about the run; CSV keeps numbers, paths and units, so that any program can read
+it.
 
 Each holds a checksum of its contents, so that a file that was cut off or damaged is refused and never gives other
 values. In a CSV it stands in a last line that begins with ``#``, and the headings are in quotes, which says that there
@@ -30,6 +31,9 @@ from atwood.files import check_directory, check_readable, write_atomically
 from atwood.late import dataclass
 from atwood.model.declare.quantities import PATHS, Quantity
 from atwood.result.about import describe_run
+from atwood.result.formats.dataset import Dataset, json_text
+from atwood.result.formats.matlab import read_matlab, write_matlab
+from atwood.result.formats.netcdf import read_netcdf, write_netcdf
 from atwood.result.result import Result
 from atwood.result.trajectories import Trajectories
 from atwood.showing import count_of, listed
@@ -91,6 +95,9 @@ class SavedResult(Trajectories):
         """Return quantities by path; all when no paths are given."""
         return super().table(paths)
 
+    def _about(self) -> Mapping[str, Any]:
+        return self.metadata
+
     def _facts(self) -> Iterator[tuple[str, str]]:
         form, level = str(self.metadata.get("form", "")), str(self.metadata.get("level", ""))
         kind = f", {form} form" + (f" ({level})" if level else "") if form else ""
@@ -112,7 +119,7 @@ def save_result(result: Result, file: str | os.PathLike[str], paths: Iterable[st
     result
         The run.
     file
-        Where to; its suffix says how: ``.nc`` (NetCDF-3), ``.npz`` (NumPy) or ``.csv``.
+        Where to; its suffix says how: ``.nc`` (NetCDF-3), ``.npz`` (NumPy), ``.mat`` (MATLAB) or ``.csv``.
     paths
         Which quantities; all when not given.
 
@@ -189,7 +196,7 @@ def _checksum(saved: SavedResult) -> str:
         "paths": list(saved.quantities),
         "units": dict(saved.units),
         "meanings": {path: text for path, text in saved.meanings.items() if text},
-        "metadata": json.loads(_metadata_text(saved.metadata)),
+        "metadata": json.loads(json_text(saved.metadata)),
     }
     found = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
     for values in (saved.time, *saved.quantities.values()):
@@ -204,64 +211,36 @@ def _verified(saved: SavedResult, checksum: str | None) -> SavedResult:
     return saved
 
 
-# -- NetCDF ------------------------------------------------------------------------------------------------------------
+# -- NetCDF and MATLAB -------------------------------------------------------------------------------------------------
+
+
+def _from_dataset(data: Dataset, checksum: str | None) -> SavedResult:
+    arrays = {one.path: one for one in data.variables}
+    time = arrays.pop("time").values
+    saved = SavedResult(
+        time,
+        {path: one.values for path, one in arrays.items()},
+        {path: one.unit for path, one in arrays.items()},
+        {path: one.meaning for path, one in arrays.items()},
+        data.about,
+    )
+    return _verified(saved, checksum)
 
 
 def _write_netcdf(saved: SavedResult, file: Path) -> None:
-    from scipy.io import netcdf_file
-
-    data: Any
-    with netcdf_file(str(file), "w", version=2) as data:
-        data.title = b"Atwood result"
-        data.atwood = _metadata_text(saved.metadata).encode()
-        data.checksum = _checksum(saved).encode()
-        data.createDimension("time", len(saved.time))
-        _netcdf_variable(data, "time", saved.time, path="time", unit="s", meaning="Time.")
-        taken = {"time"}
-        for path, values in saved.quantities.items():
-            name = _netcdf_name(path, taken)
-            _netcdf_variable(data, name, values, path, saved.units[path], saved.meanings.get(path, ""))
-
-
-def _netcdf_variable(data: Any, name: str, values: FloatArray, path: str, unit: str, meaning: str) -> None:
-    variable = data.createVariable(name, "d", ("time",))
-    variable[:] = values
-    variable.path = path.encode()
-    variable.units = unit.encode()
-    if meaning:
-        variable.long_name = meaning.encode()
-
-
-def _netcdf_name(path: str, taken: set[str]) -> str:
-    """Return a name that NetCDF and its readers take, for instance ``rod_0.angle`` for ``rod[0].angle``."""
-    name = re.sub(r"[^A-Za-z0-9_.]", "_", path.replace("]", ""))
-    base, count = name, 1
-    while name in taken:
-        count += 1
-        name = f"{base}_{count}"
-    taken.add(name)
-    return name
+    write_netcdf(saved.as_dataset(), file, _checksum(saved))
 
 
 def _read_netcdf(file: Path) -> SavedResult:
-    from scipy.io import netcdf_file
-
-    data: Any
-    with netcdf_file(str(file), "r", mmap=False) as data:
-        metadata = json.loads(data.atwood.decode())
-        checksum = data.checksum.decode() if hasattr(data, "checksum") else None
-        quantities, units, meanings = {}, {}, {}
-        for variable in data.variables.values():
-            path = variable.path.decode()
-            quantities[path] = np.array(variable[:], dtype=np.float64)
-            units[path] = variable.units.decode()
-            meanings[path] = getattr(variable, "long_name", b"").decode()
-    time = quantities.pop("time")
-    return _verified(SavedResult(time, quantities, _without_time(units), _without_time(meanings), metadata), checksum)
+    return _from_dataset(*read_netcdf(file))
 
 
-def _without_time(table: dict[str, str]) -> dict[str, str]:
-    return {path: text for path, text in table.items() if path != "time"}
+def _write_matlab(saved: SavedResult, file: Path) -> None:
+    write_matlab(saved.as_dataset(), file, _checksum(saved))
+
+
+def _read_matlab(file: Path) -> SavedResult:
+    return _from_dataset(*read_matlab(file))
 
 
 # -- NPZ ---------------------------------------------------------------------------------------------------------------
@@ -276,7 +255,7 @@ def _write_npz(saved: SavedResult, file: Path) -> None:
         "meanings": saved.meanings,
         "checksum": _checksum(saved),
     }
-    arrays: dict[str, Any] = {"time": saved.time, **saved.quantities, _ABOUT: np.array(_metadata_text(about))}
+    arrays: dict[str, Any] = {"time": saved.time, **saved.quantities, _ABOUT: np.array(json_text(about))}
     with file.open("wb") as stream:
         _savez(stream, arrays)
 
@@ -286,7 +265,7 @@ def _savez(stream: BinaryIO, arrays: Mapping[str, Any]) -> None:
 
 
 def _read_npz(file: Path) -> SavedResult:
-    with np.load(file, allow_pickle=False) as data:
+    with file.open("rb") as stream, np.load(stream, allow_pickle=False) as data:  # a damaged file is closed, too
         about = json.loads(str(data[_ABOUT]))
         quantities = {name: data[name] for name in data.files if name not in ("time", _ABOUT)}
         saved = SavedResult(data["time"], quantities, about["units"], about["meanings"], about["metadata"])
@@ -332,7 +311,8 @@ def _read_csv(file: Path) -> SavedResult:
         units[match[1]] = match[2]
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(headings)).T
     quantities = dict(zip(units, values, strict=True))
-    return SavedResult(quantities.pop("time"), quantities, _without_time(units))
+    time = quantities.pop("time")
+    return SavedResult(time, quantities, {path: units[path] for path in quantities})
 
 
 # -- which -------------------------------------------------------------------------------------------------------------
@@ -343,6 +323,7 @@ _FORMATS: dict[str, tuple[_Write, _Read]] = {
     ".nc": (_write_netcdf, _read_netcdf),
     ".npz": (_write_npz, _read_npz),
     ".csv": (_write_csv, _read_csv),
+    ".mat": (_write_matlab, _read_matlab),
 }
 
 
@@ -350,20 +331,5 @@ def _format_of(file: Path) -> tuple[_Write, _Read]:
     suffix = file.suffix.lower()
     if suffix not in _FORMATS:
         problem = f"the suffix {suffix!r} is not known" if suffix else "the name has no suffix"
-        raise UsageError(problem, where=str(file), advice="Use .nc (NetCDF-3), .npz (NumPy) or .csv.")
+        raise UsageError(problem, where=str(file), advice="Use .nc (NetCDF-3), .npz (NumPy), .mat (MATLAB) or .csv.")
     return _FORMATS[suffix]
-
-
-def _metadata_text(data: Mapping[str, Any]) -> str:
-    return json.dumps(data, default=_plain)
-
-
-def _plain(value: Any) -> Any:
-    """Return what JSON does not know by itself as plain data."""
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, Mapping):
-        return dict(value)
-    return str(value)

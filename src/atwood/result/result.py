@@ -366,6 +366,10 @@ class Result(Trajectories):
 
         return save_result(self, file, paths)
 
+    def _about(self) -> Mapping[str, Any]:
+        flat = self.assembly.flat
+        return {"scene": flat.name, "form": self.form, "level": self.level, "status": self.status}
+
     def _facts(self) -> Iterator[tuple[str, str]]:
         form = f"{self.form} form" + (f" ({self.level})" if self.level else "")
         yield "Result", f"{self.assembly.flat.name}, {form}"

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 from atwood.arguments import check, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import MissingGroupError, MissingQuantityError, ResultError, suggestion, suggestion_in_parts
-from atwood.model.declare.quantities import PATH, Quantity
+from atwood.model.declare.quantities import PATH, PATHS, Quantity
+from atwood.result.formats.dataset import Dataset, Variable
+from atwood.result.formats.tables import needed, to_xarray
 from atwood.showing import count_of, fitted, html_table, listed
 
 if TYPE_CHECKING:
@@ -95,6 +97,66 @@ class Trajectories(Mapping[str, FloatArray]):
         """Return all quantities at one output time, by its number; -1 for the end."""
         place = output_number(index, len(self.time))
         return {path: float(values[place]) for path, values in self.table().items()}
+
+    # -- as tables ------------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def _about(self) -> Mapping[str, Any]:
+        """Return what is known besides quantities, as plain data."""
+
+    @takes(paths=PATHS)
+    def to_dataframe(self, paths: Iterable[str] | None = None) -> Any:
+        """Return a table of pandas: a row for each output time, a column for each quantity.
+
+        Parameters
+        ----------
+        paths
+            Which quantities; all when not given.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the index ``time``, s; ``attrs["units"]`` has the SI units by column.
+
+        Raises
+        ------
+        UsageError
+            If pandas is not installed (``pip install 'atwood[data]'``).
+        """
+        pandas, columns = needed("pandas"), self.table(paths)
+        table = pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
+        table.attrs["units"] = {"time": "s", **{path: self.unit(path) for path in columns}}
+        return table
+
+    @takes(paths=PATHS)
+    def to_xarray(self, paths: Iterable[str] | None = None) -> Any:
+        """Return a dataset of xarray with the coordinate ``time``, and units and meanings as attributes.
+
+        Parameters
+        ----------
+        paths
+            Which quantities; all when not given.
+
+        Returns
+        -------
+        xarray.Dataset
+            Its variables have the paths of the quantities.
+
+        Raises
+        ------
+        UsageError
+            If xarray is not installed (``pip install 'atwood[data]'``).
+        """
+        return to_xarray(self.as_dataset(paths))
+
+    def as_dataset(self, paths: Iterable[str] | None = None) -> Dataset:
+        """Return the quantities as arrays with names, units and dimensions, for files."""
+        every = (
+            Variable(path, ("time",), values, self.unit(path), self.describe(path))
+            for path, values in self.table(paths).items()
+        )
+        time = Variable("time", ("time",), self.time, "s", "Time.", True)
+        return Dataset("Atwood result", (time, *every), self._about())
 
     # -- by component ---------------------------------------------------------------------------------------------
 

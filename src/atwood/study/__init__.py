@@ -1,6 +1,7 @@
 """Studies: many runs of one scene, and what they say together."""
 
 from atwood.study.comparison.compare import Comparison, ComparisonRow, Reference, compare
+from atwood.study.sweeps.files import load_sweep
 from atwood.study.sweeps.sweep import Sweep, SweepStatistics, sweep
 
-__all__ = ["Comparison", "ComparisonRow", "Reference", "Sweep", "SweepStatistics", "compare", "sweep"]
+__all__ = ["Comparison", "ComparisonRow", "Reference", "Sweep", "SweepStatistics", "compare", "load_sweep", "sweep"]

@@ -1,22 +1,35 @@
-"""Sweeps in files: CSV, NetCDF-3 and JSON; a file appears under its name only once it is complete."""
+"""Sweeps in files: NetCDF-3, NPZ, MATLAB, CSV and JSON.
+
+A file appears under its name only once it is complete, and holds a checksum, so that one that was cut off or damaged is
+refused. In a CSV the checksum stands in a last line that begins with ``#``, with what is no number. Files of older
+versions, NetCDF and JSON, have none and are read as before.
+"""
 
 from __future__ import annotations
 
 import csv
+import hashlib
+import io
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arguments import FILE, instance, takes
 from atwood.errors import UsageError
-from atwood.files import check_directory, write_atomically
+from atwood.files import check_directory, check_readable, write_atomically
+from atwood.result.formats.dataset import Dataset, Variable
+from atwood.result.formats.matlab import read_matlab, write_matlab
+from atwood.result.formats.netcdf import read_netcdf, write_netcdf
+from atwood.result.formats.npz import read_npz, write_npz
+from atwood.study.sweeps.data import about_sweep, as_dataset, from_dataset, from_parts, labels
 from atwood.study.sweeps.result import Sweep
 
-__all__ = ["check_sweep_target", "save_sweep"]
+__all__ = ["check_sweep_target", "load_sweep", "save_sweep"]
 
 
 @takes(sweep=instance("a Sweep", Sweep), file=FILE)
@@ -28,7 +41,8 @@ def save_sweep(sweep: Sweep, file: str | os.PathLike[str]) -> Path:
     sweep
         The sweep.
     file
-        Where to; its suffix says how: ``.csv`` (a row for each run and time), ``.nc`` (NetCDF-3) or ``.json``.
+        Where to; its suffix says how: ``.nc`` (NetCDF-3), ``.npz`` (NumPy), ``.mat`` (MATLAB), ``.json``, or ``.csv``
+        with a row for each run and time.
 
     Returns
     -------
@@ -41,9 +55,38 @@ def save_sweep(sweep: Sweep, file: str | os.PathLike[str]) -> Path:
         If the suffix is not known, or the file cannot be written.
     """
     target = Path(file)
-    write = _format_of(target)
+    write, _ = _format_of(target)
     write_atomically(target, lambda part: write(sweep, part))
     return target
+
+
+@takes(file=FILE)
+def load_sweep(file: str | os.PathLike[str]) -> Sweep:
+    """Read a sweep that was saved.
+
+    Parameters
+    ----------
+    file
+        A file that `Sweep.save` wrote.
+
+    Raises
+    ------
+    UsageError
+        If it does not exist, its suffix is not known, or it holds something else.
+    """
+    source = Path(file)
+    _, read = _format_of(source)
+    check_readable(source)
+    try:
+        return read(source)
+    except UsageError:
+        raise
+    except Exception as error:  # of a damaged file, its readers raise whatever comes
+        raise UsageError(
+            f"this is no sweep that Atwood saved, or it is damaged ({type(error).__name__}: {error})",
+            where=str(source),
+            advice="Save the sweep again.",
+        ) from error
 
 
 def check_sweep_target(file: str | os.PathLike[str]) -> None:
@@ -52,71 +95,178 @@ def check_sweep_target(file: str | os.PathLike[str]) -> None:
     check_directory(Path(file))
 
 
-def _format_of(target: Path) -> Callable[[Sweep, Path], None]:
-    suffix = target.suffix.lower()
-    if suffix not in _FORMATS:
-        problem = f"the suffix {target.suffix!r} is not known" if target.suffix else "the name has no suffix"
-        raise UsageError(problem, where=str(target), advice=f"Use {', '.join(_FORMATS)}.")
-    return _FORMATS[suffix]
+# -- arrays ------------------------------------------------------------------------------------------------------------
+
+
+def _write_with(write: Callable[[Dataset, Path, str], None]) -> Callable[[Sweep, Path], None]:
+    def written(sweep: Sweep, file: Path) -> None:
+        data = as_dataset(sweep)
+        write(data, file, data.checksum())
+
+    return written
+
+
+def _read_with(read: Callable[[Path], tuple[Dataset, str | None]]) -> Callable[[Path], Sweep]:
+    def found(file: Path) -> Sweep:
+        data, checksum = read(file)
+        return from_dataset(data.verified(checksum))
+
+    return found
+
+
+def _read_netcdf(file: Path) -> Sweep:
+    data, checksum = read_netcdf(file)
+    if checksum is None:
+        return _from_old_netcdf(data)
+    return from_dataset(data.verified(checksum))
+
+
+def _from_old_netcdf(data: Dataset) -> Sweep:
+    """Return a sweep of older versions, whose variables are numbered and two of which may have one path."""
+    time = next(one for one in data.variables if one.path == "time")
+    quantities = [one for one in data.variables if one.dimensions == ("run", "time")]
+    values = {one.path: one.values.tolist() for one in quantities}
+    return _from_dict({**data.about, "time": time.values.tolist(), "quantities": values}, _meanings(quantities))
+
+
+def _meanings(quantities: list[Variable]) -> dict[str, str]:
+    return {one.path: one.meaning for one in quantities if one.meaning != one.path}
+
+
+# -- JSON --------------------------------------------------------------------------------------------------------------
+
+
+def _write_json(sweep: Sweep, file: Path) -> None:
+    data = {**sweep.to_dict(), "meanings": dict(sweep.meanings)}
+    file.write_text(json.dumps({**data, "checksum": _digest(data)}, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _digest(data: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+
+
+def _read_json(file: Path) -> Sweep:
+    data = json.loads(file.read_text(encoding="utf-8"))
+    checksum = data.pop("checksum", None)
+    if checksum is None and "meanings" in data:
+        raise ValueError("its checksum is missing")
+    if checksum is not None and checksum != _digest(data):
+        raise ValueError("its checksum is that of other contents")
+    return _from_dict(data, data.get("meanings", {}))
+
+
+def _from_dict(data: Mapping[str, Any], meanings: Mapping[str, str]) -> Sweep:
+    """Return the sweep that `Sweep.to_dict` was made of."""
+    starts = {f"start.{path}": values for path, values in data["start"].items()}
+    columns = {**data["parameters"], **starts}
+    return from_parts(
+        {**data, "varied": [[label.removeprefix("start."), label, label in starts] for label in columns]},
+        time=np.array(data["time"], dtype=float),
+        varied={label: np.array(values) for label, values in columns.items()},
+        quantities={path: np.array(rows, dtype=float) for path, rows in data["quantities"].items()},
+        units={**data["units"], **{f"start.{path}": data["units"].get(path, "") for path in data["start"]}},
+        meanings=meanings,
+        status=tuple(data["status"]),
+        end_time=np.array(data["end_time"], dtype=float),
+        steps=np.array(data["steps"]),
+    )
+
+
+# -- CSV ---------------------------------------------------------------------------------------------------------------
+
+_LAST_LINE = "# rows: {rows}, sha256: {checksum}, about: {about}\n"
 
 
 def _write_csv(sweep: Sweep, file: Path) -> None:
     """Write what was varied, the time and the quantities, with units in brackets; what is not known is empty."""
-    heads = ["run", "status", *(_head(sweep, path) for path in sweep.varied), "time [s]"]
-    heads += [_head(sweep, path) for path in sweep.paths]
+    named = labels(sweep)
+    heads = ["run", "status", *(_head(label, sweep.units.get(path, "")) for path, label in named.items()), "time [s]"]
+    heads += [_head(path, sweep.units[path]) for path in sweep.paths]
     varied = [values.tolist() for values in sweep.varied.values()]
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(heads)
-        for run, status in enumerate(sweep.status):
-            first = [run, status, *(_cell(values[run]) for values in varied)]
-            for k, t in enumerate(sweep.time.tolist()):
-                row = [_cell(float(values[run, k])) for values in sweep.quantities.values()]
-                writer.writerow([*first, _cell(t), *row])
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n", quoting=csv.QUOTE_ALL).writerow(heads)
+    writer = csv.writer(text, lineterminator="\n")
+    for run, status in enumerate(sweep.status):
+        first = [run, status, *(_cell(values[run]) for values in varied)]
+        for k, t in enumerate(sweep.time.tolist()):
+            row = [_cell(float(values[run, k])) for values in sweep.quantities.values()]
+            writer.writerow([*first, _cell(t), *row])
+    whole = sweep.to_dict()
+    known = {"end_time": whole["end_time"], "steps": whole["steps"]}
+    about = json.dumps({**about_sweep(sweep), **known, "meanings": dict(sweep.meanings)}, allow_nan=False)
+    content = text.getvalue()
+    checksum = hashlib.sha256((content + about).encode()).hexdigest()
+    rows = len(sweep) * len(sweep.time)
+    file.write_bytes((content + _LAST_LINE.format(rows=rows, checksum=checksum, about=about)).encode())
 
 
-def _head(sweep: Sweep, path: str) -> str:
-    unit = sweep.units.get(path, "")
-    return f"{path} [{unit}]" if unit else path
+def _head(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
 
 
 def _cell(value: Any) -> Any:
     return ("" if not np.isfinite(value) else repr(value)) if isinstance(value, float) else value
 
 
-def _write_json(sweep: Sweep, file: Path) -> None:
-    file.write_text(json.dumps(sweep.to_dict(), allow_nan=False) + "\n", encoding="utf-8")
+def _read_csv(file: Path) -> Sweep:
+    content = file.read_bytes().replace(b"\r\n", b"\n").decode()
+    cut = content.rstrip("\n").rfind("\n") + 1
+    content, last = content[:cut], content[cut:]
+    about_text = last.partition(", about: ")[2].rstrip("\n")
+    checksum = hashlib.sha256((content + about_text).encode()).hexdigest()
+    rows = content.count("\n") - 1
+    if last.strip() != _LAST_LINE.format(rows=rows, checksum=checksum, about=about_text).strip():
+        raise ValueError("it is cut off, or its checksum is that of other contents")
+    about = json.loads(about_text)
+    heads, *lines = csv.reader(io.StringIO(content, newline=""))
+    columns = list(zip(*lines, strict=True))
+    runs = int(np.prod(about["shape"]))
+    count, middle = len(lines) // runs, 2 + len(about["varied"])
+    varied, units = {}, {}
+    for (_, label, _, is_text), head, column in zip(about["varied"], heads[2:], columns[2:], strict=False):
+        units[label] = _unit(head, label)
+        varied[label] = np.array(column[::count]) if is_text else _numbers(column[::count])
+    quantities = {}
+    for path, head, column in zip(about["paths"], heads[middle + 1 :], columns[middle + 1 :], strict=True):
+        units[path] = _unit(head, path)
+        quantities[path] = _numbers(column).reshape(runs, count)
+    return from_parts(
+        about,
+        time=_numbers(columns[middle][:count]),
+        varied=varied,
+        quantities=quantities,
+        units=units,
+        meanings=about["meanings"],
+        status=tuple(columns[1][::count]),
+        end_time=np.array(about["end_time"], dtype=float),
+        steps=np.array(about["steps"]),
+    )
 
 
-def _write_netcdf(sweep: Sweep, file: Path) -> None:
-    """Write variables by number with the dimensions run and time; their paths are attributes, since names are short."""
-    from scipy.io import netcdf_file
-
-    data: Any
-    with netcdf_file(str(file), "w", version=2) as data:
-        data.title = b"Atwood sweep"
-        about = {name: one for name, one in sweep.to_dict().items() if name not in ("quantities", "time")}
-        data.atwood = json.dumps(about, allow_nan=False).encode()
-        data.createDimension("run", len(sweep))
-        data.createDimension("time", len(sweep.time))
-        _variable(data, "time", sweep.time, ("time",), "time", "s", "Time.")
-        _variable(data, "end_time", sweep.end_time, ("run",), "end_time", "s", "The time that a run reached.")
-        for number, (path, values) in enumerate(sweep.varied.items()):
-            if values.dtype.kind == "f":  # words are in the attribute
-                _variable(
-                    data, f"varied_{number}", values, ("run",), path, sweep.units.get(path, ""), "What was varied."
-                )
-        for number, (path, values) in enumerate(sweep.quantities.items()):
-            about_it = sweep.meanings.get(path, "")
-            _variable(data, f"quantity_{number}", values, ("run", "time"), path, sweep.units[path], about_it)
+def _unit(head: str, name: str) -> str:
+    return head[len(name) + 2 : -1]
 
 
-def _variable(
-    data: Any, name: str, values: Any, dimensions: tuple[str, ...], path: str, unit: str, meaning: str
-) -> None:
-    variable = data.createVariable(name, "d", dimensions)
-    variable[:] = values
-    variable.path, variable.units, variable.long_name = path.encode(), unit.encode(), (meaning or path).encode()
+def _numbers(cells: tuple[str, ...]) -> NDArray[Any]:
+    return np.array([float(cell) if cell else np.nan for cell in cells])
 
 
-_FORMATS: dict[str, Callable[[Sweep, Path], None]] = {".csv": _write_csv, ".nc": _write_netcdf, ".json": _write_json}
+# -- which -------------------------------------------------------------------------------------------------------------
+
+_Write = Callable[[Sweep, Path], None]
+_Read = Callable[[Path], Sweep]
+_FORMATS: dict[str, tuple[_Write, _Read]] = {
+    ".csv": (_write_csv, _read_csv),
+    ".nc": (_write_with(write_netcdf), _read_netcdf),
+    ".npz": (_write_with(write_npz), _read_with(read_npz)),
+    ".mat": (_write_with(write_matlab), _read_with(read_matlab)),
+    ".json": (_write_json, _read_json),
+}
+
+
+def _format_of(target: Path) -> tuple[_Write, _Read]:
+    suffix = target.suffix.lower()
+    if suffix not in _FORMATS:
+        problem = f"the suffix {target.suffix!r} is not known" if target.suffix else "the name has no suffix"
+        raise UsageError(problem, where=str(target), advice=f"Use {', '.join(_FORMATS)}.")
+    return _FORMATS[suffix]

@@ -212,7 +212,10 @@ class Sweep:
         }
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save the sweep as ``.csv``, ``.nc`` (NetCDF-3) or ``.json``.
+        """Save the sweep as ``.nc`` (NetCDF-3), ``.npz``, ``.mat`` (MATLAB), ``.csv`` or ``.json``.
+
+        What was varied has its own names beside the quantities: parameters their paths, start values ``start.`` before
+        theirs. A grid has a dimension for each of them, a list the dimension ``run``. `atwood.load_sweep` reads it.
 
         Parameters
         ----------
@@ -222,6 +225,42 @@ class Sweep:
         from atwood.study.sweeps.files import save_sweep
 
         return save_sweep(self, file)
+
+    def to_dataframe(self) -> Any:
+        """Return a table of pandas: a row for each run and output time, with what was varied, and the quantities.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the index ``run``, ``time``; ``attrs["units"]`` has the SI units by column.
+
+        Raises
+        ------
+        UsageError
+            If pandas is not installed (``pip install 'atwood[data]'``).
+        """
+        from atwood.study.sweeps.data import as_table
+
+        return as_table(self)
+
+    def to_xarray(self) -> Any:
+        """Return the sweep as a dataset of xarray, with what was varied as coordinates.
+
+        Returns
+        -------
+        xarray.Dataset
+            A grid has a dimension for each thing that was varied, and ``time``; a list has ``run`` and ``time``.
+            Parameters have their paths, start values ``start.`` before theirs.
+
+        Raises
+        ------
+        UsageError
+            If xarray is not installed (``pip install 'atwood[data]'``).
+        """
+        from atwood.result.formats.tables import to_xarray
+        from atwood.study.sweeps.data import as_dataset
+
+        return to_xarray(as_dataset(self))
 
     def plot(self, paths: Any = None, file: str | os.PathLike[str] | None = None) -> Any:
         """Draw quantities at the end over what was varied, a map where two values were, and return the figure.
