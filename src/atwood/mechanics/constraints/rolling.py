@@ -210,15 +210,15 @@ def _unit(mechanism: Mechanism, is_length: bool) -> float:
 def _depends_on_one(places: Places, value: Expression, mechanism: Mechanism) -> int | None:
     """Return the number of the only coordinate that a value depends on; None if it is not one with a speed of its own.
 
-    What cancels but for rounding, as the product of two directions at a right angle, is no dependence.
+    What cancels but for rounding, as the product of two directions at a right angle, is no dependence; and what holds
+    wherever it is asked depends on none.
     """
     state = places.state
     found = jacobian([value], [*state.coordinates, mechanism.time])
-    numbers = np.abs(places.values(mechanism, found.entries))
-    if len(numbers) < NEEDED or not found.columns:
+    is_certain = places.certain(mechanism, found.entries) if found.columns else np.zeros((0, 0))
+    if len(is_certain) < NEEDED:
         return None
-    sizes = np.max(numbers, axis=0)
-    which = [column for column, size in zip(found.columns, sizes, strict=True) if size > 1e-11 * np.max(sizes)]
+    which = [column for column, moves in zip(found.columns, np.any(is_certain, axis=0), strict=True) if moves]
     alone = which[0] if len(which) == 1 else len(state.coordinates)
     return alone if alone < len(state.coordinates) and state.rates[alone] in set(state.speeds) else None
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.clock import within_time
-from atwood.codegen.rounding import ROUGHNESS
+from atwood.codegen.rounding import CERTAIN, ROUGHNESS
 from atwood.linalg.matrices import Matrix, is_full, scaled, to_array
 
 __all__ = [
@@ -35,13 +35,6 @@ __all__ = [
     "trusted_sizes",
 ]
 
-
-CERTAIN = 30.0
-"""Times its error: what is left of a row by more is not rounding.
-
-Errors are found from some ways of rounding 16 times as rough as the machine's; so 500 roundings in a row that all go
-the same way are still told from what is there.
-"""
 
 RANK = 1e-9
 """Relative size below which a direction is not followed when a linear system is solved.
