@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from atwood import simulate
+from atwood.codegen.llvm.columns import ColumnKernel
 from atwood.codegen.python.backend import BoundKernel
 from atwood.linalg import sparse
 from atwood.simulation.singular.monitor import SingularityMonitor
@@ -17,11 +18,14 @@ FORMS = ("reduced", "dae")
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many kernels were called while something looked out for singular positions."""
     count, inside = [0], [False]
-    call, look = BoundKernel.__call__, SingularityMonitor.look
+    look = SingularityMonitor.look
 
-    def counted(self, *groups):
-        count[0] += inside[0]
-        return call(self, *groups)
+    def counted(call):
+        def counting(self, *groups):
+            count[0] += inside[0]
+            return call(self, *groups)
+
+        return counting
 
     def looking(self, *state):
         inside[0] = True
@@ -30,7 +34,8 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         finally:
             inside[0] = False
 
-    monkeypatch.setattr(BoundKernel, "__call__", counted)
+    for kind in (BoundKernel, ColumnKernel):
+        monkeypatch.setattr(kind, "__call__", counted(kind.__call__))
     monkeypatch.setattr(SingularityMonitor, "look", looking)
     return count
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property, partial
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -44,6 +44,9 @@ from atwood.model.local.states import declared_starts
 from atwood.showing import count_of, fitted
 from atwood.topology.orientation_coordinates import Orientation
 from atwood.topology.spanning_forest import grow_spanning_forest
+
+if TYPE_CHECKING:
+    from atwood.codegen.llvm.columns import ColumnKernel
 
 __all__ = ["Assembly", "FormName"]
 
@@ -390,6 +393,17 @@ class Assembly:
         if key not in self._kernels:
             self._kernels[key] = self.compiled(program, vectorized).bind(self.parameter_values)
         found: BoundKernel = self._kernels[key]
+        return found
+
+    def columns(self, program: Program) -> ColumnKernel:
+        """Return a program for many states as machine code with the parameters of this scene, ready to run."""
+        from atwood.codegen.llvm.columns import compile_columns
+
+        key = (id(program), "columns")
+        if key not in self._kernels:
+            made = self.shared.get(("columns", id(program)), lambda: (program, compile_columns(program)))
+            self._kernels[key] = made[1].bind(self.parameter_values)
+        found: ColumnKernel = self._kernels[key]
         return found
 
     def known_kernel(self, program: Program, values: FloatArray) -> BoundKernel:

@@ -7,6 +7,7 @@ and velocities of either form.
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,10 +72,17 @@ def accelerations_and_multipliers(
 
 
 def accelerations_at(
-    assembly: Assembly, form: FormName, t: FloatArray, q: FloatArray, u: FloatArray, kept: NDArray[np.intp]
+    assembly: Assembly,
+    form: FormName,
+    t: FloatArray,
+    q: FloatArray,
+    u: FloatArray,
+    kept: NDArray[np.intp],
+    kernel: Callable[..., tuple[FloatArray, ...]] | None = None,
 ) -> FloatArray:
-    """Return the accelerations alone; see `accelerations_and_multipliers`."""
-    values = assembly.kernel(assembly.balance(form).program, vectorized=True)(t[None, :], q, u)
+    """Return the accelerations alone, perhaps with a kernel of the balance; see `accelerations_and_multipliers`."""
+    call = kernel or assembly.kernel(assembly.balance(form).program, vectorized=True)
+    values = call(t[None, :], q, u)
     return _solved(assembly, form, (t, q, u), kept, values)[0]
 
 

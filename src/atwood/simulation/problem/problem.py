@@ -29,11 +29,15 @@ from atwood.simulation.initialization.massless import check_massless_directions
 from atwood.simulation.problem.not_compilable import announce, find_not_compilable
 
 if TYPE_CHECKING:
+    from atwood.expr import Program
     from atwood.forms.null_space import NullSpaceProgram
     from atwood.simulation.problem.native_null_space import CompiledNullSpace
 
 __all__ = ["Plan", "make_plan", "pack_state"]
 
+
+_LARGEST_COLUMNS = 20_000
+"""Programs for many states that are larger are not compiled: that would take longer than it saves."""
 
 _HELD = 1e-7
 """Relative to the scene's sizes: a projected state that misses a constraint by more has not met it."""
@@ -64,6 +68,8 @@ class Plan:
         How often they changed.
     not_compilable
         What keeps the scene from being compiled, in words; empty if nothing does.
+    compiles_columns
+        Whether programs for many states are compiled; asked for once many evaluations of few states are needed.
     """
 
     assembly: Assembly
@@ -77,6 +83,7 @@ class Plan:
     dependent_speeds: tuple[int, ...]
     switches: int = 0
     not_compilable: str = ""
+    compiles_columns: bool = False
     _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
     _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
     _null_space: CompiledNullSpace | None = field(default=None, repr=False)
@@ -110,6 +117,11 @@ class Plan:
             many = program.derivative.by_columns
             self._kernels = (assembly.kernel(program.residual), assembly.kernel(program.jacobian, vectorized=many))
         return self._kernels
+
+    def columns(self, program: Program) -> Callable[..., tuple[FloatArray, ...]]:
+        """Return a program for many states: compiled where that was asked for and pays, else with NumPy."""
+        compiles = self.compiles_columns and not self.not_compilable and program.size <= _LARGEST_COLUMNS
+        return self.assembly.columns(program) if compiles else self.assembly.kernel(program, vectorized=True)
 
     @property
     def _present(self) -> FormProgram:

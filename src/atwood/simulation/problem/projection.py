@@ -233,7 +233,7 @@ def constraints_at(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> C
         alone = plan.assembly.kernel(program)(t, q[:, 0], u[:, 0])
         value, jacobian, explicit_rate = (np.reshape(one, (-1, 1)) for one in alone)
     else:
-        value, jacobian, explicit_rate = plan.assembly.kernel(program, vectorized=True)(t[None, :], q, u)
+        value, jacobian, explicit_rate = plan.columns(program)(t[None, :], q, u)
     kept, normal = list(plan.finding.kept), _normal(plan)
     farthest = int(np.argmax(np.max(np.abs(q), axis=0, initial=0.0)))
     errors = plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)

@@ -164,11 +164,12 @@ def _settle(
     integral = _points()[1]
     half = 0.5 * (end - t)
     kept = np.asarray(plan.finding.kept, dtype=np.intp)
-    last, sizes = np.inf, []
+    last, sizes, balance = np.inf, [], plan.columns(plan.balance.program.program)
     places, speeds = guess
     for _ in range(_SWEEPS):
         held = _held(plan, times, places, speeds, is_far)
-        accelerations = accelerations_at(plan.assembly, plan.assembly.form, times, held.coordinates, held.speeds, kept)
+        state = times, held.coordinates, held.speeds
+        accelerations = accelerations_at(plan.assembly, plan.assembly.form, *state, kept, balance)
         turned = half * (integral @ accelerations.T)
         turned[0] += u
         later = (_REACH @ turned).T  # known already, and twice as near as what the places would follow from

@@ -337,6 +337,7 @@ class SingularityMonitor:
 
     def _pass(self, near: float, away: float = 0.0, failed: bool = False) -> SingularCrossing | None:
         """Return the passage near a time; None where the motion is as anywhere else."""
+        self.plan.compiles_columns = True  # the arcs take many evaluations of few states each
         tried: set[float] = set()
         for reach in (1.0, 2.0, 0.5, 0.25, 0.1):
             begin = self._begin(near, reach)
