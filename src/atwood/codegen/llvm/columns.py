@@ -97,7 +97,7 @@ class ColumnKernel:
             One array of shape (size, states) for each output group.
         """
         check_time()
-        code, states = self.code, groups[0].shape[1]
+        code, states = self.code, max(one.shape[1] for one in groups)
         given = [_full(one, (size, states)) for one, size in zip(groups, code.inputs, strict=True)]
         found = [np.empty((size, states)) for size in code.outputs]
         room, scratch = np.empty(sum(code.inputs) + sum(code.outputs)), np.empty(code.built.scratch)
