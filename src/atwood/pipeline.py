@@ -36,6 +36,7 @@ from atwood.result.result import Result
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
 from atwood.simulation.initialization.start import Start, find_start
 from atwood.simulation.problem.arguments import (
+    CONDITIONS,
     FORM,
     LEVEL,
     LIMITS,
@@ -49,6 +50,7 @@ from atwood.simulation.problem.arguments import (
     STRUCTURE,
     T_END,
 )
+from atwood.simulation.problem.conditions import Condition
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.run import run, run_out_of_time
 from atwood.topology.bodies import find_bodies
@@ -228,6 +230,8 @@ def read_mechanism(
     samples=SAMPLES,
     structure=STRUCTURE,
     progress=PROGRESS,
+    until=CONDITIONS,
+    record=CONDITIONS,
     **LIMITS,
 )
 def simulate(
@@ -246,6 +250,8 @@ def simulate(
     samples: int = 400,
     structure: bool = False,
     progress: Callable[[float], object] | None = None,
+    until: Any = None,
+    record: Any = None,
 ) -> Result:
     """Simulate a scene from its start to its end.
 
@@ -278,6 +284,12 @@ def simulate(
         Whether nothing needs to move: a truss, whose forces are asked for. Otherwise what cannot move is refused.
     progress
         Called with the time reached, s.
+    until
+        Where the run stops: text such as ``"rod1.angle crosses 30 deg"``, with crosses, rises above or falls below; or
+        a function of the scene's quantities by path, ``lambda q: q["bob.position.z"] < -1.0``, which returns a
+        comparison that becomes true, or what passes zero; or a list of these. It stops at `t_end` at the latest.
+    record
+        The same, where the run goes on; `Result.events` has when. It changes nothing in the run.
 
     Returns
     -------
@@ -311,6 +323,10 @@ def simulate(
         solver=solver,
         samples=samples,
         structure=structure,
+        conditions=(
+            *(Condition(one, "stop") for one in _listed(until)),
+            *(Condition(one, "") for one in _listed(record)),
+        ),
     )
 
     try:
@@ -319,6 +335,13 @@ def simulate(
     except TimeIsUp:
         return Result(run_out_of_time(assembly, None, options))
     return Result(run(assembly, start, options, assembly.other_mode, clock))
+
+
+def _listed(conditions: Any) -> list[Any]:
+    """Return conditions as a list."""
+    if conditions is None:
+        return []
+    return [conditions] if callable(conditions) or isinstance(conditions, str) else list(conditions)
 
 
 def _with_line_signs(assembly: Assembly) -> tuple[Assembly, Start]:

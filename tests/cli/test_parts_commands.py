@@ -113,3 +113,14 @@ def test_a_synonym_is_not_inherited() -> None:
 def test_no_part_has_its_own_name_as_a_synonym() -> None:
     for name in PARTS:
         assert name not in vars(getattr(atwood_library, name)).get("synonyms", ())
+
+
+def test_a_run_stops_at_a_condition_and_notes_others() -> None:
+    arguments = ("run", "simple-pendulum", "--until", "rod.angle crosses 0", "--record", "rod.angle falls below 20 deg")
+    found = json.loads(run(*arguments, "--json").output)
+    assert found["status"] == "stopped"
+    assert [one["what"] for one in found["happenings"]] == ["rod.angle falls below 20 deg", "rod.angle crosses 0"]
+    assert "stopped: at t = " in run(*arguments, "--no-progress").output
+    wrong = CliRunner().invoke(main, ["run", "simple-pendulum", "--until", "rod.angle croses 0"])
+    assert wrong.exit_code == 1
+    assert "Did you mean 'crosses'?" in wrong.output

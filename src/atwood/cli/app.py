@@ -159,6 +159,13 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after so many seconds.")
 @click.option("--max-step", type=click.FloatRange(min=0.0, min_open=True), help="The largest step, s.")
 @click.option("--structure", is_flag=True, help="Nothing needs to move: it is a truss.")
+@click.option(
+    "--until",
+    multiple=True,
+    metavar="CONDITION",
+    help="Stop where a quantity passes a value, as 'rod1.angle crosses 30 deg' (or rises above, falls below).",
+)
+@click.option("--record", multiple=True, metavar="CONDITION", help="Note when that happens, and go on.")
 @click.option("--plot", type=_FILE, help="Save a plot; the suffix says how (.png, .svg, .pdf).")
 @click.option("--draw", type=_FILE, help="Save a picture of the mechanism (.png, .svg, .pdf), or its motion (.gif).")
 @click.option(

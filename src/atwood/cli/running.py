@@ -41,6 +41,8 @@ class RunRequest:
     max_seconds: float | None = None
     max_step: float | None = None
     structure: bool = False
+    until: tuple[str, ...] = ()
+    record: tuple[str, ...] = ()
     plot: Path | None = None
     draw: Path | None = None
     view: str | None = None
@@ -78,6 +80,8 @@ def run_scene(request: RunRequest) -> None:
                 max_seconds=request.max_seconds,
                 max_step=request.max_step,
                 structure=request.structure,
+                until=request.until or None,
+                record=request.record or None,
                 solver=request.solver,
                 progress=progress,
             )

@@ -43,6 +43,8 @@ class EventFunction:
         SI unit of the value.
     impact
         Whether velocities jump.
+    is_there
+        What must be positive for a zero to count; all count if not given.
     """
 
     part: str
@@ -53,6 +55,7 @@ class EventFunction:
     message: str
     unit: str
     impact: bool
+    is_there: Expression | None = None
 
     @property
     def is_noted(self) -> bool:

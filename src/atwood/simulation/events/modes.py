@@ -16,6 +16,7 @@ from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, 
 from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import event_program
 from atwood.forms.places import to_maximal
+from atwood.integrators.protocol import StepResult
 from atwood.late import dataclass
 from atwood.linalg.matrices import is_full, scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
@@ -32,6 +33,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
 from atwood.simulation.dynamics.rank import least_norm
 from atwood.simulation.dynamics.reactions import ReactionSolver, maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.problem.conditions import Condition, condition_functions
 from atwood.simulation.problem.problem import Plan
 
 if TYPE_CHECKING:
@@ -67,7 +69,7 @@ class EventRecord:
 
     def describe(self) -> str:
         """Return what happened, where and when."""
-        return f"at t = {self.time:.9g} s, {self.part}: {self.message}"
+        return f"at t = {self.time:.9g} s, {self.part}{': ' if self.part else ''}{self.message}"
 
 
 def find_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
@@ -109,17 +111,31 @@ class EventProbe:
     tolerance
         Relative tolerance of the run. A one-sided event that starts within ten times this of zero, as a rope does that
         has just gone slack, happens only when it has passed zero by as much; else errors of a step would set it off.
+    conditions
+        What the run looks for besides.
     """
 
-    def __init__(self, plan: Plan, t: float, q: FloatArray, u: FloatArray, tolerance: float) -> None:
-        self.plan = plan
+    def __init__(
+        self,
+        plan: Plan,
+        t: float,
+        q: FloatArray,
+        u: FloatArray,
+        tolerance: float,
+        conditions: tuple[Condition, ...] = (),
+    ) -> None:
+        self.plan, self._conditions = plan, conditions
         self.assembly = assembly = plan.assembly
-        self.event_functions = find_event_functions(assembly)
-        self.needs = assembly.shared.get("watched needs", lambda: _find_needs(assembly, self.event_functions))
+        self.event_functions = (*condition_functions(assembly, conditions), *find_event_functions(assembly))
+        self.needs = assembly.shared.get(
+            ("watched needs", conditions), lambda: _find_needs(assembly, self.event_functions)
+        )
         self.reactions = ReactionSolver(assembly, t, q, u) if self.needs.reactions else None
         self.kernel = (
             assembly.kernel(
-                assembly.known_program("events", "events", lambda: [one.value for one in self.event_functions])
+                assembly.known_program(
+                    ("events", conditions), "events", lambda: [one.value for one in self.event_functions]
+                )
             )
             if self.event_functions
             else None
@@ -186,7 +202,7 @@ class EventProbe:
                 return None
             return compile_events(program, for_ida)
 
-        code = self.assembly.shared.get(("event code", kept, maximal, for_ida), make)
+        code = self.assembly.shared.get(("event code", kept, maximal, for_ida, self._conditions), make)
         return None if code is None else code.bind(self.assembly.parameter_values, self._shift)
 
     def function(self) -> Callable[[float, FloatArray, FloatArray], FloatArray] | None:
@@ -222,15 +238,26 @@ class EventProbe:
             found.append((high, function))
         return self._record(*min(found, key=lambda one: one[0])) if found else None
 
-    def name(self, t: float, events: Sequence[int]) -> EventRecord:
-        """Return what happened when the driver reports an event: of several, first what does not go on as before."""
-        fired = [one for one, sign in zip(self.event_functions, events, strict=True) if sign]
-        return self._record(t, next((one for one in fired if one.target), fired[0]))
+    def name(self, step: StepResult) -> EventRecord | None:
+        """Return what happened when the driver reports an event, and does not go on as before; None if it does."""
+        return next((self._record(step.t, one) for one in self._fired(step) if one.target), None)
 
-    def noted(self, t: float, events: Sequence[int]) -> list[EventRecord]:
+    def noted(self, step: StepResult) -> list[EventRecord]:
         """Return what changes nothing among what the driver reports."""
-        fired = (one for one, sign in zip(self.event_functions, events, strict=True) if sign)
-        return [self._record(t, one) for one in fired if not one.target]
+        return [self._record(step.t, one) for one in self._fired(step) if not one.target]
+
+    def _fired(self, step: StepResult) -> list[EventFunction]:
+        """Return what the driver reports, without zeros that do not count."""
+        fired = [one for one, sign in zip(self.event_functions, step.events, strict=True) if sign]
+        return [one for one in fired if one.is_there is None or self._is_there(step, one)]
+
+    def _is_there(self, step: StepResult, one: EventFunction) -> bool:
+        assembly, expression = self.assembly, one.is_there
+        assert expression is not None
+        key = ("is there", one.law, self._conditions)
+        kernel = assembly.kernel(assembly.known_program(key, "whether an event is there", lambda: [expression]))
+        q, u = self.plan.program.split(step.y)
+        return bool(kernel([step.t], q, u, np.zeros_like(u), [0.0] * len(assembly.reactions))[0][0] > 0.0)
 
     def _record(self, t: float, function: EventFunction) -> EventRecord:
         return EventRecord(t, function.part, function.law, function.message, function.target, function.impact)

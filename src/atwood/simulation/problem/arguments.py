@@ -13,6 +13,7 @@ from atwood.arguments import (
     TEXT,
     Kind,
     Refused,
+    each,
     either,
     number,
     one_of,
@@ -27,6 +28,7 @@ from atwood.simulation.problem.options import SOLVERS
 from atwood.topology.orientation_coordinates import ORIENTATIONS
 
 __all__ = [
+    "CONDITIONS",
     "FORM",
     "FORMS",
     "LEVEL",
@@ -67,6 +69,12 @@ def _time(value: Any) -> float:
 _SECONDS = number(least=-_LONGEST, most=_LONGEST)
 
 
+def _condition(value: Any) -> str:
+    if not isinstance(value, str) or not value.strip():
+        raise Refused
+    return value
+
+
 def _times(value: Any) -> Any:
     if isinstance(value, (str, bytes, set, frozenset, dict)):
         raise Refused
@@ -96,6 +104,9 @@ LIMITS = {
 SAMPLES = whole(f"a whole number of samples, 1 to {_MOST:,}", 1, _MOST)
 STRUCTURE = FLAG
 PROGRESS = optional(CALLBACK)
+_WATCHED = "a condition such as 'rod1.angle crosses 0', a function of quantities, or a list of these"
+_ONE = either(Kind(_WATCHED, _condition), CALLBACK)
+CONDITIONS = optional(Kind(_WATCHED, lambda value: either(CALLBACK, each(_ONE, _WATCHED)).read(value)))
 
 
 def check_span(begin: float, end: float, max_step: float | None = None) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.late import dataclass
+from atwood.simulation.problem.conditions import Condition
 
 __all__ = ["SOLVERS", "RunOptions", "Samples", "sample_times"]
 
@@ -49,6 +50,8 @@ class RunOptions:
         Whether it may be that nothing can move.
     on_step
         Called with the time before each step of the solver.
+    conditions
+        What is looked for along the run, besides the events of parts.
     """
 
     t_end: float
@@ -63,6 +66,7 @@ class RunOptions:
     samples: int = 400
     structure: bool = False
     on_step: Callable[[float], object] | None = None
+    conditions: tuple[Condition, ...] = ()
 
     def out_of_time(self, t: float) -> str:
         """Return what is said of a run that its limit of time ended, at a time of its own."""

@@ -317,7 +317,7 @@ class _Walk:
             self.choice = choose(plan, options, t, q, u)
         self._plans.setdefault(self._piece, plan)
         if self.probe is None:
-            self.probe = EventProbe(plan, t, q, u, options.relative_tolerance)
+            self.probe = EventProbe(plan, t, q, u, options.relative_tolerance, options.conditions)
         self.plan = plan
 
     def _plan(self) -> Plan:

@@ -229,7 +229,8 @@ class _Runner:
             self.recorder.settle()
             return self._ended(self.segment.end, "finished", "")
         if step_result.status is Status.EVENT:
-            event = self.segment.probe.name(step_result.t, step_result.events)
+            event = self.segment.probe.name(step_result)
+            assert event is not None, "what changes nothing has been noted"
             if event.target != COORDINATE_SWITCH:
                 self.recorder.take(step_result.t, step_result.y, True)
             elif step_result.t > self.recorder.end:
@@ -254,20 +255,20 @@ class _Runner:
         """After an event that changes nothing, note it: the solver then goes on as if nothing had happened."""
         if step_result.status is not Status.EVENT:
             return False
-        self.noted += self.segment.probe.noted(step_result.t, step_result.events)
-        if self.segment.probe.name(step_result.t, step_result.events).target:
+        noted = self.segment.probe.noted(step_result)
+        self.noted += noted
+        if self.segment.probe.name(step_result) is not None:
             return False
-        self.recorder.take(step_result.t, step_result.y, True)
+        if noted:
+            self.recorder.take(step_result.t, step_result.y, True)
         return True
 
     def _switches_coordinates(self, session: Session, step_result: StepResult) -> bool:
         """After an event, go on in other coordinates of an orientation, if that is all that has happened."""
         segment = self.segment
         plan = segment.plan
-        if (
-            step_result.status is not Status.EVENT
-            or segment.probe.name(step_result.t, step_result.events).target != COORDINATE_SWITCH
-        ):
+        event = segment.probe.name(step_result) if step_result.status is Status.EVENT else None
+        if event is None or event.target != COORDINATE_SWITCH:
             return False
         q, u = (part.copy() for part in plan.program.split(step_result.y))
         q, bodies = switched(plan.assembly, q)
