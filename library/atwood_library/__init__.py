@@ -86,6 +86,7 @@ if TYPE_CHECKING:
     from atwood_library.sensors.orientation_sensor import OrientationSensor as OrientationSensor
     from atwood_library.sensors.position_sensor import PositionSensor as PositionSensor
     from atwood_library.sensors.relative_position_sensor import RelativePositionSensor as RelativePositionSensor
+    from atwood_library.sensors.totals_sensor import TotalsSensor as TotalsSensor
     from atwood_library.sources.ramp import Ramp as Ramp
     from atwood_library.sources.sine import Sine as Sine
 
@@ -124,9 +125,9 @@ _MODULES = {
     "MeshBody": "parts.mesh_body",
     "MutualPotential": "fields.mutual_potential",
     "OrientationSensor": "sensors.orientation_sensor",
-    "PairPotential": "fields.pair_potential",
     "PI": "blocks.pi",
     "PID": "blocks.pid",
+    "PairPotential": "fields.pair_potential",
     "Pivot": "joints.pivot",
     "Planar": "joints.planar",
     "PlanetaryGear": "joints.planetary_gear",
@@ -164,6 +165,7 @@ _MODULES = {
     "Torque": "forces.torque",
     "TorsionDamper": "forces.torsion_damper",
     "TorsionSpring": "forces.torsion_spring",
+    "TotalsSensor": "sensors.totals_sensor",
     "TransferFunction": "blocks.transfer_function",
     "Tube": "parts.tube",
     "Universal": "joints.universal",

@@ -176,7 +176,17 @@ def _bound(trial: Trial, units: Units) -> Any:
         line=trial.space.line,
         line_signs=trial.line_signs,
         reactions=reactions,
-        energies={"kinetic": 0.7 * joule, "potential": -0.2 * joule},
+        energies={
+            "kinetic": 0.7 * joule,
+            "potential": -0.2 * joule,
+            "power": 0.3 * joule / time,
+            "mass": 1.3 * mass,
+            "first_moment": Vector(0.4, -0.3, 0.8) * (mass * length),
+            "momentum": Vector(0.6, 0.9, -0.5) * (mass * length / time),
+            "angular_momentum": Vector(-0.2, 0.7, 0.3) * (joule * time),
+            "moments": Vector(1.1, 1.2, 1.4) * (mass * length**2),
+            "products": Vector(0.1, -0.2, 0.15) * (mass * length**2),
+        },
     )
     return bind(component, binding)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from atwood.expr import Expression, Scalar, live, substitute, vjp
 from atwood.late import dataclass
@@ -156,7 +157,7 @@ def make_binding(
     local: LocalPart,
     reactions: Mapping[str, Expression],
     known: Mapping[str, Expression],
-    energies: Mapping[str, Expression],
+    energies: Mapping[str, Any],
     signals: Mapping[Expression, Expression],
 ) -> Binding:
     """Return what the laws of a part read when they may read everything.
@@ -170,7 +171,7 @@ def make_binding(
     reactions, known
         Its reactions and its joint coordinates, by name.
     energies
-        Those of the model around it.
+        Energies and totals of the model around it.
     signals
         What linked inputs stand for.
     """

@@ -16,6 +16,7 @@ from atwood.expr import Expression
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable, Reaction, add_up, make_binding, part_energies, take
+from atwood.mechanics.outputs.totals import Totals, add_totals, energy_rate, observe_totals, part_totals
 from atwood.model.declare.component import Binding, bind
 from atwood.model.local.laws import LocalPart
 from atwood.model.returned import call_law, law_value, not_evaluated, one_scalar
@@ -66,10 +67,11 @@ class Observables(Mapping[str, Observable]):
         self._reader = Reader(mechanism, equations, reactions)
         self._reactions = {one.path: one for one in reactions}
         self._made: dict[str, dict[str, Observable]] = {}
+        self._wholes: dict[str, Mapping[str, Observable]] = {}
         self._all: dict[str, Observable] | None = None
 
     def __getitem__(self, path: str) -> Observable:
-        if self._all is not None:
+        if self._all is not None and path in self._all:
             return self._all[path]
         one = self._reactions.get(path)
         if one is not None:
@@ -79,13 +81,25 @@ class Observables(Mapping[str, Observable]):
             if part in self._mechanism.locals_:
                 return self._of(part)[path]
             part = part.rpartition(".")[0]
-        raise KeyError(path)
+        return self._whole(path)[path]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._everything())
 
     def __len__(self) -> int:
         return len(self._everything())
+
+    def _whole(self, path: str) -> Mapping[str, Observable]:
+        """Return the quantities of the model, or the scene, that a path may be one of; they are not listed."""
+        *steps, last = path.split(".")
+        model = steps if last not in ("x", "y", "z") else steps[:-1]
+        prefix = ".".join((*model, "")) if model else ""
+        if not any(one.startswith(prefix) for one in self._mechanism.locals_):
+            return {}
+        if prefix not in self._wholes:
+            with self._lock:
+                self._wholes[prefix] = observe_totals(self._mechanism, prefix, self._reader.inside(prefix))
+        return self._wholes[prefix]
 
     def _everything(self) -> dict[str, Observable]:
         if self._all is None:
@@ -147,7 +161,8 @@ class Reader:
         self._mechanism, self._equations = mechanism, equations
         self._signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
         self._energies: dict[str, tuple[Expression, Expression]] = {}
-        self._around: dict[str, _EnergiesAround] = {}
+        self._around: dict[str, _Around] = {}
+        self._totals: dict[str, Totals] = {}
         self._reactions: dict[str, dict[str, Expression]] = {}
         for one in reactions:
             self._reactions.setdefault(one.key[0], {})[one.path[len(one.key[0]) + 1 :]] = one.symbol
@@ -162,6 +177,16 @@ class Reader:
             self._energies[path] = part_energies(self._mechanism, self._equations, path, self._signals)
         return self._energies[path]
 
+    def totals(self, path: str) -> Totals:
+        """Return mass, momentum and inertia of one part."""
+        if path not in self._totals:
+            self._totals[path] = part_totals(self._mechanism, self._equations, path)
+        return self._totals[path]
+
+    def rate_of(self, energy: Expression) -> Expression:
+        """Return how fast an energy changes along the motion."""
+        return energy_rate(self._equations, energy)
+
     def binding(self, local: LocalPart, with_energies: bool = False) -> Binding:
         """Return what the laws of a part read.
 
@@ -170,44 +195,54 @@ class Reader:
         local
             The part.
         with_energies
-            Whether that includes the energies of the model around it.
+            Whether that includes energies and totals of the model around it.
         """
         path = local.part.path
         known, own = self._known.get(path, {}), self._reactions.get(path, {})
-        energies: Mapping[str, Expression] = self._energies_around(local) if with_energies else {}
+        energies: Mapping[str, Any] = self._around_part(local) if with_energies else {}
         return make_binding(self._mechanism, self._equations, local, own, known, energies, self._signals)
 
-    def _energies_around(self, local: LocalPart) -> Mapping[str, Expression]:
+    def _around_part(self, local: LocalPart) -> Mapping[str, Any]:
         owner = local.part.component._parent
-        inside = f"{owner.path}." if owner is not None and owner.path else ""
-        if inside not in self._around:
-            self._around[inside] = _EnergiesAround(self, [p for p in self._mechanism.locals_ if p.startswith(inside)])
-        return self._around[inside]
+        return self.inside(f"{owner.path}." if owner is not None and owner.path else "")
+
+    def inside(self, prefix: str) -> Mapping[str, Any]:
+        """Return energies and totals of all parts whose paths begin alike; of the scene, with no beginning."""
+        if prefix not in self._around:
+            self._around[prefix] = _Around(self, [p for p in self._mechanism.locals_ if p.startswith(prefix)])
+        return self._around[prefix]
 
 
-class _EnergiesAround(Mapping[str, Expression]):
-    """The energies of some parts together, added up when they are asked for."""
+class _Around(Mapping[str, Any]):
+    """Energies and totals of some parts together, added up when they are asked for."""
 
     def __init__(self, reader: Reader, parts: Sequence[str]) -> None:
         self._reader, self._parts = reader, parts
-        self._made: dict[str, Expression] = {}
+        self._made: dict[str, Any] = {}
 
-    def __getitem__(self, kind: str) -> Expression:
+    def __getitem__(self, kind: str) -> Any:
         if kind not in self._made:
-            if kind not in _ENERGIES:
+            if kind in _ENERGIES:
+                number = _ENERGIES.index(kind)
+                self._made[kind] = add_up([self._reader.energies(path)[number] for path in self._parts])
+            elif kind == "power":
+                self._made[kind] = self._reader.rate_of(self["kinetic"] + self["potential"])
+            elif kind in _TOTALS:
+                whole = add_totals([self._reader.totals(path) for path in self._parts])
+                self._made.update({name: getattr(whole, name) for name in _TOTALS})
+            else:
                 raise KeyError(kind)
-            number = _ENERGIES.index(kind)
-            self._made[kind] = add_up([self._reader.energies(path)[number] for path in self._parts])
         return self._made[kind]
 
     def __contains__(self, kind: object) -> bool:
-        return kind in _ENERGIES
+        return kind in (*_ENERGIES, "power", *_TOTALS)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_ENERGIES)
+        return iter((*_ENERGIES, "power", *_TOTALS))
 
     def __len__(self) -> int:
-        return len(_ENERGIES)
+        return len(_ENERGIES) + 1 + len(_TOTALS)
 
 
 _ENERGIES = ("kinetic", "potential")
+_TOTALS = ("mass", "first_moment", "momentum", "angular_momentum", "moments", "products")

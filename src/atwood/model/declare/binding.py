@@ -38,7 +38,7 @@ class Binding:
     reactions
         Reactions by name.
     energies
-        ``"kinetic"`` and ``"potential"`` energy of the model that the component is placed in.
+        Energies and totals of the model that the component is placed in, by name; see `Component.total_around`.
     """
 
     values: Mapping[str, Any]

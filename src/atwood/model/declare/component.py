@@ -275,10 +275,23 @@ class Component(metaclass=ComponentType):
         return reactions[name]
 
     def energy_around(self, kind: str) -> Scalar:
-        """Return the kinetic or potential energy of the enclosing model; only within an observable."""
+        """Return the ``"kinetic"`` or ``"potential"`` energy of the enclosing model; only within an observable."""
+        return self.total_around(kind)
+
+    def total_around(self, kind: str) -> Any:
+        """Return something of the enclosing model as a whole; only within an observable.
+
+        Parameters
+        ----------
+        kind
+            ``"kinetic"`` or ``"potential"``, an energy; ``"power"``, the rate of both; ``"mass"``; or a `Vector` in
+            world axes about the world's origin: ``"first_moment"`` (mass times centre of mass), ``"momentum"``,
+            ``"angular_momentum"``, ``"moments"`` and ``"products"`` (entries xx, yy, zz and xy, xz, yz of the inertia
+            tensor).
+        """
         energies = self._binding().energies
         if kind not in energies:
-            raise DeclarationError(f"this law may not read the {kind} energy", where=self.path)
+            raise DeclarationError(f"this law may not read {kind!r} of the model around it", where=self.path)
         return energies[kind]
 
     def _binding(self) -> Binding:
