@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from atwood_library.forces.torque import Torque as Torque
     from atwood_library.forces.torsion_damper import TorsionDamper as TorsionDamper
     from atwood_library.forces.torsion_spring import TorsionSpring as TorsionSpring
+    from atwood_library.joints.blade import Blade as Blade
     from atwood_library.joints.constant_velocity import ConstantVelocity as ConstantVelocity
     from atwood_library.joints.cylindrical import Cylindrical as Cylindrical
     from atwood_library.joints.drive import Drive as Drive
@@ -77,8 +78,11 @@ if TYPE_CHECKING:
     from atwood_library.parts.sphere import Sphere as Sphere
     from atwood_library.parts.tube import Tube as Tube
     from atwood_library.parts.wheel import Wheel as Wheel
+    from atwood_library.ropes.elastic_rope import ElasticRope as ElasticRope
+    from atwood_library.ropes.linked_rope import LinkedRope as LinkedRope
     from atwood_library.ropes.pulley import Pulley as Pulley
     from atwood_library.ropes.rope import Rope as Rope
+    from atwood_library.ropes.wound_rope import WoundRope as WoundRope
     from atwood_library.sensors.angle_sensor import AngleSensor as AngleSensor
     from atwood_library.sensors.energy_sensor import EnergySensor as EnergySensor
     from atwood_library.sensors.force_sensor import ForceSensor as ForceSensor
@@ -94,6 +98,7 @@ _MODULES = {
     "Add": "blocks.add",
     "AngleSensor": "sensors.angle_sensor",
     "Bar": "parts.bar",
+    "Blade": "joints.blade",
     "Box": "parts.box",
     "Bushing": "forces.bushing",
     "CentralGravity": "forces.central_gravity",
@@ -108,6 +113,7 @@ _MODULES = {
     "Disc": "parts.disc",
     "Drag": "forces.drag",
     "Drive": "joints.drive",
+    "ElasticRope": "ropes.elastic_rope",
     "EnergySensor": "sensors.energy_sensor",
     "FirstOrder": "blocks.first_order",
     "Force": "forces.force",
@@ -120,6 +126,7 @@ _MODULES = {
     "Integrator": "blocks.integrator",
     "Limiter": "blocks.limiter",
     "Link": "parts.link",
+    "LinkedRope": "ropes.linked_rope",
     "LorentzForce": "fields.lorentz_force",
     "Mass1D": "parts.mass_1d",
     "MeshBody": "parts.mesh_body",
@@ -171,6 +178,7 @@ _MODULES = {
     "Universal": "joints.universal",
     "Weld": "joints.weld",
     "Wheel": "parts.wheel",
+    "WoundRope": "ropes.wound_rope",
 }
 """The module of each part, below this package."""
 

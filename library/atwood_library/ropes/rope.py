@@ -15,9 +15,12 @@ from atwood import (
     constraint,
     dot,
     event,
+    is_zero,
+    lagrangian,
     minimum,
     observable,
     parameter,
+    signal,
 )
 
 
@@ -26,9 +29,13 @@ class Rope(Component):
 
     Its tension is the same everywhere, and cannot be negative. When it becomes so, the run stops there and says so,
     or, with ``when_slack="slack"``, the rope goes slack and comes taut again, with a jerk, when it is stretched out.
+
+    A winch that lets it out or hauls it in is its input `paid_out`. Where the input `release` falls through zero, it
+    lets go for good, as a sling does. Pulleys with inertia are taken up on the side of a, where the tension is then
+    `tension_a`.
     """
 
-    modes = ("taut", "slack")
+    modes = ("taut", "slack", "released")
     mode_parameter = "starts"
 
     pulleys: int = parameter(0, minimum=0, integer=True, doc="How many pulleys it passes.")
@@ -36,6 +43,11 @@ class Rope(Component):
     when_slack: str = parameter(
         "stop", choices=("stop", "slack"), doc="What happens when the tension becomes negative."
     )
+    pulley_inertia: float = parameter(
+        0.0, unit="kg", minimum=0.0, doc="Moment of inertia of each pulley it passes, over the square of its radius."
+    )
+    paid_out: float = signal(0.0, unit="m", doc="Length that is let out besides, a function of time.")
+    release: float = signal(1.0, unit="any", doc="The rope lets go where this falls through zero.")
     starts: str = parameter("taut", choices=("taut", "slack"), doc="Whether it is taut or slack at the start.")
     a: Point = connector(Point, "One end.")
     over: Sequence[Groove] = connector(Groove, "The pulleys it passes, in order from a to b.", count="pulleys")
@@ -50,9 +62,33 @@ class Rope(Component):
     def fixed_length(self) -> Scalar:
         """Return the length less the rope's own; for a single straight piece ``(r^2 - l^2)/(2 l)``."""
         if self.on_a_line or self.pulleys:
-            return self.sum_of_spans() - self.length
-        r = self.b.position - self.a.position
-        return dot(r, r) * (0.5 / self.length) - 0.5 * self.length
+            return self.sum_of_spans() - self.whole_length()
+        r, length = self.b.position - self.a.position, self.whole_length()
+        return dot(r, r) * (0.5 / length) - 0.5 * length
+
+    def whole_length(self) -> Scalar:
+        """Return the length from a to b with what has been let out."""
+        return self.length + self.paid_out
+
+    @lagrangian
+    def turning_pulleys(self) -> Scalar:
+        """Return the kinetic energy of the pulleys, over which the rope runs without slipping."""
+        if is_zero(self.pulley_inertia) or not self.pulleys:
+            return 0.0
+        speeds = [self.speed_at(number) for number in range(self.pulleys)]
+        return 0.5 * self.pulley_inertia * sum((v * v for v in speeds[1:]), speeds[0] * speeds[0])
+
+    def speed_at(self, number: int) -> Scalar:
+        """Return how fast the rope runs over a pulley, towards the side of a."""
+        stops = [self.a, *self.over, self.b]
+        return sum_up([self.rate_of_span(p, q, "velocity") for p, q in pairwise(stops[: number + 2])])
+
+    def rate_of_span(self, p: Point, q: Point, of: str) -> Scalar:
+        """Return the rate of a piece's length, of velocities; on a line also the second one, of accelerations."""
+        apart = getattr(q, of) - getattr(p, of)
+        if self.on_a_line:
+            return dot(apart, self.line) * self.side(p, q, None)
+        return dot(apart, q.position - p.position) / self.distance(p, q)
 
     @event(modes=("taut",), direction=-1, unit="N", target="when_slack", message="the rope has gone slack")
     def goes_slack(self) -> Scalar:
@@ -62,9 +98,20 @@ class Rope(Component):
     @event(modes=("slack",), direction=-1, unit="m", target="taut", message="the rope has come taut", impact=True)
     def comes_taut(self) -> Scalar:
         """Return how much rope is to spare."""
-        return self.length - self.reach()
+        return self.whole_length() - self.reach()
 
-    @event(direction=-1, unit="m", target="stop", message="an end of the rope has reached a pulley")
+    @event(modes=("taut", "slack"), direction=-1, target="released", message="the rope has been let go")
+    def lets_go(self) -> Scalar:
+        """Return the input."""
+        return self.release
+
+    @event(
+        modes=("taut", "slack"),
+        direction=-1,
+        unit="m",
+        target="stop",
+        message="an end of the rope has reached a pulley",
+    )
     def reaches_pulley(self) -> Scalar:
         """Return the shortest piece; on a line, where the sides would change, it must stay positive."""
         spans = self.spans()
@@ -81,7 +128,22 @@ class Rope(Component):
 
     def sum_of_spans(self) -> Scalar:
         """Return the sum of the straight pieces; on a line, signed as they start."""
-        total = self.spans()[0]
-        for span in self.spans()[1:]:
-            total = total + span
-        return total
+        return sum_up(self.spans())
+
+    @observable(unit="N", doc="Tension at a, where pulleys have inertia.", spaces=("line",))
+    def tension_a(self) -> Scalar:
+        """Return the tension at b, and what speeds the pulleys up."""
+        stops = [self.a, *self.over, self.b]
+        rates = [
+            sum_up([self.rate_of_span(p, q, "acceleration") for p, q in pairwise(stops[: number + 2])])
+            for number in range(self.pulleys)
+        ]
+        return self.reaction("tension") + (self.pulley_inertia * sum_up(rates) if rates else 0.0)
+
+
+def sum_up(values: Sequence[Scalar]) -> Scalar:
+    """Return a sum of one value or more."""
+    total = values[0]
+    for value in values[1:]:
+        total = total + value
+    return total

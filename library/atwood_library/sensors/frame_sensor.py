@@ -11,8 +11,8 @@ class FrameSensor(Component):
     """Measures the motion of a point as seen from a frame that may move and turn, in the axes of that frame.
 
     For the observer the mass of the body that the point is on obeys ``m a' = F + F_translation + F_Euler + F_Coriolis +
-    F_centrifugal`` with the acceleration a' that is seen (Goldstein, section 4.10), where F is the force that acts on it:
-    ``m a`` with its acceleration against the world. The point is meant to be the body's centre of mass.
+    F_centrifugal`` with the acceleration a' that is seen (Goldstein, section 4.10), where F is the force that acts on
+    it: ``m a`` with its acceleration against the world. The point is meant to be the body's centre of mass.
     """
 
     synonyms = ("RelativeSensor", "Fictitious forces", "Coriolis force", "Centrifugal force", "Rotating frame")
