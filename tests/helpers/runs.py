@@ -20,8 +20,16 @@ from atwood_library.scenes import SCENES
 
 FORMS = ("reduced", "dae")
 
-EVERYDAY = [name for name, make in SCENES.items() if make().space != "space" and name != "four-bar-row"]
-"""Scenes on a line and in a plane that come to no singular place; those in space have tests of their own."""
+_CLASSICAL = {
+    *("charged-particle", "kepler", "falling-with-drag", "elastic-pendulum", "oscillators", "triple-atwood"),
+    *("pulley-with-inertia", "swinging-atwood", "overhead-crane", "trebuchet"),
+}
+EVERYDAY = [
+    name
+    for name, make in SCENES.items()
+    if name not in _CLASSICAL and name != "four-bar-row" and make().space != "space"
+]
+"""Scenes on a line and in a plane that come to no singular place; the others have tests of their own."""
 
 EVERY_FORM = (("reduced", "ggl"), ("dae", "ggl"), ("dae", "index1"), ("dae", "index1-projected"))
 

@@ -23,11 +23,14 @@ if TYPE_CHECKING:
     from atwood_library.scenes.double_pendulum import DoublePendulum as DoublePendulum
     from atwood_library.scenes.double_pendulum_3d import DoublePendulum3D as DoublePendulum3D
     from atwood_library.scenes.driven_pendulum import DrivenPendulum as DrivenPendulum
+    from atwood_library.scenes.elastic_pendulum import ElasticPendulum as ElasticPendulum
+    from atwood_library.scenes.falling_with_drag import FallingWithDrag as FallingWithDrag
     from atwood_library.scenes.flyball_governor import FlyballGovernor as FlyballGovernor
     from atwood_library.scenes.foucault_pendulum import FoucaultPendulum as FoucaultPendulum
     from atwood_library.scenes.four_bar import FourBar as FourBar
     from atwood_library.scenes.four_bar_row import FourBarRow as FourBarRow
     from atwood_library.scenes.free_body import FreeBody as FreeBody
+    from atwood_library.scenes.free_symmetric_body import FreeSymmetricBody as FreeSymmetricBody
     from atwood_library.scenes.gyroscope import Gyroscope as Gyroscope
     from atwood_library.scenes.heavy_top import HeavyTop as HeavyTop
     from atwood_library.scenes.intermediate_axis import IntermediateAxis as IntermediateAxis
@@ -35,9 +38,14 @@ if TYPE_CHECKING:
     from atwood_library.scenes.lagrange_top import LagrangeTop as LagrangeTop
     from atwood_library.scenes.mass_spring_chain import MassSpringChain as MassSpringChain
     from atwood_library.scenes.n_body import NBody as NBody
+    from atwood_library.scenes.oscillators import Oscillators as Oscillators
+    from atwood_library.scenes.overhead_crane import OverheadCrane as OverheadCrane
     from atwood_library.scenes.pendulum_on_cart import PendulumOnCart as PendulumOnCart
+    from atwood_library.scenes.pulley_with_inertia import PulleyWithInertia as PulleyWithInertia
+    from atwood_library.scenes.rigid_bodies import RigidBodies as RigidBodies
     from atwood_library.scenes.rolling_ball import RollingBall as RollingBall
     from atwood_library.scenes.rolling_disc import RollingDisc as RollingDisc
+    from atwood_library.scenes.rotating_frame import RotatingFrame as RotatingFrame
     from atwood_library.scenes.rotating_hoop_driven import RotatingHoopDriven as RotatingHoopDriven
     from atwood_library.scenes.rotating_hoop_free import RotatingHoopFree as RotatingHoopFree
     from atwood_library.scenes.simple_pendulum import SimplePendulum as SimplePendulum
@@ -45,8 +53,12 @@ if TYPE_CHECKING:
     from atwood_library.scenes.spatial_slider_crank import SpatialSliderCrank as SpatialSliderCrank
     from atwood_library.scenes.spherical_pendulum import SphericalPendulum as SphericalPendulum
     from atwood_library.scenes.stewart_platform import StewartPlatform as StewartPlatform
+    from atwood_library.scenes.swinging_atwood import SwingingAtwood as SwingingAtwood
+    from atwood_library.scenes.trebuchet import Trebuchet as Trebuchet
+    from atwood_library.scenes.triple_atwood import TripleAtwood as TripleAtwood
     from atwood_library.scenes.two_body import TwoBody as TwoBody
     from atwood_library.scenes.universal_shaft import UniversalShaft as UniversalShaft
+    from atwood_library.scenes.wilberforce_pendulum import WilberforcePendulum as WilberforcePendulum
 
 _CLASSES = {
     "simple-pendulum": "SimplePendulum",
@@ -83,6 +95,18 @@ _CLASSES = {
     "n-body": "NBody",
     "bead-on-wire": "BeadOnWire",
     "bead-on-surface": "BeadOnSurface",
+    "rotating-frame": "RotatingFrame",
+    "falling-with-drag": "FallingWithDrag",
+    "free-symmetric-body": "FreeSymmetricBody",
+    "rigid-bodies": "RigidBodies",
+    "elastic-pendulum": "ElasticPendulum",
+    "wilberforce-pendulum": "WilberforcePendulum",
+    "oscillators": "Oscillators",
+    "triple-atwood": "TripleAtwood",
+    "pulley-with-inertia": "PulleyWithInertia",
+    "swinging-atwood": "SwingingAtwood",
+    "overhead-crane": "OverheadCrane",
+    "trebuchet": "Trebuchet",
 }
 """The class of each scene by the name that the command line knows it by."""
 
