@@ -184,10 +184,10 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
         line_signs={(a, b): 1.0 if i < j else -1.0 for i, a in enumerate(names) for j, b in enumerate(names)},
         reactions={name: numbers.draw(name) for name in reaction_names(component)},
         energies={
-            **{name: numbers.draw(name) for name in ("kinetic", "potential", "power")},
-            "mass": numbers.draw("mass", 1.0, 2.0),
+            **{name: numbers.draw(f"around.{name}") for name in ("kinetic", "potential", "power")},
+            "mass": numbers.draw("around.mass", 1.0, 2.0),
             **{
-                name: aw.Vector(*(numbers.draw(f"{name}.{axis}") for axis in "xyz"))
+                name: aw.Vector(*(numbers.draw(f"around.{name}.{axis}") for axis in "xyz"))
                 for name in ("first_moment", "momentum", "angular_momentum", "moments", "products")
             },
         },
