@@ -7,10 +7,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BoolArray", "FloatArray", "IndexArray", "IntArray"]
+__all__ = ["BoolArray", "ComplexArray", "FloatArray", "IndexArray", "IntArray"]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 """Numbers."""
+
+ComplexArray: TypeAlias = NDArray[np.complex128]
+"""Complex numbers."""
 
 BoolArray: TypeAlias = NDArray[np.bool_]
 """Truth values."""

@@ -269,7 +269,8 @@ class Assembly:
             if path not in self.start_observables and path not in (*self.flat.start, *self.flat.guess):
                 raise no_start_quantity(path, self.start_observables)
         scene = self.source.changed(values or {}, start or {}, guess or {})
-        return self.with_flat(flatten(scene, self.flat.name), replace(self.source, scene=scene))
+        flat = replace(flatten(scene, self.flat.name), varied=self.flat.varied)
+        return self.with_flat(flat, replace(self.source, scene=scene))
 
     def with_rows(self, rows: FloatArray) -> Assembly:
         """Return the same for vectorized kernels alone, with parameters that differ from sample to sample.

@@ -17,7 +17,7 @@ from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism, check_closures
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.local.flatten import FlatScene, Part
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.laws import LocalPart, variation_names
 from atwood.topology.line_signs import find_line_signs
 
 __all__ = ["DECIDED", "Shared", "Slot", "decided_alike", "find_slots", "with_values_of"]
@@ -123,8 +123,14 @@ class _Shape:
     fixed: tuple[Slot, ...]
 
 
+def _varied(flat: FlatScene) -> set[str]:
+    """Return the names of the parameters that stand for variations of inputs, and are always zero."""
+    return {name for part, signal in flat.varied for name in variation_names(f"{part}.{signal}")}
+
+
 def _find_shape(flat: FlatScene, mechanism: Mechanism) -> _Shape | None:
-    known = {symbol.name: symbol for symbol in mechanism.table.values}
+    varied = _varied(flat)
+    known = {symbol.name: symbol for symbol in mechanism.table.values if symbol.name not in varied}
     slots = dict(find_slots(flat))
     if not set(known) <= set(slots):
         return None
@@ -172,9 +178,11 @@ def with_values_of(
         if not isinstance(value, (int, float)) or value == 0.0:
             return None, f"{slot.path} was a number other than zero and is {_shown(value)}"
         values[symbol] = float(value)
+    varied = _varied(flat)
+    values |= {symbol: 0.0 for symbol in mechanism.table.values if symbol.name in varied}
     moved = _moved(mechanism, other, values)
     check_closures(moved)
-    if not decided_alike(moved):
+    if values != mechanism.table.values and not decided_alike(moved):
         return None, DECIDED
     if mechanism.line_signs is not None and _line_signs(moved, other, shared) != mechanism.line_signs:
         return None, "on the line, parts start on other sides of each other"
@@ -202,7 +210,7 @@ def _changed_parts(flat: FlatScene, other: FlatScene) -> str:
     for path, part in flat.parts.items():
         if type(part.component) is not type(other.parts[path].component):
             return f"{path} is another component"
-    if flat.connections != other.connections or flat.links != other.links:
+    if (flat.connections, flat.links, flat.varied) != (other.connections, other.links, other.varied):
         return "it has other connections"
     if (flat.space, flat.line_axis) != (other.space, other.line_axis):
         return "it lives in another space"

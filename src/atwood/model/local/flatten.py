@@ -70,6 +70,10 @@ class FlatScene:
         For each linked input (part path, input name): the output (part path, observable name).
     start, guess
         Start values by path.
+    varied
+        Inputs (part path, input name) that have a variation: a quadratic function of the time since the start, whose
+        three coefficients are parameters and zero. Derivatives by these are those by the input, its rate, and its
+        second derivative.
     """
 
     name: str
@@ -85,6 +89,7 @@ class FlatScene:
     links: Mapping[tuple[str, str], tuple[str, str]]
     start: Mapping[str, float]
     guess: Mapping[str, float]
+    varied: frozenset[tuple[str, str]] = frozenset()
 
 
 def flatten(scene: Model, name: str | None = None) -> FlatScene:

@@ -38,7 +38,15 @@ from atwood.model.returned import call_law, law_value, listed, one_scalar
 from atwood.model.values.space import FIXED_AXES, Space, planar_axes
 from atwood.model.values.vector import Vector
 
-__all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "ParameterTable", "localize"]
+__all__ = [
+    "LocalConnector",
+    "LocalConstraint",
+    "LocalJoint",
+    "LocalPart",
+    "ParameterTable",
+    "localize",
+    "variation_names",
+]
 
 
 @dataclass
@@ -170,7 +178,9 @@ def _bind_part(
     values = {name: _parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
     signal_symbols: dict[str, Expression] = {}
     for name, given in part.signals.items():
-        values[name] = _signal(part, name, given, flat, time, table, signal_symbols)
+        value = _signal(part, name, given, flat, time, table, signal_symbols)
+        is_varied = (part.path, name) in flat.varied
+        values[name] = value + _variation(f"{part.path}.{name}", flat, time, table) if is_varied else value
     values |= state_values(part, graph)
     connectors = {
         name: _local_connector(f"{part.path}.{name}", isinstance(one, Frame), space, graph)
@@ -367,6 +377,19 @@ def _signal(
             where=path,
             advice="Write it in plain arithmetic with Atwood's own functions (atwood.sin, atwood.select, ...).",
         ) from error
+
+
+def _variation(path: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
+    """Return the variation of an input; see `FlatScene.varied`."""
+    value, rate, second = (table.graph.parameter(name) for name in variation_names(path))
+    table.values.update(dict.fromkeys((value, rate, second), 0.0))
+    passed = time - flat.t_start
+    return value + passed * (rate + 0.5 * (passed * second))
+
+
+def variation_names(path: str) -> tuple[str, str, str]:
+    """Return the names of the parameters of an input's variation: its value, its rate and its second derivative."""
+    return f"{path} varied", f"{path} varied'", f"{path} varied''"
 
 
 def _is_source(part: Part, flat: FlatScene) -> bool:

@@ -20,6 +20,7 @@ from atwood.codegen.rounding import CERTAIN, ROUGHNESS
 from atwood.linalg.matrices import Matrix, is_full, scaled, to_array
 
 __all__ = [
+    "CERTAIN",
     "CLEAR",
     "FREE",
     "RANK",

@@ -14,7 +14,7 @@ from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable
 
-__all__ = ["Level", "Target", "as_said", "said", "sort_targets"]
+__all__ = ["Level", "Target", "as_said", "find_level", "said", "sort_targets"]
 
 
 _SAME = 1e-9
@@ -64,7 +64,7 @@ def sort_targets(assembly: Assembly, equations: Equations) -> tuple[Level, Level
     for is_fixed, given in ((True, assembly.flat.start), (False, assembly.flat.guess)):
         restated, origins = _restated(assembly, given)
         for path, value in restated.items():
-            number = assembly.shared.get(("start level", path), partial(_find_level, assembly, equations, path))
+            number = assembly.shared.get(("start level", path), partial(find_level, assembly, equations, path))
             level = levels[number]
             target = Target(path, value, assembly.start_observables[path], origins.get(path, ()))
             (level.fixed if is_fixed else level.guessed).append(target)
@@ -105,7 +105,7 @@ def _restated(assembly: Assembly, given: Mapping[str, float]) -> tuple[dict[str,
     return found, origins
 
 
-def _find_level(assembly: Assembly, equations: Equations, path: str) -> int:
+def find_level(assembly: Assembly, equations: Equations, path: str) -> int:
     """Return whether a start value is of positions (0) or of speeds (1)."""
     observables = assembly.start_observables
     if path not in observables:

@@ -1,0 +1,72 @@
+"""The matrices of a linear model about a state, with what rounding may have done to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.analysis.linear.minimal import Minimal, find_minimal
+from atwood.analysis.linear.steady import Steady
+from atwood.analysis.linear.variations import Flow, LinearScene
+from atwood.arrays import FloatArray
+from atwood.codegen.rounding import ROUGHNESS
+from atwood.simulation.dynamics.rank import CERTAIN
+
+__all__ = ["StateSpace", "find_state_space"]
+
+
+_WAYS = 3
+"""How often everything is disturbed to see what rounding can do."""
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    """How minimal states change: ``x' = A x + B w``.
+
+    Attributes
+    ----------
+    minimal
+        The minimal states.
+    matrix
+        A and B side by side, shape (states, states and inputs).
+    error
+        How far rounding can have taken each entry.
+    """
+
+    minimal: Minimal
+    matrix: FloatArray
+    error: FloatArray
+
+
+def find_state_space(scene: LinearScene, flow: Flow, steady: Steady, kept: Sequence[int]) -> StateSpace:
+    """Return the linear model about a state in minimal states.
+
+    Parameters
+    ----------
+    scene, flow, steady
+        The scene, its flow at the state, and what that moves along.
+    kept
+        Independent constraints.
+    """
+    minimal = find_minimal(scene, flow, kept)
+    matrix = _matrix(scene, flow, steady, minimal)
+    random, largest = np.random.default_rng(1974), np.zeros_like(matrix)
+    now = flow.variation
+    pace = max(1e-300, float(np.max(np.abs(now.u) / scene.sizes, initial=0.0)))
+    for _ in range(_WAYS):
+        other = scene.disturbed(random)
+        by = ROUGHNESS * scene.displacement_sizes * random.uniform(-1.0, 1.0, len(scene.tangents))
+        faster = ROUGHNESS * pace * scene.sizes * random.uniform(-1.0, 1.0, len(now.u))
+        found = other.flow(now.t, scene.tangents.moved(now.q, by), now.u + faster, kept)
+        near = _matrix(other, found, steady, find_minimal(other, found, kept, minimal))
+        largest = np.maximum(largest, np.abs(near - matrix))
+    return StateSpace(minimal, matrix, CERTAIN * largest)
+
+
+def _matrix(scene: LinearScene, flow: Flow, steady: Steady, minimal: Minimal) -> FloatArray:
+    size = len(flow.field)
+    moved = (flow.matrix[:, :size] - steady.moving) @ minimal.state
+    moved[:, minimal.states :] += flow.matrix[:, size + 1 :]
+    return minimal.reduced(moved)

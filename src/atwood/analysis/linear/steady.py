@@ -1,0 +1,327 @@
+"""Steady motions: states that move along a symmetry of the scene, so that nothing but that changes.
+
+A vector field xi is a symmetry if it solves the variational equation along every motion: ``d xi / dt = A xi``. It is
+looked for among shifts of time and of single coordinates, rotations of places and orientations about axes of the
+space, and rotations of a body about axes of its own. If the motion at a state is such a field there, neighbours move by
+``A - A_xi`` as seen by somebody who moves along, and that matrix does not change (Marsden and Ratiu, Introduction to
+Mechanics and Symmetry, section 4.1: relative equilibria).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.analysis.linear.variations import Flow, LinearScene
+from atwood.arrays import FloatArray
+from atwood.errors import AtwoodError
+
+__all__ = ["Steady", "find_steady", "still"]
+
+
+_STEADY = 1e-7
+"""Relative to the terms that it is made of: how well a motion must be a symmetry at the state.
+
+A start is solved to 1e-11 of its scale, and what it gives for accelerations can be several powers of ten less exact.
+"""
+
+_KEPT = 1e-8
+"""Relative to its terms: how well a field must solve the variational equation at random states."""
+
+_STATES = 4
+_REACH = 0.3
+"""At so many random states near by, so far away in each coordinate and speed relative to their sizes."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Field:
+    """A vector field that may be a symmetry, with values along displacements and speeds.
+
+    Attributes
+    ----------
+    at
+        Its value at a flow.
+    carried
+        The rate of that value along the motion.
+    matrix
+        How it moves neighbours.
+    is_time
+        Whether it is the shift of time.
+    """
+
+    at: Callable[[Flow], FloatArray]
+    carried: Callable[[Flow], FloatArray]
+    matrix: FloatArray
+    is_time: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Steady:
+    """What is known of the motion at a state.
+
+    Attributes
+    ----------
+    is_steady
+        Whether it is a steady motion, or rest.
+    moving
+        What the symmetry along which it moves does to neighbours, shape (displacements and speeds, twice).
+    symmetries
+        The directions along which the symmetries that were found lead from the state, as columns.
+    fastest
+        Number of the displacement or speed that changes most where the motion is not steady; -1 where it is, and where
+        nothing moves now but the equations depend on time.
+    """
+
+    is_steady: bool
+    moving: FloatArray
+    symmetries: FloatArray
+    fastest: int = -1
+
+
+def find_steady(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> Steady:
+    """Find the symmetry along which a state moves.
+
+    Parameters
+    ----------
+    scene, flow
+        The scene, and its flow at the state.
+    kept
+        Independent constraints.
+    """
+    size = len(flow.field)
+    sizes = _sizes(scene, flow)
+    goal = flow.field / sizes
+    pace = _pace(scene, flow)
+    tiers = [[_time_shift(scene)], _shifts(scene), _rotations(scene), _own_rotations(scene)]
+    found: list[_Field] = []
+    states = [flow, *_near_by(scene, flow, kept, pace)]
+    symmetries = np.zeros((size, 0))
+    for tier in tiers:
+        found += tier
+        combinations = _symmetric(found, states, sizes)
+        values = np.stack([one.at(flow) for one in found], axis=1) @ combinations
+        symmetries = values
+        timely = np.array([float(one.is_time) for one in found]) @ combinations
+        # Time goes on by itself: the symmetry shifts it at rate one, or nothing depends on it.
+        rows = np.concatenate([values / sizes[:, None], pace * timely[None, :]])
+        right = np.concatenate([goal, [pace]])
+        terms = np.linalg.lstsq(rows, right, rcond=1e-10)[0]
+        missed = np.abs(rows @ terms - right)
+        terms_of_each = np.abs(rows) @ np.abs(terms) + np.abs(right) + pace
+        if np.all(missed <= _STEADY * np.maximum(terms_of_each, np.max(np.abs(right)))):
+            weights = combinations @ terms
+            moving = sum((w * one.matrix for w, one in zip(weights, found, strict=True)), np.zeros((size, size)))
+            return Steady(True, np.asarray(moving), symmetries)
+    # Where coordinates grow along shifts this is no steady motion for what accelerates, not for what moves.
+    moves = bool(np.any(np.abs(goal) > _STEADY))
+    return Steady(False, np.zeros((size, size)), symmetries, int(np.argmax(missed[:size])) if moves else -1)
+
+
+def still(flow: Flow) -> Steady:
+    """Return the moving frame of a state at which neighbours are looked at as they are."""
+    size = len(flow.field)
+    return Steady(True, np.zeros((size, size)), np.zeros((size, 0)))
+
+
+def _sizes(scene: LinearScene, flow: Flow) -> FloatArray:
+    pace = _pace(scene, flow)
+    return np.concatenate([scene.displacement_sizes * pace, scene.sizes * pace**2])
+
+
+def _pace(scene: LinearScene, flow: Flow) -> float:
+    """Return how fast things happen, 1/s: the largest of what speeds and accelerations say beside the scene's sizes."""
+    found = [1e-300]
+    found += list(np.abs(flow.variation.displacement_rates) / scene.displacement_sizes)
+    found += list(np.abs(flow.variation.u) / scene.sizes)
+    matrix = flow.acceleration[:, : len(scene.tangents)] * scene.displacement_sizes / scene.sizes[:, None]
+    found.append(float(np.sqrt(np.max(np.abs(matrix), initial=0.0))))
+    return float(max(found)) if max(found) > 1e-300 else 1.0
+
+
+def _near_by(scene: LinearScene, flow: Flow, kept: Sequence[int], pace: float) -> list[Flow]:
+    """Return the flow at random states around one; where a law has no value another is taken."""
+    random = np.random.default_rng(19180717)  # the year of Noether's theorem
+    now, found = flow.variation, []
+    for _ in range(5 * _STATES):
+        reach = _REACH * 0.7 ** len(found)
+        aside = reach * scene.displacement_sizes * random.uniform(-1.0, 1.0, len(scene.tangents))
+        faster = reach * pace * scene.sizes * random.uniform(-1.0, 1.0, len(now.u))
+        t = now.t + random.uniform(0.0, 2.0) / pace
+        try:
+            found.append(scene.flow(t, scene.tangents.moved(now.q, aside), now.u + faster, kept))
+        except (AtwoodError, ArithmeticError):
+            continue
+        if len(found) == _STATES:
+            break
+    return found
+
+
+def _symmetric(fields: Sequence[_Field], states: Sequence[Flow], sizes: FloatArray) -> FloatArray:
+    """Return the combinations of fields that are symmetries, as columns."""
+    rows, units = [], []
+    for flow in states:
+        matrix = flow.matrix
+        time = matrix[:, len(sizes)]
+        missed = np.zeros((len(sizes), len(fields)))
+        terms = np.zeros((len(sizes), len(fields)))
+        for k, one in enumerate(fields):
+            value, carried = one.at(flow), one.carried(flow)
+            shifted = time if one.is_time else 0.0
+            missed[:, k] = matrix[:, : len(sizes)] @ value + shifted - carried
+            terms[:, k] = np.abs(matrix[:, : len(sizes)]) @ np.abs(value) + np.abs(shifted) + np.abs(carried)
+        rows.append(missed / sizes[:, None])
+        units.append(terms / sizes[:, None])
+    all_rows, all_units = np.concatenate(rows), np.concatenate(units)
+    columns = np.max(all_units, axis=0, initial=0.0)
+    columns[columns == 0.0] = 1.0
+    even = all_rows / columns
+    row_sizes = np.max(np.abs(all_units / columns), axis=1, initial=0.0)
+    # A row all of whose terms are rounding says nothing.
+    even = even[row_sizes > 0.0]
+    keep = np.abs(even) > _KEPT * row_sizes[row_sizes > 0.0][:, None]
+    even = np.where(keep, even, 0.0)
+    if not np.any(even):
+        return np.eye(len(fields)) / columns if len(fields) else np.zeros((0, 0))
+    _, values, directions = np.linalg.svd(even, full_matrices=True)
+    rank = int(np.sum(values > _KEPT * values[0]))
+    return (directions[rank:] / columns).T
+
+
+# -- candidates ------------------------------------------------------------------------------------------------------
+
+
+def _constant(value: FloatArray, matrix: FloatArray | None = None, is_time: bool = False) -> _Field:
+    size = len(value)
+    still = np.zeros(size)
+    return _Field(lambda _: value, lambda _: still, np.zeros((size, size)) if matrix is None else matrix, is_time)
+
+
+def _time_shift(scene: LinearScene) -> _Field:
+    return _constant(np.zeros(len(scene.tangents) + len(scene.sizes)), is_time=True)
+
+
+def _shifts(scene: LinearScene) -> list[_Field]:
+    """Return the shift of each coordinate that is displaced by itself."""
+    size = len(scene.tangents) + len(scene.sizes)
+    found: list[_Field] = []
+    for _, k in scene.tangents.plain:
+        value = np.zeros(size)
+        value[k] = 1.0
+        found.append(_constant(value))
+    for chart, numbers in scene.tangents.charts:
+        if chart.kind == "direction":
+            value = np.zeros(size)
+            value[numbers[0]] = 1.0
+            found.append(_constant(value))
+    return found
+
+
+def _rotations(scene: LinearScene) -> list[_Field]:
+    """Return rotations of places and of orientations about axes of the space that they are in."""
+    found = [_place_rotation(scene, pair) for pair in _pairs(scene)]
+    for number, (chart, _) in enumerate(scene.tangents.charts):
+        if chart.kind == "quaternion":
+            found += [_turned_in_space(scene, number, axis) for axis in np.eye(3)]
+    return found
+
+
+def _pairs(scene: LinearScene) -> list[tuple[int, int]]:
+    """Return the pairs of lengths that belong to one joint or body."""
+    lengths: dict[str, list[int]] = {}
+    for _, k in scene.tangents.plain:
+        if scene.tangents.units[k] == "m":
+            head, _, last = scene.tangents.names[k].rpartition(".")
+            head = head if len(last) == 1 else f"{head}/{last.rstrip('0123456789')}"
+            lengths.setdefault(head, []).append(k)
+    return [(a, b) for own in lengths.values() for i, a in enumerate(own) for b in own[i + 1 :] if len(own) <= 3]
+
+
+def _place_rotation(scene: LinearScene, pair: tuple[int, int]) -> _Field:
+    size, count = len(scene.tangents) + len(scene.sizes), len(scene.tangents)
+    matrix = np.zeros((size, size))
+    (a, b), of_displacement = pair, {k: i for i, k in scene.tangents.plain}
+    speeds = _speed_of(scene)
+    matrix[a, b], matrix[b, a] = -1.0, 1.0
+    if a in speeds and b in speeds:
+        u, v = count + speeds[a], count + speeds[b]
+        matrix[u, v], matrix[v, u] = -1.0, 1.0
+
+    def at(flow: Flow) -> FloatArray:
+        state = np.zeros(size)
+        for k in pair:
+            state[k] = flow.variation.q[of_displacement[k]]
+        state[count:] = flow.variation.u
+        return np.asarray(matrix @ state)
+
+    return _Field(at, lambda flow: np.asarray(matrix @ flow.field, dtype=float), matrix)
+
+
+def _speed_of(scene: LinearScene) -> dict[int, int]:
+    """Return the number of the speed that is the rate of each displacement, of those that have one."""
+    e = scene.equations
+    number = {speed: i for i, speed in enumerate(e.speeds)}
+    return {k: number[e.rates[i]] for i, k in scene.tangents.plain if e.rates[i] in number}
+
+
+def _turned_in_space(scene: LinearScene, chart: int, axis: FloatArray) -> _Field:
+    """Return the rotation of an orientation about an axis of the space: neighbours are moved alike."""
+    size = len(scene.tangents) + len(scene.sizes)
+    own, numbers = scene.tangents.charts[chart]
+
+    def at(flow: Flow) -> FloatArray:
+        value = np.zeros(size)
+        value[list(numbers)] = _in_body(flow.variation.q[list(own.coordinates)], axis)
+        return value
+
+    def carried(flow: Flow) -> FloatArray:
+        value = at(flow)
+        value[list(numbers)] = -np.cross(flow.variation.displacement_rates[list(numbers)], value[list(numbers)])
+        return value
+
+    return _Field(at, carried, np.zeros((size, size)))
+
+
+def _in_body(quaternion: FloatArray, axis: FloatArray) -> FloatArray:
+    """Return an axis of the space in the body's own axes."""
+    w, v = quaternion[0], quaternion[1:]
+    found = (w * w - v @ v) * axis + 2.0 * (v @ axis) * v - 2.0 * w * np.cross(v, axis)
+    return np.asarray(found / (quaternion @ quaternion))
+
+
+def _own_rotations(scene: LinearScene) -> list[_Field]:
+    """Return rotations of bodies about axes of their own, of which only the body's own velocities know."""
+    found = []
+    size, count = len(scene.tangents) + len(scene.sizes), len(scene.tangents)
+    for chart, numbers in scene.tangents.charts:
+        if chart.kind != "quaternion":
+            continue
+        spins = [count + k for k in chart.speeds]
+        for axis in np.eye(3):
+            matrix = np.zeros((size, size))
+            crossed = -np.array([np.cross(axis, e) for e in np.eye(3)]).T
+            matrix[np.ix_(numbers, numbers)] = crossed
+            if len(spins) == 3:
+                matrix[np.ix_(spins, spins)] = crossed
+            found.append(_own_rotation(matrix, numbers, axis, spins, count))
+    return found
+
+
+def _own_rotation(
+    matrix: FloatArray, numbers: Sequence[int], axis: FloatArray, spins: Sequence[int], count: int
+) -> _Field:
+    def at(flow: Flow) -> FloatArray:
+        value = np.zeros(len(matrix))
+        value[list(numbers)] = axis
+        if len(spins) == 3:
+            value[spins] = -np.cross(axis, flow.variation.u[[k - count for k in spins]])
+        return value
+
+    def carried(flow: Flow) -> FloatArray:
+        value = np.zeros(len(matrix))
+        if len(spins) == 3:
+            value[spins] = -np.cross(axis, flow.variation.a[[k - count for k in spins]])
+        return value
+
+    return _Field(at, carried, matrix)

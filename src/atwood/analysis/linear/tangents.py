@@ -1,0 +1,106 @@
+"""Small displacements of a configuration: along each coordinate, and as rotations where coordinates are orientations.
+
+The tangent of a quaternion is the small rotation of the body in its own axes, so that three numbers stand for it and
+its size, which means nothing, does not appear. ``dq = N(q) ds`` with N block by block; N is linear in q.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.topology.charts import Chart
+
+__all__ = ["Tangents", "find_tangents"]
+
+
+@dataclass(frozen=True)
+class Tangents:
+    """The displacements of a configuration.
+
+    Attributes
+    ----------
+    coordinates
+        Number of coordinates.
+    names, units
+        Of each displacement: the coordinate's name, or that of a small rotation, such as ``body.rotation.x``.
+    plain
+        For each coordinate that is displaced by itself: its number, and that of the displacement.
+    charts
+        The orientations, each with the numbers of its displacements.
+    """
+
+    coordinates: int
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    plain: tuple[tuple[int, int], ...]
+    charts: tuple[tuple[Chart, tuple[int, ...]], ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def basis(self, q: FloatArray) -> FloatArray:
+        """Return N(q), shape (coordinates, displacements)."""
+        found = np.zeros((self.coordinates, len(self)))
+        for i, k in self.plain:
+            found[i, k] = 1.0
+        for chart, numbers in self.charts:
+            found[np.ix_(chart.coordinates, numbers)] = _block(q[list(chart.coordinates)])
+        return found
+
+    def inverse(self, q: FloatArray) -> FloatArray:
+        """Return the left inverse of N(q), shape (displacements, coordinates)."""
+        found = np.zeros((len(self), self.coordinates))
+        for i, k in self.plain:
+            found[k, i] = 1.0
+        for chart, numbers in self.charts:
+            own = q[list(chart.coordinates)]
+            scale = (4.0 if len(own) == 4 else 1.0) / float(own @ own)
+            found[np.ix_(numbers, chart.coordinates)] = scale * _block(own).T
+        return found
+
+    def moved(self, q: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Return coordinates after a displacement, orientations turned by its whole angle."""
+        found = q.copy()
+        for i, k in self.plain:
+            found[i] += displacement[k]
+        for chart, numbers in self.charts:
+            own, by = q[list(chart.coordinates)], displacement[list(numbers)]
+            angle = float(np.linalg.norm(by))
+            half = 0.5 * angle if len(own) == 4 else angle
+            step = _block(own) @ by * (np.sinc(half / np.pi) if angle else 1.0)
+            found[list(chart.coordinates)] = np.cos(half) * own + step
+        return found
+
+
+def _block(own: FloatArray) -> FloatArray:
+    """Return the derivative of the coordinates of an orientation by a small rotation in the body's axes."""
+    if len(own) == 2:  # cosine and sine
+        return np.array([[-own[1]], [own[0]]])
+    w, x, y, z = own
+    return 0.5 * np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
+
+
+def find_tangents(equations: Equations) -> Tangents:
+    """Return the displacements of the coordinates of a set of equations, whose orientations are quaternions."""
+    of_chart = {chart.coordinates[0]: chart for chart in equations.charts}
+    inside = {i for chart in equations.charts for i in chart.coordinates}
+    names: list[str] = []
+    units: list[str] = []
+    plain: list[tuple[int, int]] = []
+    charts: list[tuple[Chart, tuple[int, ...]]] = []
+    for i, one in enumerate(equations.names):
+        if i not in inside:
+            plain.append((i, len(names)))
+            names.append(one.name)
+            units.append(one.unit)
+        elif i in of_chart:
+            chart = of_chart[i]
+            axes = ("x", "y", "z") if chart.kind == "quaternion" else ("",)
+            charts.append((chart, tuple(range(len(names), len(names) + len(axes)))))
+            names += [f"{chart.body}.rotation{'.' * bool(axis)}{axis}" for axis in axes]
+            units += ["rad"] * len(axes)
+    return Tangents(len(equations.names), tuple(names), tuple(units), tuple(plain), tuple(charts))

@@ -1,0 +1,22 @@
+"""Linear models of scenes, equilibria, small oscillations: what the equations say near a state."""
+
+from atwood.linearization.equilibria import Equilibria, Equilibrium, equilibria
+from atwood.linearization.linear_model import LinearModel
+from atwood.linearization.linearize import linearize
+from atwood.linearization.normal_modes import NormalModes, normal_modes
+from atwood.linearization.root_locus import RootLocus, root_locus
+from atwood.linearization.trim import Trim, trim
+
+__all__ = [
+    "Equilibria",
+    "Equilibrium",
+    "LinearModel",
+    "NormalModes",
+    "RootLocus",
+    "Trim",
+    "equilibria",
+    "linearize",
+    "normal_modes",
+    "root_locus",
+    "trim",
+]

@@ -1,0 +1,232 @@
+"""Linear models: matrices with the names of what they belong to, and what follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from atwood.analysis.linear.realization import (
+    Matrices,
+    frequency_response,
+    minimal_realization,
+    static_gain,
+    transmission_zeros,
+)
+from atwood.analysis.linear.spectrum import Spectrum, find_spectrum
+from atwood.arrays import ComplexArray, FloatArray
+from atwood.errors import UsageError
+
+__all__ = ["LinearModel"]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """A linear model ``x' = A x + B w``, ``y = C x + D w`` of a scene about a state.
+
+    Attributes
+    ----------
+    A, B, C, D
+        Its matrices, in SI units.
+    states
+        What the states are deviations of: coordinates, small rotations of bodies in their own axes
+        (``body.rotation.x``, rad) and speeds, by path; position and speed of drives that are inputs come last.
+    inputs
+        Inputs by path; with a prime twice, ``drive.motion''``, where it is the second derivative of a prescribed
+        motion.
+    outputs
+        Quantities by path.
+    units
+        SI unit of every state, input and output by name.
+    values
+        The state that it is about: value by path of the coordinates and speeds that have one number each.
+    scene
+        Name of the scene.
+    form
+        Form whose equations were linearised.
+    about
+        ``"rest"``, ``"steady motion"`` or ``"motion"``, for a state of a run, where A holds at that time alone.
+    error
+        How far rounding can have taken the entries of A.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    units: Mapping[str, str]
+    values: Mapping[str, float]
+    scene: str
+    form: str
+    about: str
+    error: FloatArray = field(repr=False)
+
+    @cached_property
+    def spectrum(self) -> Spectrum:
+        """Eigenvalues of A with their vectors, zero ones split off."""
+        return find_spectrum(self.A, self.error)
+
+    @property
+    def eigenvalues(self) -> ComplexArray:
+        """Eigenvalues of A, 1/s: largest real part first, those that are zero last and exactly zero."""
+        return self.spectrum.values
+
+    @property
+    def poles(self) -> ComplexArray:
+        """The same as `eigenvalues`."""
+        return self.eigenvalues
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether no eigenvalue has a positive real part beyond rounding."""
+        return not bool(np.any(self.spectrum.others.real > _GROWING * self._fastest))
+
+    @property
+    def _fastest(self) -> float:
+        return float(np.max(np.abs(self.spectrum.others), initial=0.0))
+
+    @property
+    def matrices(self) -> Matrices:
+        """A, B, C and D."""
+        return self.A, self.B, self.C, self.D
+
+    def zeros(self) -> ComplexArray:
+        """Return the finite transmission zeros, 1/s.
+
+        Raises
+        ------
+        UsageError
+            If there are not as many outputs as inputs.
+        """
+        if len(self.inputs) != len(self.outputs) or not self.inputs:
+            raise UsageError(
+                f"zeros belong to as many outputs as inputs, and here are {len(self.outputs)} and {len(self.inputs)}",
+                where=self.scene,
+                advice="Choose as many of both, one each for a transfer function.",
+            )
+        return transmission_zeros(self.matrices)
+
+    def dc_gain(self) -> FloatArray:
+        """Return the response to constant inputs, shape (outputs, inputs).
+
+        Raises
+        ------
+        UsageError
+            If an output grows without bound under a constant input.
+        """
+        found = static_gain(self.matrices)
+        if found is None:
+            raise UsageError(
+                "under constant inputs an output grows without bound", where=self.scene, advice="Look at its rate."
+            )
+        return found
+
+    def minimal_realization(self) -> Matrices:
+        """Return A, B, C and D of the part that inputs reach and outputs see; its states have no names."""
+        return minimal_realization(self.matrices)
+
+    def frequency_response(self, angular_frequencies: Iterable[float]) -> ComplexArray:
+        """Return the response to harmonic inputs.
+
+        Parameters
+        ----------
+        angular_frequencies
+            In rad/s.
+
+        Returns
+        -------
+        numpy.ndarray
+            Complex, shape (frequencies, outputs, inputs).
+        """
+        omega = np.array([float(one) for one in angular_frequencies])
+        return frequency_response(self.matrices, omega)
+
+    def to_scipy(self) -> Any:
+        """Return it as `scipy.signal.StateSpace`."""
+        from scipy.signal import StateSpace
+
+        return StateSpace(*self.matrices)
+
+    def to_control(self) -> Any:
+        """Return it as `control.StateSpace`, with the names of states, inputs and outputs.
+
+        Raises
+        ------
+        UsageError
+            If python-control is not installed.
+        """
+        try:
+            import control
+        except ImportError:
+            raise UsageError(
+                "python-control is not installed", advice="Install it: pip install 'atwood[control]'."
+            ) from None
+        names = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
+        flat = {kind: [one.replace(".", "_") for one in own] for kind, own in names.items()}
+        return control.ss(*self.matrices, **{kind: own for kind, own in flat.items() if own})
+
+    def bode(self, file: Any = None, angular_frequencies: Iterable[float] | None = None) -> Any:
+        """Draw gain and phase over the frequency, for each pair of input and output; see `plot_bode`."""
+        from atwood.plotting.plots.linear import plot_bode
+
+        return plot_bode(self, angular_frequencies, file)
+
+    def nyquist(self, file: Any = None, angular_frequencies: Iterable[float] | None = None) -> Any:
+        """Draw the frequency response in the complex plane; see `plot_nyquist`."""
+        from atwood.plotting.plots.linear import plot_nyquist
+
+        return plot_nyquist(self, angular_frequencies, file)
+
+    def to_data(self) -> dict[str, Any]:
+        """Return it as plain data, for JSON."""
+        return {
+            "scene": self.scene,
+            "form": self.form,
+            "about": self.about,
+            "values": dict(self.values),
+            "states": list(self.states),
+            "inputs": list(self.inputs),
+            "outputs": list(self.outputs),
+            "units": dict(self.units),
+            **{name: matrix.tolist() for name, matrix in zip("ABCD", self.matrices, strict=True)},
+            "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues],
+        }
+
+    def __str__(self) -> str:
+        head = f"{self.scene} ({self.form}), linear about a {_ABOUT[self.about]}"
+        lines = [head, "states: " + _listed(self.states)]
+        lines += [
+            f"{kind}: {_listed(own)}" for kind, own in (("inputs", self.inputs), ("outputs", self.outputs)) if own
+        ]
+        lines.append("eigenvalues, 1/s: " + _listed([_complex(v) for v in self.spectrum.others], 8))
+        if self.spectrum.zeros:
+            lines[-1] += f"{'; and ' * bool(len(self.spectrum.others))}{self.spectrum.zeros} times 0"
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+
+_GROWING = 1e-9
+"""Relative to the fastest eigenvalue: a real part below it is rounding."""
+
+_ABOUT = {"rest": "state of rest", "steady motion": "steady motion", "motion": "state of a motion"}
+
+
+def _complex(value: complex) -> str:
+    if value.imag == 0.0:
+        return f"{value.real:.6g}"
+    real = f"{value.real:.6g} " if abs(value.real) > _GROWING * abs(value) else ""
+    sign = ("+ " if value.imag > 0.0 else "- ") if real else "-" * int(value.imag < 0.0)
+    return f"{real}{sign}{abs(value.imag):.6g}i"
+
+
+def _listed(names: Iterable[str], most: int = 12) -> str:
+    found = list(names)
+    more = f", and {len(found) - most} more" if len(found) > most else ""
+    return ", ".join(found[:most]) + more

@@ -1,0 +1,196 @@
+"""`normal_modes`: small oscillations of a scene about rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from atwood.analysis.linear.modes import find_modes
+from atwood.analysis.linear.state_space import find_state_space
+from atwood.analysis.linear.steady import find_steady, still
+from atwood.analysis.linear.switches import refuse_switches
+from atwood.arguments import takes
+from atwood.arrays import ComplexArray, FloatArray
+from atwood.forms.assembly import Assembly
+from atwood.linearization.linearize import not_steady
+from atwood.linearization.operating_point import AT, At, OperatingPoint, find_operating_point, values_at
+from atwood.model.compose.composite import Model
+from atwood.pipeline import SCENE
+
+__all__ = ["NormalModes", "normal_modes"]
+
+
+@dataclass(frozen=True, eq=False)
+class NormalModes:
+    """Modes of a scene about a state of rest or a steady motion.
+
+    Attributes
+    ----------
+    angular_frequencies
+        rad/s, ascending; zero for modes that do not oscillate: free ones, unstable ones, overdamped ones.
+    growth_rates
+        1/s: zero without damping, positive for unstable modes, negative for damped ones.
+    eigenvalues
+        ``growth_rates + i angular_frequencies``.
+    shapes
+        For each mode the amplitude of every coordinate, by path; the largest is 1 m or 1 rad. They are complex where
+        velocity terms shift phases.
+    spaces
+        Numbers of the modes whose eigenvalues are equal: any combination of their shapes is one too.
+    values
+        The state that they are about, by path.
+    scene
+        Name of the scene.
+    """
+
+    angular_frequencies: FloatArray
+    growth_rates: FloatArray
+    eigenvalues: ComplexArray
+    shapes: tuple[Mapping[str, complex], ...]
+    spaces: tuple[tuple[int, ...], ...]
+    values: Mapping[str, float]
+    scene: str
+    point: OperatingPoint = field(repr=False)
+    displacements: ComplexArray = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.angular_frequencies)
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Frequencies, Hz."""
+        return self.angular_frequencies / (2.0 * np.pi)
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether no mode grows."""
+        return bool(np.all(self.growth_rates <= 1e-9 * np.max(np.abs(self.eigenvalues), initial=0.0)))
+
+    def matrix(self) -> ComplexArray:
+        """Return the shapes as columns, rows in the order of the paths in `shapes`."""
+        if not self.shapes:
+            return np.zeros((0, 0), dtype=complex)
+        return np.array([list(shape.values()) for shape in self.shapes]).T
+
+    def positions(self, mode: int, phase: float = 0.0, amplitude: float = 0.2) -> FloatArray:
+        """Return the coordinates of the scene displaced along a mode.
+
+        Parameters
+        ----------
+        mode
+            Number of the mode.
+        phase
+            Phase of the oscillation, rad.
+        amplitude
+            Of the largest displacement, in radians or in extents of the scene.
+        """
+        linear = self.point.scene
+        shape = self.displacements[:, mode]
+        size = float(np.max(np.abs(shape) / linear.displacement_sizes, initial=0.0)) or 1.0
+        moved = (shape * np.exp(1j * phase)).real * amplitude / size
+        return linear.tangents.moved(self.point.q, moved)
+
+    def plot(self, file: Any = None) -> Any:
+        """Draw the mechanism displaced along each mode; see `plot_modes`."""
+        from atwood.plotting.plots.linear import plot_modes
+
+        return plot_modes(self, file)
+
+    def to_data(self) -> dict[str, Any]:
+        """Return them as plain data, for JSON."""
+        return {
+            "scene": self.scene,
+            "values": dict(self.values),
+            "angular_frequencies": self.angular_frequencies.tolist(),
+            "growth_rates": self.growth_rates.tolist(),
+            "shapes": [{path: _number(value) for path, value in shape.items()} for shape in self.shapes],
+            "spaces": [list(one) for one in self.spaces],
+        }
+
+    def __str__(self) -> str:
+        lines = [f"{self.scene}: {len(self)} modes about {_state(self.values)}"]
+        lines.append(f"{'mode':>4} {'omega, rad/s':>14} {'growth, 1/s':>12}   shape")
+        for k, shape in enumerate(self.shapes[:_SHOWN]):
+            text = f"{k:>4} {self.angular_frequencies[k]:>14.6g} {self.growth_rates[k]:>12.4g}"
+            lines.append(f"{text}   {_shape_text(shape)}")
+        if len(self) > _SHOWN:
+            lines.append(f"... and {len(self) - _SHOWN} more")
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+
+_SHOWN = 7
+
+
+def _state(values: Mapping[str, float]) -> str:
+    shown = [f"{path} = {value:.4g}" for path, value in list(values.items())[:3]]
+    return ", ".join(shown) + (", ..." if len(values) > 3 else "")
+
+
+def _shape_text(shape: Mapping[str, complex], most: int = 4) -> str:
+    parts = [f"{path} {_short(value)}" for path, value in shape.items() if abs(value) > 1e-6]
+    return ", ".join(parts[:most]) + (", ..." if len(parts) > most else "")
+
+
+def _short(value: complex) -> str:
+    if abs(value.imag) < 1e-9 * abs(value):
+        return f"{value.real:.4g}"
+    return f"{abs(value):.4g} at {np.degrees(np.angle(value)):.0f} deg"
+
+
+def _number(value: complex) -> float | list[float]:
+    return value.real if value.imag == 0.0 else [value.real, value.imag]
+
+
+@takes(scene=SCENE, at=AT)
+def normal_modes(scene: Model | Assembly, *, at: At = None) -> NormalModes:
+    """Find the frequencies and shapes of small oscillations.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it.
+    at
+        The state of rest or the steady motion, as for `linearize`. The scene's start if not given.
+
+    Returns
+    -------
+    NormalModes
+        One for each degree of freedom without velocity terms; with damping or gyroscopic terms one for each pair of
+        conjugate eigenvalues and for each real one.
+
+    Raises
+    ------
+    UsageError
+        If the state is neither at rest nor a steady motion, or a law switches there.
+    """
+    point = find_operating_point(scene, at, ())
+    return modes_of(point)
+
+
+def modes_of(point: OperatingPoint) -> NormalModes:
+    """Return the modes about an operating point."""
+    flow = point.scene.flow(point.t, point.q, point.u, point.kept)
+    refuse_switches(point.scene, flow, point.kept)
+    steady = still(flow) if point.is_from_result else find_steady(point.scene, flow, point.kept)
+    if not steady.is_steady:
+        raise not_steady(point, flow, steady)
+    space = find_state_space(point.scene, flow, steady, point.kept)
+    found = find_modes(flow, space)
+    names = point.scene.tangents.names
+    shapes = tuple(dict(zip(names, map(complex, column), strict=True)) for column in found.shapes.T)
+    return NormalModes(
+        found.angular_frequencies,
+        found.growth_rates,
+        found.eigenvalues,
+        shapes,
+        found.spaces,
+        values_at(point),
+        point.assembly.flat.name,
+        point,
+        found.shapes,
+    )
