@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+
+from atwood import Scene
 from atwood_library import (
     Disc,
     Ground,
@@ -16,8 +18,6 @@ from atwood_library import (
     RotaryDrive,
     Weld,
 )
-
-from atwood import Scene
 
 
 def bicycle(heading: float = 0.0, place: Sequence[float] = (0.0, 0.0)) -> Scene:

@@ -49,8 +49,8 @@ class LinearModel:
         Form whose equations were linearised.
     about
         ``"rest"``, ``"steady motion"`` or ``"motion"``, for a state of a run, where A holds at that time alone.
-    error
-        How far rounding can have taken the entries of A.
+    error, sizes
+        How far rounding can have taken the entries of A, and what is large for each state.
     """
 
     A: FloatArray
@@ -66,11 +66,12 @@ class LinearModel:
     form: str
     about: str
     error: FloatArray = field(repr=False)
+    sizes: FloatArray = field(repr=False)
 
     @cached_property
     def spectrum(self) -> Spectrum:
         """Eigenvalues of A with their vectors, zero ones split off."""
-        return find_spectrum(self.A, self.error)
+        return find_spectrum(self.A, self.error, self.sizes)
 
     @property
     def eigenvalues(self) -> ComplexArray:
@@ -170,18 +171,6 @@ class LinearModel:
         names = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
         flat = {kind: [one.replace(".", "_") for one in own] for kind, own in names.items()}
         return control.ss(*self.matrices, **{kind: own for kind, own in flat.items() if own})
-
-    def bode(self, file: Any = None, angular_frequencies: Iterable[float] | None = None) -> Any:
-        """Draw gain and phase over the frequency, for each pair of input and output; see `plot_bode`."""
-        from atwood.plotting.plots.linear import plot_bode
-
-        return plot_bode(self, angular_frequencies, file)
-
-    def nyquist(self, file: Any = None, angular_frequencies: Iterable[float] | None = None) -> Any:
-        """Draw the frequency response in the complex plane; see `plot_nyquist`."""
-        from atwood.plotting.plots.linear import plot_nyquist
-
-        return plot_nyquist(self, angular_frequencies, file)
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, for JSON."""

@@ -101,7 +101,7 @@ def _of_dae_form(point: OperatingPoint, flow: Flow, steady: Steady, space: State
     accelerations = pulled_back(image, own) - steady.moving[count:] @ minimal.state
     matrix = space.matrix.copy()
     matrix[len(minimal.displacements) :] = accelerations[list(minimal.speeds)]
-    return StateSpace(minimal, matrix, space.error)
+    return StateSpace(minimal, matrix, space.error, space.sizes)
 
 
 def not_steady(point: OperatingPoint, flow: Flow, steady: Steady) -> UsageError:
@@ -155,10 +155,23 @@ def _model(
     shown = tuple(f"{name}''" if k in moved else name for k, name in enumerate(inputs))
     units |= _units(point, minimal) | {path: point.assembly.start_observables[path].unit for path in outputs}
     about = "motion" if point.is_from_result else "steady motion" if _moves(point, flow) else "rest"
+    driven = np.ones(2 * len(moved))
     return LinearModel(
-        a, b, c, d, tuple(names), shown, tuple(outputs), units, values_at(point), point.assembly.flat.name, form, about,
-        error,
-    )  # fmt: skip
+        A=a,
+        B=b,
+        C=c,
+        D=d,
+        states=tuple(names),
+        inputs=shown,
+        outputs=tuple(outputs),
+        units=units,
+        values=values_at(point),
+        scene=point.assembly.flat.name,
+        form=form,
+        about=about,
+        error=error,
+        sizes=np.concatenate([space.sizes, driven]),
+    )
 
 
 def _inputs(

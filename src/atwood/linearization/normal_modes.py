@@ -12,13 +12,15 @@ from atwood.analysis.linear.modes import find_modes
 from atwood.analysis.linear.state_space import find_state_space
 from atwood.analysis.linear.steady import find_steady, still
 from atwood.analysis.linear.switches import refuse_switches
-from atwood.arguments import takes
+from atwood.arguments import check, takes, whole
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.linearization.linearize import not_steady
+from atwood.linearization.mode_motion import mode_motion
 from atwood.linearization.operating_point import AT, At, OperatingPoint, find_operating_point, values_at
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
+from atwood.result.result import Result
 
 __all__ = ["NormalModes", "normal_modes"]
 
@@ -75,29 +77,27 @@ class NormalModes:
             return np.zeros((0, 0), dtype=complex)
         return np.array([list(shape.values()) for shape in self.shapes]).T
 
-    def positions(self, mode: int, phase: float = 0.0, amplitude: float = 0.2) -> FloatArray:
-        """Return the coordinates of the scene displaced along a mode.
+    def motion(self, mode: int, amplitude: float = 0.2, frames: int = 25) -> Result:
+        """Return one period of a mode as a motion of the mechanism, to be drawn and animated.
 
         Parameters
         ----------
         mode
             Number of the mode.
-        phase
-            Phase of the oscillation, rad.
         amplitude
             Of the largest displacement, in radians or in extents of the scene.
+        frames
+            Number of times.
+
+        Returns
+        -------
+        Result
+            As `simulate` returns it; closed loops are met. A mode that does not oscillate is shown swinging too.
         """
-        linear = self.point.scene
-        shape = self.displacements[:, mode]
-        size = float(np.max(np.abs(shape) / linear.displacement_sizes, initial=0.0)) or 1.0
-        moved = (shape * np.exp(1j * phase)).real * amplitude / size
-        return linear.tangents.moved(self.point.q, moved)
-
-    def plot(self, file: Any = None) -> Any:
-        """Draw the mechanism displaced along each mode; see `plot_modes`."""
-        from atwood.plotting.plots.linear import plot_modes
-
-        return plot_modes(self, file)
+        index = check(whole(f"the number of a mode, 0 to {len(self) - 1}", 0, len(self) - 1), mode, "mode", "motion")
+        return mode_motion(
+            self.point, self.displacements[:, index], float(self.angular_frequencies[index]), amplitude, frames
+        )
 
     def to_data(self) -> dict[str, Any]:
         """Return them as plain data, for JSON."""

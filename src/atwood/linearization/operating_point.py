@@ -165,7 +165,7 @@ def _at_time(base: Assembly, result: Result, time: float, inputs: tuple[InputPat
             where=base.flat.name,
             advice="Give a result of the reduced form.",
         )
-    for event in result.happenings:
+    for event in result.events:
         if abs(event.time - time) <= _SAME_TIME * max(abs(time), 1.0):
             raise UsageError(
                 f"at t = {time:g} s is the event {event.part}.{event.law}, where the motion has no derivative",
@@ -186,7 +186,7 @@ def _at_time(base: Assembly, result: Result, time: float, inputs: tuple[InputPat
     own, t = segment.assembly, float(segment.time[near])
     keys = frozenset(key for one in inputs for key in one.keys)
     flat = replace(own.flat, varied=keys, t_start=t)
-    assembly = assemble_flat(flat, modes=own.modes, sides=own.mechanism.sides) if keys else own
+    assembly = assemble_flat(flat, modes=own.modes, line_signs=own.mechanism.line_signs) if keys else own
     q = to_regular(own, segment.coordinates[:, near])
     return _point(assembly, t, q, segment.speeds[:, near], inputs, is_from_result=True)
 
@@ -318,6 +318,6 @@ _SPEEDS = ("angular_velocity", "speed", "velocity.x", "velocity.y", "velocity.z"
 def values_at(point: OperatingPoint) -> dict[str, float]:
     """Return the coordinates and speeds of a state that have one number each, by path."""
     e = point.scene.equations
-    charted = {i for chart in e.charts for i in chart.coordinates}
+    charted = {i for chart in e.orientation_coordinates for i in chart.coordinates}
     found = {one.name: float(q) for i, (one, q) in enumerate(zip(e.names, point.q, strict=True)) if i not in charted}
     return found | {speed_name(point, k): float(u) for k, u in enumerate(point.u)}

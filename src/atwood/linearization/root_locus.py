@@ -41,12 +41,6 @@ class RootLocus:
     eigenvalues: ComplexArray
     scene: str
 
-    def plot(self, file: Any = None) -> Any:
-        """Draw the eigenvalues over the value, and in the complex plane; see `plot_root_locus`."""
-        from atwood.plotting.plots.linear import plot_root_locus
-
-        return plot_root_locus(self, file)
-
     def crossings(self) -> list[float]:
         """Return values at which the real part of an eigenvalue changes sign, by linear interpolation."""
         real = self.eigenvalues.real

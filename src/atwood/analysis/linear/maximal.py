@@ -27,11 +27,14 @@ class Image:
         Displacements and speeds, shape (displacements and speeds, columns of `Minimal`).
     inputs
         Number of inputs, whose columns are the last ones.
+    sizes
+        Size of a displacement along each maximal speed.
     """
 
     flow: Flow
     state: FloatArray
     inputs: int
+    sizes: FloatArray
 
     @property
     def acceleration(self) -> FloatArray:
@@ -116,7 +119,7 @@ def image_of(scene: LinearScene, flow: Flow, minimal: Minimal) -> tuple[Image, t
         return found
 
     state = np.concatenate([inverse @ along("q"), along("u")])
-    return Image(big_flow, state, inputs), kept, np.hstack([along("a"), places.by["a", "a"]])
+    return Image(big_flow, state, inputs, big.sizes), kept, np.hstack([along("a"), places.by["a", "a"]])
 
 
 def pulled_back(image: Image, accelerations: FloatArray) -> FloatArray:
@@ -134,7 +137,5 @@ def pulled_back(image: Image, accelerations: FloatArray) -> FloatArray:
     """
     columns = image.state.shape[1]
     own, by_own = accelerations[:, :columns], accelerations[:, columns:]
-    size = np.max(np.abs(by_own), axis=1, initial=0.0)
-    size[size == 0.0] = 1.0
-    right = (image.acceleration - own) / size[:, None]
-    return np.asarray(np.linalg.lstsq(by_own / size[:, None], right, rcond=None)[0])
+    right = (image.acceleration - own) / image.sizes[:, None]
+    return np.asarray(np.linalg.lstsq(by_own / image.sizes[:, None], right, rcond=None)[0])

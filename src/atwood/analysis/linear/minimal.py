@@ -14,7 +14,7 @@ import numpy as np
 
 from atwood.analysis.linear.variations import Flow, LinearScene
 from atwood.arrays import FloatArray
-from atwood.simulation.dynamics.partitioning import choose_dependent
+from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates
 
 __all__ = ["Minimal", "find_minimal"]
 
@@ -75,9 +75,9 @@ def find_minimal(scene: LinearScene, flow: Flow, kept: Sequence[int], like: Mini
     if like is not None:
         free, free_speeds = like.displacements, like.speeds
     else:
-        chosen = choose_dependent(by_s, scene.displacement_sizes) if holding else ()
+        chosen = choose_dependent_coordinates(by_s, scene.displacement_sizes) if holding else ()
         same = _same_speeds(scene, chosen) if len(holding) == len(kept) else None
-        follow = same if same is not None else choose_dependent(rate_u, scene.sizes) if len(kept) else ()
+        follow = same if same is not None else choose_dependent_coordinates(rate_u, scene.sizes) if len(kept) else ()
         free, free_speeds = _others(count, chosen), _others(speeds, follow)
     dependent, dependent_speeds = _others(count, free), _others(speeds, free_speeds)
     total = len(free) + len(free_speeds) + inputs

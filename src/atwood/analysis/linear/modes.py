@@ -105,7 +105,7 @@ def _undamped(flow: Flow, space: StateSpace) -> ModeValues | None:
 
 def _damped(space: StateSpace, n: int) -> ModeValues:
     minimal = space.minimal
-    spectrum = find_spectrum(space.matrix[:, : minimal.states], space.error[:, : minimal.states])
+    spectrum = find_spectrum(space.matrix[:, : minimal.states], space.error[:, : minimal.states], space.sizes)
     size = float(np.max(np.abs(spectrum.others), initial=0.0))
     upper = [k for k, value in enumerate(spectrum.others) if value.imag >= -1e-9 * size]
     values = spectrum.others[upper]

@@ -2,7 +2,7 @@
 
 A coordinate that nothing depends on gives a zero eigenvalue, together with its conserved momentum a double one, which
 rounding would make a pair of size 1e-8 that spoils its neighbours. So what a matrix takes to zero is split off first,
-step by step (the staircase form; Golub and Wilkinson, SIAM Review 18, 1976), and only the rest is left to the QR method.
+step by step (the staircase form; Golub and Wilkinson, SIAM Review 18, 1976); the rest is left to the QR method.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ __all__ = ["Spectrum", "find_spectrum"]
 _ROUNDING = 1e-14
 """Relative to the largest singular value after balancing: what is less is rounding of the decomposition itself."""
 
-_SWEEPS, _FACTOR = 6, 16.0
+_SWEEPS, _FACTOR = 3, 4.0
 """So often every state is scaled, each time by this at most."""
 
 
@@ -48,7 +48,7 @@ class Spectrum:
         return np.concatenate([self.others, np.zeros(self.zeros, dtype=complex)])
 
 
-def find_spectrum(matrix: FloatArray, error: FloatArray | None = None) -> Spectrum:
+def find_spectrum(matrix: FloatArray, error: FloatArray, sizes: FloatArray) -> Spectrum:
     """Return the eigenvalues of a matrix.
 
     Parameters
@@ -56,15 +56,16 @@ def find_spectrum(matrix: FloatArray, error: FloatArray | None = None) -> Spectr
     matrix
         Shape (n, n).
     error
-        How far its entries may be off; rounding of their own size if not given.
+        How far its entries may be off.
+    sizes
+        What is large for each state.
     """
     n = len(matrix)
     if n == 0:
         return Spectrum(0, np.zeros(0, dtype=complex), np.zeros((0, 0), dtype=complex))
-    error = _ROUNDING * np.abs(matrix) if error is None else error
     # Entries that are nothing but rounding say nothing of how large states are beside each other.
     certain = np.where(np.abs(matrix) > error, matrix, 0.0)
-    scale = _scale(certain)
+    scale = sizes * _scale(certain * sizes / sizes[:, None])
     balanced = certain * scale[None, :] / scale[:, None]
     bound = _ROUNDING * float(np.linalg.norm(balanced, 2))
     bound = max(bound, float(np.linalg.norm(error * scale[None, :] / scale[:, None])))

@@ -33,11 +33,14 @@ class StateSpace:
         A and B side by side, shape (states, states and inputs).
     error
         How far rounding can have taken each entry.
+    sizes
+        What is large for each state: the scene's sizes, and for speeds the rate at which these change fastest.
     """
 
     minimal: Minimal
     matrix: FloatArray
     error: FloatArray
+    sizes: FloatArray
 
 
 def find_state_space(scene: LinearScene, flow: Flow, steady: Steady, kept: Sequence[int]) -> StateSpace:
@@ -62,7 +65,12 @@ def find_state_space(scene: LinearScene, flow: Flow, steady: Steady, kept: Seque
         found = other.flow(now.t, scene.tangents.moved(now.q, by), now.u + faster, kept)
         near = _matrix(other, found, steady, find_minimal(other, found, kept, minimal))
         largest = np.maximum(largest, np.abs(near - matrix))
-    return StateSpace(minimal, matrix, CERTAIN * largest)
+    n = len(minimal.displacements)
+    own = scene.displacement_sizes[list(minimal.displacements)], scene.sizes[list(minimal.speeds)]
+    fastest = np.sqrt(np.max(np.abs(matrix[n:, :n] * own[0] / own[1][:, None]), initial=0.0))
+    fastest = max(float(fastest), float(np.max(np.abs(matrix[n:, n : minimal.states]), initial=0.0))) or 1.0
+    sizes = np.concatenate([own[0], own[1] * fastest])
+    return StateSpace(minimal, matrix, CERTAIN * largest, sizes)
 
 
 def _matrix(scene: LinearScene, flow: Flow, steady: Steady, minimal: Minimal) -> FloatArray:

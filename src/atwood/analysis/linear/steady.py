@@ -30,6 +30,9 @@ A start is solved to 1e-11 of its scale, and what it gives for accelerations can
 _KEPT = 1e-8
 """Relative to its terms: how well a field must solve the variational equation at random states."""
 
+_NOTHING = 1e-12
+"""Relative to the fastest rates of the scene: what is missed by less is rounding of terms that cancel."""
+
 _STATES = 4
 _REACH = 0.3
 """At so many random states near by, so far away in each coordinate and speed relative to their sizes."""
@@ -91,26 +94,28 @@ def find_steady(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> Steady:
         Independent constraints.
     """
     size = len(flow.field)
-    sizes = _sizes(scene, flow)
-    goal = flow.field / sizes
     pace = _pace(scene, flow)
+    extents = np.concatenate([scene.displacement_sizes, scene.sizes * pace])
+    sizes = extents * pace
+    goal = flow.field / sizes
+    if not scene.depends_on_time and np.all(np.abs(goal) <= _STEADY) and not np.any(flow.variation.u):
+        return still(flow)
     tiers = [[_time_shift(scene)], _shifts(scene), _rotations(scene), _own_rotations(scene)]
     found: list[_Field] = []
     states = [flow, *_near_by(scene, flow, kept, pace)]
     symmetries = np.zeros((size, 0))
     for tier in tiers:
         found += tier
-        combinations = _symmetric(found, states, sizes)
+        combinations = _symmetric(found, states, sizes, extents)
         values = np.stack([one.at(flow) for one in found], axis=1) @ combinations
         symmetries = values
-        timely = np.array([float(one.is_time) for one in found]) @ combinations
+        timely = np.array([float(one.is_time) for one in found]) @ combinations  # by so many 1 / pace
         # Time goes on by itself: the symmetry shifts it at rate one, or nothing depends on it.
-        rows = np.concatenate([values / sizes[:, None], pace * timely[None, :]])
-        right = np.concatenate([goal, [pace]])
+        rows = np.concatenate([values / sizes[:, None], timely[None, :] / pace])
+        right = np.concatenate([goal, [1.0]])
         terms = np.linalg.lstsq(rows, right, rcond=1e-10)[0]
         missed = np.abs(rows @ terms - right)
-        terms_of_each = np.abs(rows) @ np.abs(terms) + np.abs(right) + pace
-        if np.all(missed <= _STEADY * np.maximum(terms_of_each, np.max(np.abs(right)))):
+        if np.all(missed <= _STEADY * (1.0 + np.abs(rows) @ np.abs(terms))):
             weights = combinations @ terms
             moving = sum((w * one.matrix for w, one in zip(weights, found, strict=True)), np.zeros((size, size)))
             return Steady(True, np.asarray(moving), symmetries)
@@ -123,11 +128,6 @@ def still(flow: Flow) -> Steady:
     """Return the moving frame of a state at which neighbours are looked at as they are."""
     size = len(flow.field)
     return Steady(True, np.zeros((size, size)), np.zeros((size, 0)))
-
-
-def _sizes(scene: LinearScene, flow: Flow) -> FloatArray:
-    pace = _pace(scene, flow)
-    return np.concatenate([scene.displacement_sizes * pace, scene.sizes * pace**2])
 
 
 def _pace(scene: LinearScene, flow: Flow) -> float:
@@ -158,35 +158,41 @@ def _near_by(scene: LinearScene, flow: Flow, kept: Sequence[int], pace: float) -
     return found
 
 
-def _symmetric(fields: Sequence[_Field], states: Sequence[Flow], sizes: FloatArray) -> FloatArray:
-    """Return the combinations of fields that are symmetries, as columns."""
-    rows, units = [], []
+def _symmetric(fields: Sequence[_Field], states: Sequence[Flow], sizes: FloatArray, extents: FloatArray) -> FloatArray:
+    """Return the combinations of fields that are symmetries, as columns.
+
+    Parameters
+    ----------
+    fields, states
+        The fields, and the flows at which they are tried.
+    sizes, extents
+        Sizes of the motion's rates, and of displacements and speeds.
+    """
+    n = len(sizes)
+    pace = float(np.max(sizes / extents, initial=0.0)) or 1.0
+    large = np.array(
+        [max(float(np.max(np.abs(one.at(flow)) / extents, initial=0.0)) for flow in states) or 1.0 for one in fields]
+    )
+    rows, own = [], []
     for flow in states:
-        matrix = flow.matrix
-        time = matrix[:, len(sizes)]
-        missed = np.zeros((len(sizes), len(fields)))
-        terms = np.zeros((len(sizes), len(fields)))
+        matrix, time = flow.matrix[:, :n], flow.matrix[:, n]
+        missed, terms = np.zeros((n, len(fields))), np.zeros((n, len(fields)))
         for k, one in enumerate(fields):
             value, carried = one.at(flow), one.carried(flow)
-            shifted = time if one.is_time else 0.0
-            missed[:, k] = matrix[:, : len(sizes)] @ value + shifted - carried
-            terms[:, k] = np.abs(matrix[:, : len(sizes)]) @ np.abs(value) + np.abs(shifted) + np.abs(carried)
-        rows.append(missed / sizes[:, None])
-        units.append(terms / sizes[:, None])
-    all_rows, all_units = np.concatenate(rows), np.concatenate(units)
-    columns = np.max(all_units, axis=0, initial=0.0)
-    columns[columns == 0.0] = 1.0
-    even = all_rows / columns
-    row_sizes = np.max(np.abs(all_units / columns), axis=1, initial=0.0)
-    # A row all of whose terms are rounding says nothing.
-    even = even[row_sizes > 0.0]
-    keep = np.abs(even) > _KEPT * row_sizes[row_sizes > 0.0][:, None]
-    even = np.where(keep, even, 0.0)
-    if not np.any(even):
-        return np.eye(len(fields)) / columns if len(fields) else np.zeros((0, 0))
-    _, values, directions = np.linalg.svd(even, full_matrices=True)
+            shifted = time / pace if one.is_time else np.zeros(n)
+            missed[:, k] = (matrix @ value + shifted - carried) / sizes / large[k]
+            terms[:, k] = (np.abs(matrix) @ np.abs(value) + np.abs(shifted) + np.abs(carried)) / sizes / large[k]
+        rows.append(missed)
+        own.append(terms)
+    found, terms = np.concatenate(rows), np.concatenate(own)
+    found = np.where(np.abs(found) > np.maximum(_KEPT * terms, _NOTHING), found, 0.0)
+    row_sizes = np.max(np.abs(found), axis=1, initial=0.0)
+    found = found[row_sizes > 0.0] / row_sizes[row_sizes > 0.0, None]
+    if not len(found):
+        return np.diag(1.0 / large)
+    _, values, directions = np.linalg.svd(found, full_matrices=True)
     rank = int(np.sum(values > _KEPT * values[0]))
-    return (directions[rank:] / columns).T
+    return np.asarray((directions[rank:] / large).T)
 
 
 # -- candidates ------------------------------------------------------------------------------------------------------

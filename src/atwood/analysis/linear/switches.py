@@ -48,7 +48,7 @@ def refuse_switches(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> None
     kernel, now = scene.assembly.kernel(program), flow.variation
     random = np.random.default_rng(5)
     with np.errstate(all="ignore"):
-        here = kernel(np.array([now.t]), now.q, now.u, now.a, now.multipliers)[0]
+        here = np.asarray(kernel(np.array([now.t]), now.q, now.u, now.a, now.multipliers)[0])
     pace = float(np.max(np.abs(now.u) / scene.sizes, initial=0.0)) or 1.0
     for _ in range(_WAYS):
         by = _ASIDE * scene.displacement_sizes * random.uniform(-1.0, 1.0, len(scene.tangents))
@@ -57,7 +57,7 @@ def refuse_switches(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> None
         try:
             for sign in (1.0, -1.0):
                 q, u = scene.tangents.moved(now.q, sign * by), now.u + sign * faster
-                there = kernel(np.array([now.t + sign * _ASIDE / pace]), q, u, now.a, now.multipliers)[0]
+                there = np.asarray(kernel(np.array([now.t + sign * _ASIDE / pace]), q, u, now.a, now.multipliers)[0])
                 sides.append((there, scene.flow(now.t + sign * _ASIDE / pace, q, u, kept)))
         except (AtwoodError, ArithmeticError):
             continue

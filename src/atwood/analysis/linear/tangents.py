@@ -12,7 +12,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.topology.charts import Chart
+from atwood.topology.orientation_coordinates import OrientationCoordinates
 
 __all__ = ["Tangents", "find_tangents"]
 
@@ -37,7 +37,7 @@ class Tangents:
     names: tuple[str, ...]
     units: tuple[str, ...]
     plain: tuple[tuple[int, int], ...]
-    charts: tuple[tuple[Chart, tuple[int, ...]], ...]
+    charts: tuple[tuple[OrientationCoordinates, tuple[int, ...]], ...]
 
     def __len__(self) -> int:
         return len(self.names)
@@ -86,12 +86,12 @@ def _block(own: FloatArray) -> FloatArray:
 
 def find_tangents(equations: Equations) -> Tangents:
     """Return the displacements of the coordinates of a set of equations, whose orientations are quaternions."""
-    of_chart = {chart.coordinates[0]: chart for chart in equations.charts}
-    inside = {i for chart in equations.charts for i in chart.coordinates}
+    of_chart = {chart.coordinates[0]: chart for chart in equations.orientation_coordinates}
+    inside = {i for chart in equations.orientation_coordinates for i in chart.coordinates}
     names: list[str] = []
     units: list[str] = []
     plain: list[tuple[int, int]] = []
-    charts: list[tuple[Chart, tuple[int, ...]]] = []
+    charts: list[tuple[OrientationCoordinates, tuple[int, ...]]] = []
     for i, one in enumerate(equations.names):
         if i not in inside:
             plain.append((i, len(names)))

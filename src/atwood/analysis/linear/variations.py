@@ -1,8 +1,8 @@
 """First variations of the equations of motion about a state, by derivatives of the expression graph.
 
 The equations ``F(t, q, u, a, w) = G^T lambda``, the constraints' values, rates ``c1`` and second derivatives ``c2``,
-and the coordinates' rates are differentiated by displacements, speeds, time and inputs; no differences are taken. What is
-found solves for the variations of accelerations and multipliers as the equations themselves do:
+and the coordinates' rates are differentiated by displacements, speeds, time and inputs; no differences are taken. They
+give the variations of accelerations and multipliers as the equations themselves do:
 
     M da - G^T dlambda = -(F_s ds + F_u du + F_t dt + F_w dw),    G da = -(c2_s ds + c2_u du + c2_t dt + c2_w dw).
 """
@@ -210,6 +210,11 @@ class LinearScene:
             numbers[place[name]] = value
         found.__dict__["_kernel"] = self.assembly.compiled(self._program).bind(numbers)
         return found
+
+    @property
+    def depends_on_time(self) -> bool:
+        """Whether time appears in the equations."""
+        return any(len(part.places["t"].entries) > 0 for part in self._parts if "t" in part.places)
 
     def disturbed(self, random: np.random.Generator) -> LinearScene:
         """Return the same with parameters that are off by a little more than rounding."""

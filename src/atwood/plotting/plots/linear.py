@@ -1,0 +1,198 @@
+"""Pictures of linear models: frequency responses, root loci, modes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from atwood.arguments import FILE, instance, number, optional, takes, whole
+from atwood.arguments import each as several
+from atwood.arrays import FloatArray
+from atwood.errors import UsageError
+from atwood.linearization import LinearModel, NormalModes, RootLocus
+from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
+from atwood.plotting.drawing import plot_mechanism
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["plot_bode", "plot_mode", "plot_nyquist", "plot_root_locus"]
+
+_POINTS = 600
+
+_FREQUENCIES = optional(several(number(above=0.0), "angular frequencies above 0, rad/s", 2))
+_MODEL = instance("a LinearModel, as linearize returns it", LinearModel)
+
+
+def _frequencies(model: LinearModel, given: Iterable[float] | None) -> FloatArray:
+    """Return angular frequencies that show all poles and zeros, unless some are given."""
+    if given is not None:
+        return np.array(sorted(given), dtype=float)
+    sizes = np.abs(model.spectrum.others)
+    sizes = sizes[sizes > 0.0]
+    low, high = (float(np.min(sizes)), float(np.max(sizes))) if len(sizes) else (1.0, 1.0)
+    return np.asarray(np.geomspace(0.05 * low, 20.0 * high, _POINTS))
+
+
+def _pairs(model: LinearModel) -> list[tuple[int, int, str]]:
+    if not model.inputs or not model.outputs:
+        raise UsageError(
+            "a frequency response needs an input and an output",
+            where=model.scene,
+            advice="Give both to `linearize`.",
+        )
+    return [
+        (i, j, f"{output} by {given}") for i, output in enumerate(model.outputs) for j, given in enumerate(model.inputs)
+    ]
+
+
+@takes(model=_MODEL, file=optional(FILE), angular_frequencies=_FREQUENCIES)
+def plot_bode(
+    model: LinearModel,
+    file: str | os.PathLike[str] | None = None,
+    angular_frequencies: Iterable[float] | None = None,
+) -> Figure:
+    """Draw gain and phase over the angular frequency, one curve for each pair of output and input.
+
+    Parameters
+    ----------
+    model
+        What `atwood.linearize` gave, with inputs and outputs.
+    file
+        Where to save the picture.
+    angular_frequencies
+        rad/s; so that all poles are seen if not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+
+    Raises
+    ------
+    UsageError
+        If the model has no input or no output.
+    """
+    pairs, omega = _pairs(model), _frequencies(model, angular_frequencies)
+    response = model.frequency_response(omega)
+    figure = new_figure(7.0, 5.4)
+    above, below = figure.subplots(2, 1, sharex=True)
+    for (i, j, label), colour in zip(pairs, _colours(len(pairs)), strict=True):
+        own = response[:, i, j]
+        above.plot(omega, 20.0 * np.log10(np.maximum(np.abs(own), 1e-300)), color=colour, linewidth=1.6, label=label)
+        below.plot(omega, np.degrees(np.unwrap(np.angle(own))), color=colour, linewidth=1.6)
+    above.set_xscale("log")
+    polish(above, "", "gain, dB of SI units")
+    polish(below, "angular frequency, rad/s", "phase, deg")
+    above.legend(frameon=False, fontsize=9, labelcolor=INK)
+    above.set_title(f"{model.scene}: frequency response", loc="left", fontsize=11, fontweight="bold", color=INK)
+    return _finished(figure, file)
+
+
+@takes(model=_MODEL, file=optional(FILE), angular_frequencies=_FREQUENCIES)
+def plot_nyquist(
+    model: LinearModel,
+    file: str | os.PathLike[str] | None = None,
+    angular_frequencies: Iterable[float] | None = None,
+) -> Figure:
+    """Draw the frequency response in the complex plane; see `plot_bode`."""
+    pairs, omega = _pairs(model), _frequencies(model, angular_frequencies)
+    response = model.frequency_response(omega)
+    figure = new_figure(5.6, 5.2)
+    axes = figure.subplots()
+    for (i, j, label), colour in zip(pairs, _colours(len(pairs)), strict=True):
+        own = response[:, i, j]
+        axes.plot(own.real, own.imag, color=colour, linewidth=1.6, label=label)
+        axes.plot(own.real, -own.imag, color=colour, linewidth=1.0, linestyle=":")
+    axes.plot([-1.0], [0.0], marker="+", color=INK, markersize=9, linestyle="none")
+    polish(axes, "real part", "imaginary part")
+    axes.legend(frameon=False, fontsize=9, labelcolor=INK)
+    axes.set_title(f"{model.scene}: Nyquist diagram", loc="left", fontsize=11, fontweight="bold", color=INK)
+    return _finished(figure, file)
+
+
+@takes(locus=instance("a RootLocus, as root_locus returns it", RootLocus), file=optional(FILE), scale=number())
+def plot_root_locus(locus: RootLocus, file: str | os.PathLike[str] | None = None, scale: float = 1.0) -> Figure:
+    """Draw eigenvalues over what changes, and in the complex plane.
+
+    Parameters
+    ----------
+    locus
+        What `atwood.root_locus` gave.
+    file
+        Where to save the picture.
+    scale
+        What the values are multiplied by along the axis, such as a wheel's radius.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    figure = new_figure(9.4, 4.4)
+    left, right = figure.subplots(1, 2)
+    values = scale * locus.values
+    for k in range(locus.eigenvalues.shape[1]):
+        own, colour = locus.eigenvalues[:, k], COLOURS[k % len(COLOURS)]
+        if not np.any(own):
+            continue
+        left.plot(values, own.real, color=colour, linewidth=1.6)
+        moving = np.abs(own.imag) > 1e-9 * np.max(np.abs(own))
+        left.plot(values, np.where(moving, np.abs(own.imag), np.nan), color=colour, linewidth=1.1, linestyle="--")
+        right.plot(own.real, own.imag, color=colour, linewidth=1.6)
+        right.plot(own.real[-1:], own.imag[-1:], color=colour, marker="o", markersize=4)
+    for axes in (left, right):
+        (axes.axhline if axes is left else axes.axvline)(0.0, color=GREY, linewidth=0.9)
+    polish(left, locus.path + (f" x {scale:g}" if scale != 1.0 else ""), "real part; imaginary part dashed, 1/s")
+    polish(right, "real part, 1/s", "imaginary part, 1/s")
+    left.set_title(f"{locus.scene}: eigenvalues", loc="left", fontsize=11, fontweight="bold", color=INK)
+    return _finished(figure, file)
+
+
+@takes(
+    modes=instance("NormalModes, as normal_modes returns them", NormalModes),
+    mode=whole("the number of a mode", 0),
+    file=optional(FILE),
+)
+def plot_mode(modes: NormalModes, mode: int = 0, file: str | os.PathLike[str] | None = None) -> Figure:
+    """Draw the mechanism at both ends of a mode's swing and in the middle.
+
+    Parameters
+    ----------
+    modes
+        What `atwood.normal_modes` gave.
+    mode
+        Number of the mode.
+    file
+        Where to save the picture; `NormalModes.motion` gives what `atwood.animate` moves.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    motion = modes.motion(mode)
+    last = float(motion.time[-1] - motion.time[0])
+    times = [float(motion.time[0]) + share * last for share in (0.5, 0.25, 0.0)]
+    figure = plot_mechanism(motion, times=sorted(times))
+    omega, growth = modes.angular_frequencies[mode], modes.growth_rates[mode]
+    figure.suptitle(
+        f"{modes.scene}, mode {mode}: {omega:.5g} rad/s" + (f", growth {growth:.4g} 1/s" if growth else ""),
+        fontsize=11,
+        fontweight="bold",
+        color=INK,
+    )
+    return _finished(figure, file)
+
+
+def _colours(count: int) -> list[str]:
+    return [COLOURS[k % len(COLOURS)] for k in range(count)]
+
+
+def _finished(figure: Figure, file: str | os.PathLike[str] | None) -> Figure:
+    if file is not None:
+        save_figure(figure, file)
+    return figure
