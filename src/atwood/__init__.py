@@ -93,6 +93,8 @@ if TYPE_CHECKING:
     from atwood.model.compose.serialization import from_data, load_scene, save_scene, to_data
     from atwood.pipeline import Assembly, assemble, simulate
     from atwood.plotting.drawing import animate, plot_mechanism
+    from atwood.plotting.mode_shapes import plot_mode
+    from atwood.plotting.plots.linear import plot_bode, plot_nyquist, plot_root_locus
     from atwood.plotting.plots.precision import plot_comparison
     from atwood.plotting.plots.quantities import plot
     from atwood.plotting.plots.sweep import plot_sweep
@@ -199,8 +201,12 @@ __all__ = [
     "observable",
     "parameter",
     "plot",
+    "plot_bode",
     "plot_comparison",
     "plot_mechanism",
+    "plot_mode",
+    "plot_nyquist",
+    "plot_root_locus",
     "plot_sweep",
     "potential",
     "report",
@@ -254,8 +260,12 @@ _LATER = {
     "load_scene": "atwood.model.compose.serialization",
     "normal_modes": "atwood.linearization",
     "plot": "atwood.plotting",
+    "plot_bode": "atwood.plotting.plots.linear",
     "plot_comparison": "atwood.plotting",
     "plot_mechanism": "atwood.plotting",
+    "plot_mode": "atwood.plotting.mode_shapes",
+    "plot_nyquist": "atwood.plotting.plots.linear",
+    "plot_root_locus": "atwood.plotting.plots.linear",
     "plot_sweep": "atwood.plotting",
     "report": "atwood.reporting",
     "root_locus": "atwood.linearization",

@@ -61,6 +61,9 @@ def main() -> None:
     atwood run double-pendulum           its motion and its forces
     atwood compare double-pendulum       what each form costs for which error
     atwood sweep double-pendulum --vary mass2=0.5:2:16
+    atwood equilibria pendulum-on-cart   where it can stay at rest, and whether it does
+    atwood modes double-pendulum         frequencies and shapes of small oscillations
+    atwood linearize pendulum-on-cart    its linear model, for control
     atwood check my_parts.py             whether components of one's own are sound
     """  # noqa: D301 - click reads the backspace, not the two letters
 
@@ -250,6 +253,68 @@ def sweep_command(scene: str, as_json: bool, **options: Any) -> None:
     from atwood.cli.sweeping import SweepRequest, sweep_scene
 
     sweep_scene(SweepRequest(scene=scene, as_json=as_json, **options))
+
+
+def _state_options(function: F) -> F:
+    """Add the scene, its parameters, and the state about which it is looked at."""
+    for option in (
+        click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output."),
+        click.option(
+            "--at", multiple=True, metavar="PATH=VALUE",
+            help="The state, such as rod.angle='180 deg' or wheel.angular_velocity=3: speeds that are not named are "
+            "zero. The scene's own start if not given. Can be repeated.",
+        ),
+        click.option(
+            "--set", "settings", multiple=True, metavar="PATH=VALUE",
+            help="Parameter, such as rod1.length='30 cm'. Can be repeated.",
+        ),
+        click.argument("scene"),
+    ):  # fmt: skip
+        function = option(function)
+    return function
+
+
+@main.command("linearize", short_help="Show the linear model of a scene about a state.", epilog=_SCENE_HELP)
+@_state_options
+@click.option("--input", "inputs", multiple=True, metavar="PATH", help="Input, such as push.value. Can be repeated.")
+@click.option("--output", "outputs", multiple=True, metavar="PATH", help="Quantity, such as bob.position.x.")
+@click.option("--form", type=_FORM, default="reduced", show_default=True, help="Whose equations are linearised.")
+@click.option("--bode", type=_FILE, help="Save gain and phase over the frequency (.png, .svg, .pdf).")
+@reporting_errors
+def linearize_command(scene: str, **options: Any) -> None:
+    """Show A, B, C, D and the eigenvalues of SCENE about rest or a steady motion."""
+    from atwood.cli.linear import show_linear_model
+
+    show_linear_model(scene, **options)
+
+
+@main.command("modes", short_help="Show the frequencies and shapes of small oscillations.", epilog=_SCENE_HELP)
+@_state_options
+@click.option("--plot", type=_FILE, help="Save a picture of each mode, numbered (.png, .svg, .pdf).")
+@reporting_errors
+def modes_command(scene: str, **options: Any) -> None:
+    """Show the normal modes of SCENE: about its start if it is at rest there, else about its stable equilibria."""
+    from atwood.cli.linear import show_modes
+
+    show_modes(scene, **options)
+
+
+@main.command("equilibria", short_help="Find where a scene can stay at rest.", epilog=_SCENE_HELP)
+@click.argument("scene")
+@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Parameter. Can be repeated.")
+@click.option(
+    "--region",
+    multiple=True,
+    metavar="PATH=FROM:TO",
+    help="Where to look, such as rod.angle=-90deg:90deg; everywhere if not given. Can be repeated.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output.")
+@reporting_errors
+def equilibria_command(scene: str, **options: Any) -> None:
+    """Find the equilibria of SCENE, and whether they are stable."""
+    from atwood.cli.linear import show_equilibria
+
+    show_equilibria(scene, **options)
 
 
 @main.command("check", short_help="Check components of one's own.")

@@ -20,7 +20,7 @@ from atwood.analysis.linear.spectrum import Spectrum, find_spectrum
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.errors import UsageError
 
-__all__ = ["LinearModel"]
+__all__ = ["LinearModel", "complex_text"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +87,11 @@ class LinearModel:
     def is_stable(self) -> bool:
         """Whether no eigenvalue has a positive real part beyond rounding."""
         return not bool(np.any(self.spectrum.others.real > _GROWING * self._fastest))
+
+    @property
+    def kind(self) -> str:
+        """What the state is, in words."""
+        return _ABOUT[self.about]
 
     @property
     def _fastest(self) -> float:
@@ -188,12 +193,12 @@ class LinearModel:
         }
 
     def __str__(self) -> str:
-        head = f"{self.scene} ({self.form}), linear about a {_ABOUT[self.about]}"
+        head = f"{self.scene} ({self.form}), linear about a {self.kind}"
         lines = [head, "states: " + _listed(self.states)]
         lines += [
             f"{kind}: {_listed(own)}" for kind, own in (("inputs", self.inputs), ("outputs", self.outputs)) if own
         ]
-        lines.append("eigenvalues, 1/s: " + _listed([_complex(v) for v in self.spectrum.others], 8))
+        lines.append("eigenvalues, 1/s: " + _listed([complex_text(v) for v in self.spectrum.others], 8))
         if self.spectrum.zeros:
             lines[-1] += f"{'; and ' * bool(len(self.spectrum.others))}{self.spectrum.zeros} times 0"
         return "\n".join(lines)
@@ -207,7 +212,8 @@ _GROWING = 1e-9
 _ABOUT = {"rest": "state of rest", "steady motion": "steady motion", "motion": "state of a motion"}
 
 
-def _complex(value: complex) -> str:
+def complex_text(value: complex) -> str:
+    """Return a complex number as it is written."""
     if value.imag == 0.0:
         return f"{value.real:.6g}"
     real = f"{value.real:.6g} " if abs(value.real) > _GROWING * abs(value) else ""

@@ -58,6 +58,5 @@ def mode_motion(
         else np.zeros((len(still), frames)),
         shown=np.ones(frames, dtype=bool),
         held=np.zeros((2, frames)),
-        passages=(),
     )  # fmt: skip
     return Result(replace(begun, segments=(segment,)))

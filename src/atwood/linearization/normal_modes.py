@@ -22,7 +22,7 @@ from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
 from atwood.result.result import Result
 
-__all__ = ["NormalModes", "normal_modes"]
+__all__ = ["NormalModes", "modes_of", "normal_modes", "shape_text"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ class NormalModes:
         lines.append(f"{'mode':>4} {'omega, rad/s':>14} {'growth, 1/s':>12}   shape")
         for k, shape in enumerate(self.shapes[:_SHOWN]):
             text = f"{k:>4} {self.angular_frequencies[k]:>14.6g} {self.growth_rates[k]:>12.4g}"
-            lines.append(f"{text}   {_shape_text(shape)}")
+            lines.append(f"{text}   {shape_text(shape)}")
         if len(self) > _SHOWN:
             lines.append(f"... and {len(self) - _SHOWN} more")
         return "\n".join(lines)
@@ -131,7 +131,8 @@ def _state(values: Mapping[str, float]) -> str:
     return ", ".join(shown) + (", ..." if len(values) > 3 else "")
 
 
-def _shape_text(shape: Mapping[str, complex], most: int = 4) -> str:
+def shape_text(shape: Mapping[str, complex], most: int = 4) -> str:
+    """Return the amplitudes of a mode in a line."""
     parts = [f"{path} {_short(value)}" for path, value in shape.items() if abs(value) > 1e-6]
     return ", ".join(parts[:most]) + (", ..." if len(parts) > most else "")
 

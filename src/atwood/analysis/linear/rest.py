@@ -68,7 +68,10 @@ def slopes_at(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> tuple[Mini
     columns = scene.displacement_sizes[list(minimal.displacements)]
     slopes = by * columns / own[:, None]
     accelerations = flow.variation.a[list(minimal.speeds)] / own
-    return minimal, accelerations, slopes
+    # States of parts, such as that of a controller, must keep still as well.
+    alone = [k for i, k in scene.tangents.plain if i >= scene.equations.placing]
+    slopes = np.vstack([slopes, (flow.shift[alone, :count] @ minimal.shift[:, :n]) * columns])
+    return minimal, np.concatenate([accelerations, flow.variation.displacement_rates[alone]]), slopes
 
 
 def seek_rest(

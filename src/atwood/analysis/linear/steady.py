@@ -143,7 +143,7 @@ def _pace(scene: LinearScene, flow: Flow) -> float:
 def _near_by(scene: LinearScene, flow: Flow, kept: Sequence[int], pace: float) -> list[Flow]:
     """Return the flow at random states around one; where a law has no value another is taken."""
     random = np.random.default_rng(19180717)  # the year of Noether's theorem
-    now, found = flow.variation, []
+    now, found = flow.variation, list[Flow]()
     for _ in range(5 * _STATES):
         reach = _REACH * 0.7 ** len(found)
         aside = reach * scene.displacement_sizes * random.uniform(-1.0, 1.0, len(scene.tangents))
@@ -298,7 +298,7 @@ def _in_body(quaternion: FloatArray, axis: FloatArray) -> FloatArray:
 
 def _own_rotations(scene: LinearScene) -> list[_Field]:
     """Return rotations of bodies about axes of their own, of which only the body's own velocities know."""
-    found = []
+    found: list[_Field] = []
     size, count = len(scene.tangents) + len(scene.sizes), len(scene.tangents)
     for chart, numbers in scene.tangents.charts:
         if chart.kind != "quaternion":

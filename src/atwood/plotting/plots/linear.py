@@ -1,4 +1,4 @@
-"""Pictures of linear models: frequency responses, root loci, modes."""
+"""Pictures of linear models: frequency responses and root loci."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from atwood.arguments import FILE, instance, number, optional, takes, whole
+from atwood.arguments import FILE, instance, number, optional, takes
 from atwood.arguments import each as several
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.linearization import LinearModel, NormalModes, RootLocus
+from atwood.linearization import LinearModel, RootLocus
 from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
-from atwood.plotting.drawing import plot_mechanism
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_bode", "plot_mode", "plot_nyquist", "plot_root_locus"]
+__all__ = ["plot_bode", "plot_nyquist", "plot_root_locus"]
 
 _POINTS = 600
 
@@ -149,42 +148,6 @@ def plot_root_locus(locus: RootLocus, file: str | os.PathLike[str] | None = None
     polish(left, locus.path + (f" x {scale:g}" if scale != 1.0 else ""), "real part; imaginary part dashed, 1/s")
     polish(right, "real part, 1/s", "imaginary part, 1/s")
     left.set_title(f"{locus.scene}: eigenvalues", loc="left", fontsize=11, fontweight="bold", color=INK)
-    return _finished(figure, file)
-
-
-@takes(
-    modes=instance("NormalModes, as normal_modes returns them", NormalModes),
-    mode=whole("the number of a mode", 0),
-    file=optional(FILE),
-)
-def plot_mode(modes: NormalModes, mode: int = 0, file: str | os.PathLike[str] | None = None) -> Figure:
-    """Draw the mechanism at both ends of a mode's swing and in the middle.
-
-    Parameters
-    ----------
-    modes
-        What `atwood.normal_modes` gave.
-    mode
-        Number of the mode.
-    file
-        Where to save the picture; `NormalModes.motion` gives what `atwood.animate` moves.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure.
-    """
-    motion = modes.motion(mode)
-    last = float(motion.time[-1] - motion.time[0])
-    times = [float(motion.time[0]) + share * last for share in (0.5, 0.25, 0.0)]
-    figure = plot_mechanism(motion, times=sorted(times))
-    omega, growth = modes.angular_frequencies[mode], modes.growth_rates[mode]
-    figure.suptitle(
-        f"{modes.scene}, mode {mode}: {omega:.5g} rad/s" + (f", growth {growth:.4g} 1/s" if growth else ""),
-        fontsize=11,
-        fontweight="bold",
-        color=INK,
-    )
     return _finished(figure, file)
 
 

@@ -1,0 +1,186 @@
+"""`atwood linearize`, `atwood modes` and `atwood equilibria`: what the equations say near a state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from atwood.cli.output import print_json, warn, writer
+from atwood.cli.scenes import pairs, prepare, warn_of_radians
+from atwood.errors import UsageError
+
+if TYPE_CHECKING:
+    from atwood.linearization import LinearModel, NormalModes
+    from atwood.model.compose.composite import Model
+
+__all__ = ["show_equilibria", "show_linear_model", "show_modes"]
+
+
+def _state(scene: Model, texts: Sequence[str]) -> dict[str, str] | None:
+    """Return the values of ``--at``; None if there are none, for the scene's own start."""
+    if not texts:
+        return None
+    found = dict(pairs(texts, "--at"))
+    for path, value in found.items():
+        warn_of_radians(scene, path, [value], "--at")
+    return {} if found == {"rest": "yes"} else found
+
+
+def show_linear_model(
+    scene: str,
+    settings: Sequence[str],
+    at: Sequence[str],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    form: str,
+    bode: Path | None,
+    as_json: bool,
+) -> None:
+    """Show the linear model of a scene; see the options of `atwood linearize`."""
+    from atwood.linearization import linearize
+
+    model, name = prepare(scene, settings, ())
+    found = linearize(model, at=_state(model, at), inputs=inputs, outputs=outputs, form=form)
+    if bode is not None:
+        from atwood.plotting.plots.linear import plot_bode
+
+        plot_bode(found, bode)
+    if as_json:
+        print_json({**found.to_data(), "scene": name})
+        return
+    _print_model(found, name)
+    if bode is not None:
+        writer().line((f"plotted: {bode}", "dim"))
+
+
+def _print_model(found: LinearModel, name: str) -> None:
+    from atwood.linearization.linear_model import complex_text
+
+    out = writer()
+    out.line((name, "bold"), (f" ({found.form}), linear about a {found.kind}", ""))
+    stable = "no deviation grows" if found.is_stable else "some deviations grow"
+    zeros = f"; {found.spectrum.zeros} times 0" if found.spectrum.zeros else ""
+    out.pairs(
+        [
+            ("states", ", ".join(found.states)),
+            ("inputs", ", ".join(found.inputs) or "none: name some with --input"),
+            ("outputs", ", ".join(found.outputs) or "none: name some with --output"),
+            ("eigenvalues", ", ".join(complex_text(value) for value in found.spectrum.others) + f" 1/s{zeros}"),
+            ("stability", stable),
+        ]
+    )
+    if len(found.states) <= _SHOWN:
+        for matrix, rows, columns in (
+            ("A", found.states, found.states),
+            ("B", found.states, found.inputs),
+            ("C", found.outputs, found.states),
+            ("D", found.outputs, found.inputs),
+        ):
+            if rows and columns:
+                entries = getattr(found, matrix)
+                out.line(("", ""))
+                out.table(
+                    [matrix, *(f"{one}>" for one in columns)],
+                    [[row, *(f"{x:.6g}" for x in values)] for row, values in zip(rows, entries, strict=True)],
+                )
+    else:
+        out.line((f"Matrices of {len(found.states)} states: --json writes them.", "dim"))
+
+
+_SHOWN = 8
+"""Matrices of more states are not shown on a terminal."""
+
+
+def show_modes(scene: str, settings: Sequence[str], at: Sequence[str], plot: Path | None, as_json: bool) -> None:
+    """Show the normal modes of a scene; see the options of `atwood modes`."""
+    from atwood.linearization import equilibria, normal_modes
+
+    model, name = prepare(scene, settings, ())
+    state = _state(model, at)
+    if state is None:
+        try:
+            found = [normal_modes(model)]
+        except UsageError as error:
+            found = [one.modes for one in equilibria(model) if one.stable]
+            if not found:
+                raise error
+    else:
+        found = [normal_modes(model, at=state)]
+    if plot is not None:
+        _plot_modes(found[0], plot)
+    if as_json:
+        print_json({"scene": name, "modes": [one.to_data() for one in found]})
+        return
+    for one in found:
+        _print_modes(one, name)
+    if plot is not None:
+        writer().line((f"plotted: {plot}", "dim"))
+
+
+def _plot_modes(found: NormalModes, file: Path) -> None:
+    """Draw every mode in a picture of its own: numbered, where there are several."""
+    from atwood.plotting.mode_shapes import plot_mode
+
+    if len(found) > _PICTURES:
+        warn(f"only the first {_PICTURES} of {len(found)} modes are drawn")
+    for mode in range(min(len(found), _PICTURES)):
+        target = file if len(found) == 1 else file.with_name(f"{file.stem}-{mode}{file.suffix}")
+        plot_mode(found, mode, target)
+
+
+_PICTURES = 12
+
+
+def _print_modes(found: NormalModes, name: str) -> None:
+    from atwood.linearization.normal_modes import shape_text
+
+    out = writer()
+    out.line((name, "bold"), (f": {len(found)} modes about {_values(found.values)}", ""))
+    rows = []
+    for k, shape in enumerate(found.shapes):
+        omega, growth = found.angular_frequencies[k], found.growth_rates[k]
+        rows.append([str(k), f"{omega:.9g}", f"{found.frequencies[k]:.6g}", f"{growth:.6g}", shape_text(shape)])
+    out.table(["mode", "rad/s>", "Hz>", "growth, 1/s>", "shape"], rows)
+    for group in found.spaces:
+        if len(group) > 1:
+            text = ", ".join(map(str, group))
+            out.line((f"Modes {text} have equal eigenvalues: any combination of them is a mode.", "dim"))
+
+
+def _values(values: Mapping[str, float], most: int = 6) -> str:
+    shown = [f"{path} = {value:.6g}" for path, value in list(values.items())[:most]]
+    return ", ".join(shown) + (", ..." if len(values) > most else "")
+
+
+def show_equilibria(scene: str, settings: Sequence[str], region: Sequence[str], as_json: bool) -> None:
+    """Show the equilibria of a scene; see the options of `atwood equilibria`."""
+    from atwood.linearization import equilibria
+
+    model, name = prepare(scene, settings, ())
+    bounds: dict[str, Any] = {}
+    for path, text in pairs(region, "--region"):
+        low, colon, high = text.partition(":")
+        if not colon:
+            raise UsageError(
+                f"{text!r} is no region", where=path, advice="Write --region PATH=FROM:TO, as rod.angle=-90deg:90deg."
+            )
+        unit = "".join(character for character in high if character.isalpha())
+        bounds[path] = (_number(low, unit), _number(high, unit))
+    found = equilibria(model, region=bounds or None)
+    if as_json:
+        print_json({"scene": name, "equilibria": found.to_data()})
+        return
+    out = writer()
+    out.line((name, "bold"), (f": {len(found)} equilibri{'um' if len(found) == 1 else 'a'}", ""))
+    rows = [["stable" if one.stable else "unstable", f"{one.growth_rate:.6g}", _values(one.values)] for one in found]
+    out.table(["", "growth, 1/s>", "where"], rows)
+
+
+def _number(text: str, unit: str) -> float | str:
+    """Return one end of a region: text where it has a unit, which the other end may lack."""
+    text = text.strip()
+    try:
+        return float(text) if not unit else f"{float(text)} {unit}"
+    except ValueError:
+        return text
