@@ -72,6 +72,7 @@ def roots(tmp_path_factory) -> dict[str, object]:
     scene = Chain(links=30)
     result = atwood.simulate(scene, t_end=0.2, outputs=400)
     angles = {"rod[0].angle": np.linspace(0.0, 1.0, 40)}
+    hanging = {path: 0.0 for path in scene.start if path.endswith("angle")}
     return {
         "scene": scene,
         "result": result,
@@ -84,6 +85,12 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "comparison": atwood.compare(FourBar(), rtols=[1e-4, 1e-6], t_end=0.2),
         "sweep": atwood.sweep(scene, start=angles, t_end=0.1, outputs=30),
         "check": atwood.check(Rod),
+        "linear": atwood.linearize(scene, at=hanging, inputs=[], outputs=["bob[0].position.x"]),
+        "modes": atwood.normal_modes(scene, at=hanging),
+        "equilibria": list(atwood.equilibria(DoublePendulum())),
+        "equilibria of a loop": atwood.equilibria(FourBar()),
+        "trim": atwood.trim(scene, at=hanging),
+        "locus": atwood.root_locus(scene, "gravity", [9.0, 10.0, 11.0], at=hanging),
         "declared": _declared(),
         "box": atwood.solids.box(1.0, 2.0, 3.0, density=1e3),
     }

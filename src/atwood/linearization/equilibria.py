@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,13 @@ from atwood.arguments import BY_PATH, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, ParameterError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.linearization.normal_modes import NormalModes, modes_of
 from atwood.linearization.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE
+from atwood.showing import fitted
 from atwood.simulation.dynamics.balance import balance_of
 
 __all__ = ["Equilibria", "Equilibrium", "equilibria"]
@@ -75,7 +77,8 @@ class Equilibria(list[Equilibrium]):
             shown.append(f"... and {len(self) - len(shown)} more")
         return "\n".join([f"{self.scene}: {len(self)} equilibri{'um' if len(self) == 1 else 'a'}", *shown])
 
-    __repr__ = __str__
+    def __repr__(self) -> str:
+        return fitted(str(self))
 
 
 @takes(scene=SCENE, region=optional(BY_PATH))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,8 @@ from atwood.analysis.linear.realization import (
 from atwood.analysis.linear.spectrum import Spectrum, find_spectrum
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.errors import UsageError
+from atwood.late import dataclass
+from atwood.showing import fitted
 
 __all__ = ["LinearModel", "complex_text"]
 
@@ -203,7 +205,8 @@ class LinearModel:
             lines[-1] += f"{'; and ' * bool(len(self.spectrum.others))}{self.spectrum.zeros} times 0"
         return "\n".join(lines)
 
-    __repr__ = __str__
+    def __repr__(self) -> str:
+        return fitted(str(self))
 
 
 _GROWING = 1e-9

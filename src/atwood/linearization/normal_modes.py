@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -15,12 +15,14 @@ from atwood.analysis.linear.switches import refuse_switches
 from atwood.arguments import check, takes, whole
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.linearization.linearize import not_steady
 from atwood.linearization.mode_motion import mode_motion
 from atwood.linearization.operating_point import AT, At, OperatingPoint, find_operating_point, values_at
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
 from atwood.result.result import Result
+from atwood.showing import fitted
 
 __all__ = ["NormalModes", "modes_of", "normal_modes", "shape_text"]
 
@@ -120,7 +122,8 @@ class NormalModes:
             lines.append(f"... and {len(self) - _SHOWN} more")
         return "\n".join(lines)
 
-    __repr__ = __str__
+    def __repr__(self) -> str:
+        return fitted(str(self))
 
 
 _SHOWN = 7

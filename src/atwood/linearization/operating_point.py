@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from atwood.arguments import Kind, Refused
 from atwood.arrays import FloatArray
 from atwood.errors import ParameterError, StartError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.laws import variation_names

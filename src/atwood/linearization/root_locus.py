@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,9 +12,11 @@ from atwood.arguments import TEXT, Kind, takes
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.linearization.linearize import linearize
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble
+from atwood.showing import fitted
 
 __all__ = ["RootLocus", "root_locus"]
 
@@ -57,7 +58,8 @@ class RootLocus:
         lines += [f"  stability changes near {self.path} = {value:.6g}" for value in self.crossings()[:6]]
         return "\n".join(lines)
 
-    __repr__ = __str__
+    def __repr__(self) -> str:
+        return fitted(str(self))
 
 
 def _read_values(value: Any) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -11,9 +11,11 @@ from atwood.analysis.linear.rest import slopes_at
 from atwood.arguments import TEXT, each, takes
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.linearization.operating_point import AT, At, OperatingPoint, find_operating_point, moved_to, values_at
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
+from atwood.showing import fitted
 from atwood.simulation.dynamics.balance import balance_of
 
 __all__ = ["Trim", "trim"]
@@ -50,7 +52,8 @@ class Trim:
         lines += [f"  {path} = {value:.9g}" for path, value in list(self.values.items())[:7]]
         return "\n".join(lines)
 
-    __repr__ = __str__
+    def __repr__(self) -> str:
+        return fitted(str(self))
 
 
 @takes(scene=SCENE, at=AT, inputs=each(TEXT, "paths, as a list of texts", single=True), free=each(TEXT, "paths"))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from atwood.analysis.linear.minimal import Minimal
@@ -11,6 +9,7 @@ from atwood.analysis.linear.variations import Flow, LinearScene, Variation
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, jvp
 from atwood.forms.places import to_maximal
+from atwood.late import dataclass
 
 __all__ = ["Image", "image_of", "pulled_back"]
 

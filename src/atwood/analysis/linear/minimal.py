@@ -8,12 +8,12 @@ Design 104, 1982).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from atwood.analysis.linear.variations import Flow, LinearScene
 from atwood.arrays import FloatArray
+from atwood.late import dataclass
 from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates
 
 __all__ = ["Minimal", "find_minimal"]

@@ -7,8 +7,6 @@ problem ``K v = omega^2 M v`` (Goldstein, section 6.2). With damping or gyroscop
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.linalg
 
@@ -16,6 +14,7 @@ from atwood.analysis.linear.spectrum import find_spectrum
 from atwood.analysis.linear.state_space import StateSpace
 from atwood.analysis.linear.variations import Flow
 from atwood.arrays import ComplexArray, FloatArray
+from atwood.late import dataclass
 
 __all__ = ["ModeValues", "find_modes"]
 

@@ -7,7 +7,6 @@ happen, and the derivative is that of the linear model (`LinearScene.flow`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from atwood.analysis.linear.minimal import Minimal, find_minimal
 from atwood.analysis.linear.variations import Flow, LinearScene
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
+from atwood.late import dataclass
 from atwood.simulation.dynamics.balance import Balance
 
 __all__ = ["Rest", "is_at_rest", "same_rest", "seek_rest", "slopes_at"]

@@ -7,12 +7,11 @@ step by step (the staircase form; Golub and Wilkinson, SIAM Review 18, 1976); th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.linalg
 
 from atwood.arrays import ComplexArray, FloatArray
+from atwood.late import dataclass
 
 __all__ = ["Spectrum", "find_spectrum"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from atwood.analysis.linear.steady import Steady
 from atwood.analysis.linear.variations import Flow, LinearScene
 from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
+from atwood.late import dataclass
 from atwood.simulation.dynamics.rank import CERTAIN
 
 __all__ = ["StateSpace", "find_state_space"]

@@ -10,13 +10,13 @@ Mechanics and Symmetry, section 4.1: relative equilibria).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from atwood.analysis.linear.variations import Flow, LinearScene
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
+from atwood.late import dataclass
 
 __all__ = ["Steady", "find_steady", "still"]
 

@@ -6,11 +6,10 @@ its size, which means nothing, does not appear. ``dq = N(q) ds`` with N block by
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.topology.orientation_coordinates import OrientationCoordinates
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -24,6 +23,7 @@ from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import SolveError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, SparseMatrix, jacobian
 from atwood.forms.assembly import Assembly, FormName
+from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
