@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from atwood.arguments import instance, number, optional, takes
@@ -32,6 +33,7 @@ from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.model.local.laws import LocalPart, ParameterTable, localize
 from atwood.model.values.space import make_space
+from atwood.progress import told
 from atwood.result.result import Result
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
 from atwood.simulation.initialization.start import Start, find_start
@@ -249,7 +251,7 @@ def simulate(
     solver: str = "auto",
     samples: int = 400,
     structure: bool = False,
-    progress: Callable[[float], object] | None = None,
+    progress: Callable[[float], object] | bool | None = None,
     until: Any = None,
     record: Any = None,
 ) -> Result:
@@ -283,7 +285,7 @@ def simulate(
     structure
         Whether nothing needs to move: a truss, whose forces are asked for. Otherwise what cannot move is refused.
     progress
-        Called with the time reached, s.
+        Called with the time reached, s; True for a line on standard error that says how far the run is.
     until
         Where the run stops: text such as ``"rod1.angle crosses 30 deg"``, with crosses, rises above or falls below; or
         a function of the scene's quantities by path, ``lambda q: q["bob.position.z"] < -1.0``, which returns a
@@ -312,29 +314,35 @@ def simulate(
         scene if isinstance(scene, Assembly) else assemble(scene, form=form, level=level, orientation=orientation)
     )
     flat = assembly.flat
-    options = RunOptions(
-        t_end=flat.t_end if t_end is None else float(t_end),
-        relative_tolerance=rtol,
-        outputs=outputs,
-        max_steps=max_steps,
-        max_seconds=max_seconds,
-        progress=progress,
-        max_step=max_step,
-        solver=solver,
-        samples=samples,
-        structure=structure,
-        conditions=(
-            *(Condition(one, "stop") for one in _listed(until)),
-            *(Condition(one, "") for one in _listed(record)),
-        ),
-    )
+    end = flat.t_end if t_end is None else float(t_end)
+    with told(progress, flat.name, partial(_share, flat.t_start, end)) as watch:
+        options = RunOptions(
+            t_end=end,
+            relative_tolerance=rtol,
+            outputs=outputs,
+            max_steps=max_steps,
+            max_seconds=max_seconds,
+            progress=watch,
+            max_step=max_step,
+            solver=solver,
+            samples=samples,
+            structure=structure,
+            conditions=(
+                *(Condition(one, "stop") for one in _listed(until)),
+                *(Condition(one, "") for one in _listed(record)),
+            ),
+        )
+        try:
+            with clock.kept(GRACE):
+                assembly, start = _with_line_signs(assembly)
+        except TimeIsUp:
+            return Result(run_out_of_time(assembly, None, options))
+        return Result(run(assembly, start, options, assembly.other_mode, clock))
 
-    try:
-        with clock.kept(GRACE):
-            assembly, start = _with_line_signs(assembly)
-    except TimeIsUp:
-        return Result(run_out_of_time(assembly, None, options))
-    return Result(run(assembly, start, options, assembly.other_mode, clock))
+
+def _share(begin: float, end: float, t: float) -> tuple[float, str]:
+    """Return how much of a run is done at a time, and where it is in words."""
+    return (t - begin) / (end - begin), f"t = {t:.3g} of {end:g} s"
 
 
 def _listed(conditions: Any) -> list[Any]:

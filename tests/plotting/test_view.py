@@ -1,5 +1,6 @@
 """Pictures: that they can be made, and that what is in them is what was asked for."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -124,6 +125,22 @@ def test_animation(results: dict[str, Result], tmp_path: Path) -> None:
     file = animate(results["simple-pendulum"], tmp_path / "run.gif", seconds=0.3, frames_per_second=10)
     with Image.open(file) as picture:
         assert picture.n_frames == 3  # type: ignore[attr-defined]
+
+
+def test_a_notebook_plays_an_animation(results: dict[str, Result], tmp_path: Path) -> None:
+    played = animate(results["simple-pendulum"], seconds=0.2, frames_per_second=10)
+    assert played.gif.startswith(b"GIF8")
+    assert 'src="data:image/gif;base64,R0lGOD' in played._repr_html_()
+    with pytest.raises(TypeError, match="was not saved"):
+        os.fspath(played)
+    saved = animate(results["simple-pendulum"], tmp_path / "run.gif", seconds=0.2, frames_per_second=10)
+    assert Path(saved).read_bytes() == saved.gif
+    assert len(repr(saved)) < 300
+
+
+def test_a_notebook_shows_a_figure_without_a_word(results: dict[str, Result]) -> None:
+    for figure in (plot(results["simple-pendulum"]), plot_mechanism(results["simple-pendulum"])):
+        assert figure._repr_png_().startswith(b"\x89PNG")  # what IPython asks for where no backend was chosen
 
 
 @pytest.mark.parametrize("name", ["picture", "picture.xyz", "missing/picture.png"])

@@ -159,6 +159,13 @@ def test_a_watched_run_can_be_pickled() -> None:
     assert_alike(result, pickle.loads(pickle.dumps(result)))
 
 
+def test_functions_that_a_run_was_watched_for_stay_behind() -> None:
+    result = simulate(DoublePendulum(), t_end=1.0, until=lambda q: q["bob2.position.z"] + 1.0)
+    back = pickle.loads(pickle.dumps(result))
+    assert_alike(result, back)
+    assert back.status == "stopped"
+
+
 def test_a_process_that_begins_anew_takes_an_assembly_and_gives_a_result() -> None:
     assembly = atwood.assemble(DoublePendulum())
     expected = simulate(assembly, t_end=0.5, outputs=21)

@@ -14,7 +14,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["ANIMATED", "COLOURS", "GREY", "INK", "SUFFIXES", "check_picture", "new_figure", "polish", "save_figure"]
+__all__ = [
+    "ANIMATED",
+    "COLOURS",
+    "GREY",
+    "INK",
+    "SUFFIXES",
+    "check_picture",
+    "need_matplotlib",
+    "new_figure",
+    "polish",
+    "save_figure",
+]
 
 COLOURS = ("#2a6fbb", "#d1495b", "#2e9e6b", "#c98a1b", "#7b5ea7", "#3aa6b9", "#8a6d5a", "#d46ba3")
 """Told apart by most readers, and in print."""
@@ -41,7 +52,7 @@ def check_picture(file: str | os.PathLike[str], suffixes: tuple[str, ...] = SUFF
     UsageError
         If matplotlib is missing, the suffix is not known or there is no such directory.
     """
-    _need_matplotlib()
+    need_matplotlib()
     target = Path(file)
     if target.suffix.lower() not in suffixes:
         problem = f"the suffix {target.suffix!r} is not known" if target.suffix else "the name has no suffix"
@@ -49,7 +60,8 @@ def check_picture(file: str | os.PathLike[str], suffixes: tuple[str, ...] = SUFF
     check_directory(target)
 
 
-def _need_matplotlib() -> None:
+def need_matplotlib() -> None:
+    """Refuse a picture where matplotlib is missing."""
     try:
         found = importlib.util.find_spec("matplotlib") is not None
     except ValueError:  # it stands in the table of modules as missing
@@ -59,7 +71,7 @@ def _need_matplotlib() -> None:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure that belongs to no window.
+    """Return an empty figure that belongs to no window, and that notebooks show.
 
     Parameters
     ----------
@@ -71,10 +83,10 @@ def new_figure(width: float, height: float) -> Figure:
     UsageError
         If matplotlib is missing.
     """
-    _need_matplotlib()
-    from matplotlib.figure import Figure
+    need_matplotlib()
+    from atwood.plotting.figure import ShownFigure
 
-    return Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    return ShownFigure(figsize=(width, height), layout="constrained", facecolor="white")
 
 
 def polish(axes: Axes, x_label: str = "", y_label: str = "") -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.files import write_atomically
 from atwood.plotting.camera import View, as_camera, check_view
-from atwood.plotting.canvas import ANIMATED, COLOURS, INK, check_picture, new_figure, save_figure
+from atwood.plotting.canvas import ANIMATED, COLOURS, INK, check_picture, need_matplotlib, new_figure, save_figure
 from atwood.plotting.planar.geometry import Picture, find_connectors, make_picture
 from atwood.plotting.planar.strokes import Pen, draw_trace
 from atwood.plotting.scene3d.drawing import draw_space, frame_space, space_panels
@@ -24,6 +25,8 @@ from atwood.result.result import Result
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from atwood.plotting.figure import Animation
 
 __all__ = ["animate", "plot_mechanism"]
 
@@ -168,7 +171,7 @@ _LONGEST, _MOST = 3600.0, 240
 
 @takes(
     result=RESULT,
-    file=FILE,
+    file=optional(FILE),
     seconds=optional(number("a number of seconds, above 0 and at most an hour", above=0.0, most=_LONGEST)),
     frames_per_second=whole(f"a whole number of frames, 1 to {_MOST}", 1, _MOST),
     view=ANYTHING,
@@ -176,21 +179,21 @@ _LONGEST, _MOST = 3600.0, 240
 )
 def animate(
     result: Result,
-    file: str | os.PathLike[str],
+    file: str | os.PathLike[str] | None = None,
     seconds: float | None = None,
     frames_per_second: int = 25,
     *,
     view: View | None = None,
     trace: str | Sequence[str] = (),
-) -> Path:
-    """Save the motion as an animated picture.
+) -> Animation:
+    """Make an animated picture of the motion; a notebook plays it.
 
     Parameters
     ----------
     result
         The run.
     file
-        Where to (``.gif``).
+        Where to save it (``.gif``).
     seconds
         How long it plays; as long as the run took in its own time when not given, but at most twenty seconds.
     frames_per_second
@@ -200,16 +203,20 @@ def animate(
 
     Returns
     -------
-    Path
-        The file.
+    atwood.plotting.figure.Animation
+        The picture; it can be opened like the path of its file.
 
     Raises
     ------
     UsageError
         If matplotlib is missing, there is no such view or connector, or the file cannot be saved.
     """
-    check_picture(file, ANIMATED)
+    need_matplotlib()
+    if file is not None:
+        check_picture(file, ANIMATED)
     from matplotlib.animation import FuncAnimation, PillowWriter
+
+    from atwood.plotting.figure import Animation
 
     lasting = min(float(result.time[-1] - result.time[0]), 20.0) if seconds is None else seconds
     count = max(2, round(lasting * frames_per_second))
@@ -241,8 +248,15 @@ def animate(
     figure.set_layout_engine("none")
     motion = FuncAnimation(figure, show, frames=count, blit=False)  # type: ignore[arg-type]
     writer = PillowWriter(fps=frames_per_second)
-    write_atomically(Path(file), lambda part: motion.save(str(part), writer=writer, dpi=80))
-    return Path(file)
+    with TemporaryDirectory() as folder:
+        made = Path(folder, "motion.gif")
+        motion.save(str(made), writer=writer, dpi=80)
+        gif = made.read_bytes()
+    if file is None:
+        return Animation(gif)
+    target = Path(file)
+    write_atomically(target, lambda part: part.write_bytes(gif))
+    return Animation(gif, target)
 
 
 def _name(result: Result) -> str:

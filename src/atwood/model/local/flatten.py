@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Mapping
+from types import FrameType
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, StartError, UsageError
@@ -100,7 +102,7 @@ def flatten(scene: Model, name: str | None = None) -> FlatScene:
     scene
         The scene; a plain model is taken as a scene with the usual settings.
     name
-        What to call it; the name of its class otherwise.
+        What to call it; the name of its class otherwise, or of its variable where it is a plain `Scene`.
 
     Raises
     ------
@@ -119,12 +121,12 @@ def flatten(scene: Model, name: str | None = None) -> FlatScene:
     guess: dict[str, float] = {}
     _collect(scene, leaves, joined, start, guess)
     if not leaves:
-        where, advice = name or type(scene).__name__, "Add some: scene.add('bob', PointMass())."
+        where, advice = name or title(scene), "Add some: scene.add('bob', PointMass())."
         raise DeclarationError("the scene has no parts", where=where, advice=advice)
     connections, links = _split_links(scene, joined, leaves)
     settings = scene if isinstance(scene, Scene) else Scene()
     return FlatScene(
-        name=name or type(scene).__name__,
+        name=name or title(scene),
         space=settings.space,
         line_axis=_unit_vector(settings.line_axis),
         gravity=settings.gravity,
@@ -138,6 +140,34 @@ def flatten(scene: Model, name: str | None = None) -> FlatScene:
         start=start,
         guess=guess,
     )
+
+
+def title(scene: Model) -> str:
+    """Return what to call a scene: the name of its class, or of its variable where the class says nothing.
+
+    The variable is that of the nearest caller outside of Atwood who has one, unless it only says what the scene is, as
+    ``scene`` does.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    """
+    kind = type(scene).__name__
+    if type(scene) not in (Scene, Model):
+        return kind
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        if str(frame.f_globals.get("__name__", "")).partition(".")[0] != "atwood":
+            for name, value in frame.f_locals.items():
+                if value is scene and name.isidentifier() and name.lower() not in _GENERIC and name[0] != "_":
+                    return name
+        frame = frame.f_back
+    return kind
+
+
+_GENERIC = ("scene", "model", "self", "made", "result", "mechanism", "system")
+"""Names of variables that say no more than the class."""
 
 
 def _collect(

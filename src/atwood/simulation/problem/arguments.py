@@ -103,7 +103,7 @@ LIMITS = {
 }
 SAMPLES = whole(f"a whole number of samples, 1 to {_MOST:,}", 1, _MOST)
 STRUCTURE = FLAG
-PROGRESS = optional(CALLBACK)
+PROGRESS = optional(either(FLAG, CALLBACK))
 _WATCHED = "a condition such as 'rod1.angle crosses 0', a function of quantities, or a list of these"
 _ONE = either(Kind(_WATCHED, _condition), CALLBACK)
 CONDITIONS = optional(Kind(_WATCHED, lambda value: either(CALLBACK, each(_ONE, _WATCHED)).read(value)))

@@ -93,8 +93,11 @@ class Run:
     again: Callable[[RunOptions, FloatArray], Run] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        # Whoever watched the run is not there where it is read.
-        return {**vars(self), "options": replace(self.options, progress=None, on_step=None)}
+        # Whoever watched the run is not there where it is read, nor are functions that it was watched for.
+        texts = tuple(one for one in self.options.conditions if isinstance(one.given, str))
+        options = replace(self.options, progress=None, on_step=None, conditions=texts)
+        again = self.again if len(texts) == len(self.options.conditions) else None
+        return {**vars(self), "options": options, "again": again}
 
     @property
     def singular_crossings(self) -> tuple[SingularCrossing, ...]:

@@ -15,6 +15,7 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import flatten
 from atwood.pipeline import assemble_flat
+from atwood.progress import told
 from atwood.showing import count_of, fitted, html_table
 from atwood.simulation.problem.arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRESS, RTOL, T_END, check_span
 from atwood.simulation.problem.options import SOLVERS
@@ -240,17 +241,18 @@ def compare(
     assembled = cache(lambda form, level: assemble_flat(flat, form=form, level=level))
     kinds = list(_kinds(assembled, forms, levels))
     total = len(kinds) * len(rtols) + 2
-    watch = progress or (lambda what, done, of: None)
     end = flat.t_end if t_end is None else float(t_end)
     check_span(flat.t_start, end)
     patience = None if max_seconds is None else 10.0 * max_seconds
-    reference = find_reference(scene, flat, assembled, end, outputs, patience, lambda what: watch(what, 0, total))
     rows: list[ComparisonRow] = []
-    for form, level, solver in kinds:
-        for rtol in sorted(rtols, reverse=True):
-            row = ComparisonRow(form, level, SOLVERS[solver], rtol)
-            watch(f"{row.label} at rtol {rtol:g}", len(rows) + 2, total)
-            rows.append(_measure(assembled, row, solver, reference, max_seconds))
+    with told(progress, flat.name, lambda what, done, of: (done / of, what)) as called:
+        watch = called or (lambda what, done, of: None)
+        reference = find_reference(scene, flat, assembled, end, outputs, patience, lambda what: watch(what, 0, total))
+        for form, level, solver in kinds:
+            for rtol in sorted(rtols, reverse=True):
+                row = ComparisonRow(form, level, SOLVERS[solver], rtol)
+                watch(f"{row.label} at rtol {rtol:g}", len(rows) + 2, total)
+                rows.append(_measure(assembled, row, solver, reference, max_seconds))
     return Comparison(flat.name, float(reference.time[-1]), reference, tuple(rows))
 
 

@@ -17,6 +17,7 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.declare.quantities import PATHS
 from atwood.pipeline import SCENE, assemble
+from atwood.progress import told
 from atwood.simulation.problem.arguments import (
     FORM,
     LEVEL,
@@ -78,7 +79,7 @@ def sweep(
     max_seconds: float | None = None,
     threads: int | None = None,
     executor: Executor | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
     name: str | None = None,
 ) -> Sweep:
     """Run a scene with many values of its parameters and of its start.
@@ -113,7 +114,7 @@ def sweep(
     executor
         Where to run instead, any of `concurrent.futures`; the scene must then be picklable.
     progress
-        Called with the number of runs done, and of how many.
+        Called with the number of runs done, and of how many; True for a line on standard error.
     name
         What to call the scene.
 
@@ -145,19 +146,20 @@ def sweep(
         RunOptions(end, rtol, max_steps=max_steps, max_seconds=max_seconds, solver=solver),
     )
     records = Records.empty(request)
-    watch = _Progress(progress, cases.count)
     count = _threads(threads)
     reason = ""
-    try:
-        if executor is not None:
-            reason = "they were given to an executor"
-            run_in_processes(request, records, executor, watch.count)
-        else:
-            reason = why_not_batched(request)
-            left = np.arange(cases.count) if reason else run_batches(request, records, count, watch.count)
-            run_one_by_one(request, records, left, count, watch.count)
-    except KeyboardInterrupt:
-        records.interrupt()
+    with told(progress, first.flat.name, lambda done, of: (done / of, f"{done} of {of} runs")) as called:
+        watch = _Progress(called, cases.count)
+        try:
+            if executor is not None:
+                reason = "they were given to an executor"
+                run_in_processes(request, records, executor, watch.count)
+            else:
+                reason = why_not_batched(request)
+                left = np.arange(cases.count) if reason else run_batches(request, records, count, watch.count)
+                run_one_by_one(request, records, left, count, watch.count)
+        except KeyboardInterrupt:
+            records.interrupt()
     return _finished(request, records, reason, count if executor is None else 0, time.perf_counter() - began)
 
 
