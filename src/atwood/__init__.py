@@ -104,6 +104,7 @@ if TYPE_CHECKING:
     from atwood.study.comparison.compare import Comparison, ComparisonRow, compare
     from atwood.study.sweeps.files import load_sweep
     from atwood.study.sweeps.sweep import Sweep, sweep
+    from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
 
     __version__: str
 
@@ -121,6 +122,7 @@ __all__ = [
     "DeclarationError",
     "Equilibria",
     "Equilibrium",
+    "EquationsOfMotion",
     "Expression",
     "ExternalFunction",
     "Formula",
@@ -134,6 +136,7 @@ __all__ = [
     "NormalModes",
     "Outline",
     "ParameterError",
+    "PartOfEquations",
     "Placement",
     "Point",
     "PointInertia",
@@ -176,6 +179,7 @@ __all__ = [
     "dissipation",
     "dot",
     "equilibria",
+    "equations",
     "event",
     "exp",
     "external",
@@ -238,10 +242,12 @@ _LATER = {
     "ComparisonRow": "atwood.study",
     "Equilibria": "atwood.linearization",
     "Equilibrium": "atwood.linearization",
+    "EquationsOfMotion": "atwood.theory.equations",
     "Formula": "atwood.expr.formulas.formula",
     "LinearModel": "atwood.linearization",
     "MechanismReport": "atwood.reporting",
     "NormalModes": "atwood.linearization",
+    "PartOfEquations": "atwood.theory.equations",
     "Result": "atwood.result.result",
     "RootLocus": "atwood.linearization",
     "SavedResult": "atwood.result.files",
@@ -252,6 +258,7 @@ _LATER = {
     "check": "atwood.checking",
     "compare": "atwood.study",
     "equilibria": "atwood.linearization",
+    "equations": "atwood.theory.equations",
     "formula": "atwood.expr.formulas.formula",
     "from_data": "atwood.model.compose.serialization",
     "linearize": "atwood.linearization",

@@ -12,7 +12,7 @@ equation 5.39). Angular velocities are rates of angles where orientations are in
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from atwood.errors import UsageError
 from atwood.expr import (
@@ -27,6 +27,7 @@ from atwood.expr import (
     vjp,
 )
 from atwood.forms.assembly import Assembly, FormName
+from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Constraint, Equations, balance_rows, inertia_forces
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
@@ -35,7 +36,7 @@ from atwood.mechanics.outputs.observables import add_up, part_energies
 from atwood.model.local.laws import LocalPart
 from atwood.topology.spanning_forest import Coordinate
 
-__all__ = ["Contribution", "Lagrangian", "lagrangian_of"]
+__all__ = ["Contribution", "Lagrangian", "lagrangian_of", "rows_by_part"]
 
 
 @dataclass(frozen=True)
@@ -212,6 +213,42 @@ def lagrangian_of(assembly: Assembly, form: FormName | None = None) -> Lagrangia
     return _along_angles(made) if any(c.kind.startswith("euler-") for c in equations.orientation_coordinates) else made
 
 
+def rows_by_part(found: Lagrangian) -> dict[str, tuple[Expression, ...]]:
+    """Return what each part adds to each equation of motion: inertia, less all forces, those of constraints included.
+
+    Parameters
+    ----------
+    found
+        The scene.
+
+    Returns
+    -------
+    dict
+        By path. Empty where some velocities are no derivatives of coordinates or constraints on velocities are solved:
+        there the equations are not the sums of what the Lagrangians of parts give.
+    """
+    if found.has_angular_velocities or found.is_restricted:
+        return {}
+    graph, one = found.graph, found.graph.one
+    along: dict[Expression, Expression | float] = {found.time: 1.0}
+    along |= dict(zip(found.coordinates, found.rates, strict=True))
+    along |= dict(zip(found.velocities, found.accelerations, strict=True))
+    places = [place for place in found.moves if place is not None]
+    rows: dict[str, tuple[Expression, ...]] = {}
+    for part in found.parts:
+        momenta = vjp([part.lagrangian], [one], list(found.velocities))
+        slopes = vjp([part.lagrangian], [one], list(found.coordinates))
+        losses = vjp([part.rayleigh], [one], list(found.velocities))
+        sides = zip(jvp(momenta, along), places, losses, part.forces, strict=True)
+        rows[part.path] = tuple(rate - slopes[place] + loss - force for rate, place, loss, force in sides)
+    for held in found.constraints:
+        path, nothing = held.key[0], (graph.zero,) * len(found.velocities)
+        others = {other.multiplier: 0.0 for other in found.constraints if other is not held}
+        pushes = substitute(list(found.constraint_rows), others) if others else found.constraint_rows
+        rows[path] = tuple(row - push for row, push in zip(rows.get(path, nothing), pushes, strict=True))
+    return rows
+
+
 def _along_speeds(assembly: Assembly, equations: Equations) -> Lagrangian:
     """Return it with the speeds of the equations as velocities."""
     mechanism, number = assembly.mechanism, {q: i for i, q in enumerate(equations.rates)}
@@ -229,7 +266,7 @@ def _along_speeds(assembly: Assembly, equations: Equations) -> Lagrangian:
         moves=tuple(number.get(u) for u in equations.speeds),
         parts=tuple(one for one in parts if not one.is_nothing),
         inertial=tuple(_inertial(equations, signals)),
-        rows=equations.rows,
+        rows=equations.rows_with_multipliers or equations.rows,
         constraint_rows=equations.constraint_rows,
         constraints=equations.constraints,
     )

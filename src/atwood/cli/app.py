@@ -58,6 +58,7 @@ def main() -> None:
     atwood list --parts                  the parts they are made of
     atwood info four-bar                 bodies, joints, freedom, equations
     atwood info Pivot                    connectors, parameters, quantities
+    atwood equations double-pendulum     its equations of motion, as in a textbook
     atwood run double-pendulum           its motion and its forces
     atwood compare double-pendulum       what each form costs for which error
     atwood sweep double-pendulum --vary mass2=0.5:2:16
@@ -182,6 +183,25 @@ def run_command(scene: str, as_json: bool, **options: Any) -> None:
     from atwood.cli.running import RunRequest, run_scene
 
     run_scene(RunRequest(scene=scene, as_json=as_json, **options))
+
+
+@main.command("equations", short_help="Write the equations of motion of a scene.", epilog=_SCENE_HELP)
+@_scene_options
+@click.option("--form", type=_FORM, default="reduced", show_default=True, help="Constraints eliminated, or kept.")
+@_ORIENTATION
+@click.option("--values", is_flag=True, help="Put the values of parameters in place of their symbols.")
+@click.option("--latex", is_flag=True, help="Write the equations of motion in LaTeX.")
+@click.option("--markdown", is_flag=True, help="Write a page: symbols, energies, momenta, equations, matrices.")
+@click.option("--python", is_flag=True, help="Write a module of Python that computes them.")
+@reporting_errors
+def equations_command(scene: str, as_json: bool, **options: Any) -> None:
+    """Write the equations of motion of SCENE: Lagrange's equations, with symbols as in a textbook.
+
+    In space, --orientation euler-zxz gives them in Euler angles; else angular velocities are in the axes of the body.
+    """
+    from atwood.cli.equations import EquationsRequest, show_equations
+
+    show_equations(EquationsRequest(scene=scene, as_json=as_json, **options))
 
 
 @main.command("compare", short_help="Compare what each form costs for which error.", epilog=_SCENE_HELP)

@@ -149,6 +149,56 @@ def _fold_pair(expansion: Expansion, monomial: Monomial, result: Polynomial) -> 
         return
 
 
+def without_squares(expansion: Expansion, polynomial: Polynomial, kind: str, limit: int) -> Polynomial:
+    """Return a polynomial without squares of sines, or of cosines: ``s^2 = 1 - c^2``.
+
+    Of every polynomial in sines and cosines of the same angles there is one such form, so that all that cancels does.
+    """
+    other = "cos" if kind == "sin" else "sin"
+    result: Polynomial = {}
+    stack = list(polynomial.items())
+    while stack:
+        monomial, coefficient = stack.pop()
+        for number, exponent in monomial:
+            atom = expansion.atoms[number]
+            if atom.kind == kind and exponent >= 2:
+                rest = multiply_monomials(monomial, ((number, -2),))
+                partner = multiply_monomials(rest, ((expansion.number(Atom(other, atom.argument)), 2),))
+                expansion.spend(2 * len(coefficient))
+                stack += [(rest, coefficient), (partner, {one: -value for one, value in coefficient.items()})]
+                break
+        else:
+            add_coefficient(result, monomial, coefficient)
+            if len(result) > 4 * limit:
+                raise TooLargeError
+    return result
+
+
+def squares_of_waves(expansion: Expansion, polynomial: Polynomial) -> Polynomial:
+    """Return a sum of waves in which those of twice an angle are squares and products: ``sin(2 a)`` is 2 sin(a) cos(a).
+
+    ``p + q cos(2 a)`` becomes ``(p + q) cos(a)^2 + (p - q) sin(a)^2``, as moments of inertia are written.
+    """
+    result = {monomial: dict(coefficient) for monomial, coefficient in polynomial.items()}
+    for monomial in sorted(polynomial):
+        kind, wave, rest = _split_wave(expansion, monomial)
+        if not any(wave) or any(count % 2 for count in wave):
+            continue
+        half = tuple(count // 2 for count in wave)
+        cosine, sine = (expansion.number(Atom(one, half)) for one in ("cos", "sin"))
+        coefficient = result.pop(monomial)
+        if kind == "sin":
+            both = multiply_monomials(((cosine, 1),), ((sine, 1),))
+            add_coefficient(result, multiply_monomials(rest, both), coefficient, 2.0)
+            continue
+        level = result.pop(rest, {})
+        for atom, sign in ((cosine, 1.0), (sine, -1.0)):
+            square = multiply_monomials(rest, ((atom, 2),))
+            add_coefficient(result, square, level)
+            add_coefficient(result, square, coefficient, sign)
+    return result
+
+
 def _split_wave(expansion: Expansion, monomial: Monomial) -> tuple[str, Wave, Monomial]:
     """Return the wave of a monomial and the rest; the wave of zero where it has none or several."""
     for number, exponent in monomial:

@@ -1,0 +1,468 @@
+"""The equations of motion of a scene for people to read: sympy objects, LaTeX, Markdown, plain text and Python code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, Literal
+
+from atwood.analysis.equation_modules import module_of
+from atwood.analysis.equation_pages import as_data, equation_lines, html_of, sections_of, symbol_lines, symbol_table
+from atwood.analysis.formulas import objects, page
+from atwood.analysis.formulas.book import Book, TooLargeError
+from atwood.analysis.formulas.notation import Notation, notation_of
+from atwood.analysis.formulas.objects import Sympy
+from atwood.analysis.formulas.page import Section
+from atwood.analysis.formulas.tree import Name, Sum, Symbol
+from atwood.analysis.lagrangian import Lagrangian, lagrangian_of, rows_by_part
+from atwood.analysis.structure import Structure, structure_of
+from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.expr import Expression, SparseMatrix, count_operations, substitute
+from atwood.expr.core import algebra
+from atwood.expr.core.relations import Relation
+from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
+
+__all__ = ["EquationsOfMotion", "PartOfEquations", "read_equations"]
+
+_READABLE_COORDINATES, _READABLE_OPERATIONS = 12, 2_500
+"""Beyond either nobody reads equations: their structure is shown."""
+
+_WRITABLE = 5_000
+"""Beyond so many operations no formulas are made at all."""
+
+Parameters = Literal["symbolic", "values"]
+
+
+def read_equations(assembly: Assembly, parameters: Parameters = "symbolic") -> EquationsOfMotion:
+    """Return the equations of motion of an assembly, to be read.
+
+    Parameters
+    ----------
+    assembly
+        The scene, in the form that the equations are to have.
+    parameters
+        Whether parameters are symbols, or their values are put in.
+    """
+    found = lagrangian_of(assembly)
+    return EquationsOfMotion(assembly, found, notation_of(assembly, found), parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class PartOfEquations:
+    """What one part, or a model with all its parts, contributes to the equations of motion; sympy objects.
+
+    Attributes
+    ----------
+    path
+        The part.
+    kinetic_energy, potential_energy, lagrangian, rayleigh_function
+        J, and W.
+    generalized_forces
+        One for each velocity.
+    rows
+        What it adds to each equation of motion, forces of its constraints included; empty where velocities are not all
+        derivatives of free coordinates, so that the equations are not those of a sum of Lagrangians.
+    """
+
+    path: str
+    kinetic_energy: Sympy
+    potential_energy: Sympy
+    lagrangian: Sympy
+    rayleigh_function: Sympy
+    generalized_forces: tuple[Sympy, ...]
+    rows: tuple[Sympy, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class EquationsOfMotion:
+    """The equations of motion of a scene, to be read.
+
+    Lagrange's equations with multipliers, ``d/dt dL/dq' - dL/dq + dR/dq' = Q + G^T lambda`` with ``g(q, t) = 0`` and
+    ``G = dg/dq`` (Goldstein, equations 1.57, 1.70 and 2.23). Where orientations are quaternions, velocities are the
+    components of angular velocities in the axes of the body, and the equations are Euler's. Coordinates are functions
+    of ``t``, as `sympy.physics.mechanics.dynamicsymbols` makes them; parameters are plain symbols.
+
+    Attributes
+    ----------
+    assembly
+        The scene.
+    expressions
+        The same as expressions of the graph.
+    notation
+        What stands for what.
+    parameters
+        ``"symbolic"`` or ``"values"``.
+    """
+
+    assembly: Assembly
+    expressions: Lagrangian
+    notation: Notation
+    parameters: Parameters = "symbolic"
+
+    # -- as formulas --------------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """What the scene is called."""
+        return self.assembly.flat.name
+
+    @property
+    def form(self) -> str:
+        """``"reduced"`` or ``"dae"``."""
+        return self.assembly.form
+
+    @property
+    def legend(self) -> tuple[Symbol, ...]:
+        """The symbols in order, each with letter, path, unit, meaning and value; see `symbol`."""
+        every = self.notation.legend
+        return every if self.parameters == "symbolic" else tuple(one for one in every if one.kind != "parameter")
+
+    @property
+    def is_readable(self) -> bool:
+        """Whether somebody would read these equations; else `structure` says what there is to see."""
+        return len(self.expressions.coordinates) <= _READABLE_COORDINATES and self._operations <= _READABLE_OPERATIONS
+
+    @cached_property
+    def _operations(self) -> int:
+        return sum(count_operations(list(self.expressions.rows), self.assembly.parameters).values())
+
+    @cached_property
+    def structure(self) -> Structure:
+        """How many unknowns, equations and operations there are, and which depends on which."""
+        return structure_of(self.assembly, self.expressions, self._operations)
+
+    @cached_property
+    def book(self) -> Book:
+        """What writes the formulas."""
+        found, notation = self.expressions, self.notation
+        names = {expression: Name(symbol) for expression, symbol in notation.symbols.items()}
+        names |= {expression: Name(symbol, dots) for expression, (symbol, dots) in notation.velocities.items()}
+        angles = [q for q, name in zip(found.coordinates, found.names, strict=True) if name.unit == "rad"]
+        orientations = [one for one in found.equations.orientation_coordinates if one.kind == "quaternion"]
+        return Book(
+            names,
+            tuple(angles),
+            self.assembly.parameters,
+            self.parameters == "symbolic",
+            [[found.coordinates[i] for i in one.coordinates] for one in orientations],
+        )
+
+    @cached_property
+    def _meanings(self) -> dict[Expression, Expression | float]:
+        """What is put in place of symbols: equal moments, relations of time, and perhaps the values of parameters."""
+        known: dict[Expression, Expression | float] = dict(self.notation.merged)
+        if self.parameters == "values":
+            known |= self.assembly.mechanism.table.values
+        for one in self.assembly.relations:
+            known[one.symbol] = substitute([_as_condition(one)], known)[0]
+        return known
+
+    def _plain(self, values: Sequence[Expression]) -> list[Expression]:
+        return substitute(list(values), self._meanings) if values and self._meanings else list(values)
+
+    def formula(self, value: Expression, shares: Mapping[str, Expression] | None = None, energy: bool = False) -> Sum:
+        """Return an expression as a formula: the shortest, or as it is computed where that is too long.
+
+        Parameters
+        ----------
+        value
+            The expression.
+        shares
+            What it is the sum of, by part: each term then says from which parts it comes.
+        energy
+            Whether terms with one coefficient are put together, and squares of sums may stay.
+        """
+        whole, *parts = self._plain([value, *(shares or {}).values()])
+        try:
+            if self.is_readable:
+                return self.book.write(whole, dict(zip(shares or {}, parts, strict=True)), energy)
+        except TooLargeError:
+            pass
+        return self._as_computed([whole])[0]
+
+    def formulas(self, values: Sequence[Expression]) -> tuple[Sum, ...]:
+        """Return several expressions as formulas."""
+        if self.is_readable:
+            return tuple(map(self.formula, values))
+        return tuple(self._as_computed(self._plain(values))) if values else ()
+
+    def _as_computed(self, values: Sequence[Expression]) -> list[Sum]:
+        if self._operations > _WRITABLE:
+            raise UnsupportedError(
+                f"its equations take {self._operations} operations and would fill a book",
+                where=self.name,
+                advice="`structure` shows what they are like, and atwood.dynamics has them as functions of numbers.",
+            )
+        return self.book.write_plainly(values)
+
+    @cached_property
+    def written(self) -> Written:
+        """The formulas."""
+        found = self.expressions
+        linear = found.lagrangian - found.kinetic + found.potential
+        return Written(
+            kinetic=self.formula(found.kinetic, energy=True),
+            potential=self.formula(found.potential, energy=True),
+            linear=self.formula(linear, energy=True),
+            rayleigh=self.formula(found.rayleigh, energy=True),
+            momenta=self.formulas(found.momenta),
+            forces=self.formulas(found.forces),
+            velocity_terms=self.formulas(found.velocity_terms),
+            rows=self.formulas(self.residuals),
+            constraints=tuple(
+                self.formula(one.rate if one.value is None else one.value, energy=True) for one in found.constraints
+            ),
+            rates=self.formulas(found.rates),
+        )
+
+    @property
+    def residuals(self) -> tuple[Expression, ...]:
+        """The equations of motion as expressions, forces of constraints included."""
+        found = self.expressions
+        return tuple(row - held for row, held in zip(found.rows, found.constraint_rows, strict=True))
+
+    def _matrix(self, matrix: SparseMatrix, shape: tuple[int, int]) -> tuple[tuple[Sum, ...], ...]:
+        entries = [[Sum(())] * shape[1] for _ in range(shape[0])]
+        for row, column, entry in zip(matrix.rows, matrix.columns, self.formulas(matrix.entries), strict=True):
+            entries[row][column] = entry
+        return tuple(tuple(row) for row in entries)
+
+    @cached_property
+    def mass(self) -> tuple[tuple[Sum, ...], ...]:
+        """The mass matrix as formulas."""
+        n = len(self.expressions.velocities)
+        return self._matrix(self.expressions.mass_matrix, (n, n))
+
+    @cached_property
+    def slopes(self) -> tuple[tuple[Sum, ...], ...]:
+        """The constraint Jacobian as formulas."""
+        found = self.expressions
+        return self._matrix(found.constraint_jacobian, (len(found.constraints), len(found.velocities)))
+
+    # -- as sympy objects ---------------------------------------------------------------------------------------------
+
+    def symbol(self, path: str) -> Sympy:
+        """Return the sympy symbol of a coordinate, multiplier or parameter by its path.
+
+        Raises
+        ------
+        UsageError
+            If nothing has this path.
+        """
+        for one in self.legend:
+            if one.path == path:
+                return objects.symbol_of(one)
+        merged = {other.name: self.notation.symbols[first] for other, first in self.notation.merged.items()}
+        if path in merged and self.parameters == "symbolic":
+            return objects.symbol_of(merged[path])
+        raise UsageError("it has no symbol", where=path, advice=suggestion(path, [one.path for one in self.legend]))
+
+    @property
+    def values(self) -> dict[Sympy, float]:
+        """The value of each parameter's symbol, in SI units."""
+        return {objects.symbol_of(one): one.value for one in self.legend if one.value is not None}
+
+    @property
+    def coordinates(self) -> tuple[Sympy, ...]:
+        """The coordinates q, functions of t."""
+        return tuple(objects.symbol_of(self.notation.symbols[q]) for q in self.expressions.coordinates)
+
+    @property
+    def velocities(self) -> tuple[Sympy, ...]:
+        """The velocities: derivatives of coordinates, and components of angular velocities in the axes of a body."""
+        return tuple(objects.derivative(*self.notation.velocities[u]) for u in self.expressions.velocities)
+
+    @property
+    def accelerations(self) -> tuple[Sympy, ...]:
+        """The derivatives of the velocities."""
+        return tuple(objects.derivative(*self.notation.velocities[a]) for a in self.expressions.accelerations)
+
+    @property
+    def multipliers(self) -> tuple[Sympy, ...]:
+        """One for each constraint; the generalized force of the constraints is ``G^T lambda``."""
+        return tuple(objects.symbol_of(self.notation.symbols[one.multiplier]) for one in self.expressions.constraints)
+
+    @property
+    def rates(self) -> tuple[Sympy, ...]:
+        """The derivatives of the coordinates in terms of the velocities."""
+        return tuple(map(objects.formula, self.written.rates))
+
+    @property
+    def kinetic_energy(self) -> Sympy:
+        """The kinetic energy T, J."""
+        return objects.formula(self.written.kinetic)
+
+    @property
+    def potential_energy(self) -> Sympy:
+        """The potential energy V, J; weight included."""
+        return objects.formula(self.written.potential)
+
+    @property
+    def rayleigh_function(self) -> Sympy:
+        """The Rayleigh function R, W."""
+        return objects.formula(self.written.rayleigh)
+
+    @property
+    def lagrangian(self) -> Sympy:
+        """The Lagrangian, J: T - V, and terms linear in the velocities, as of a charge in a magnetic field."""
+        return self.kinetic_energy - self.potential_energy + objects.formula(self.written.linear)
+
+    @property
+    def momenta(self) -> tuple[Sympy, ...]:
+        """The momenta ``dL/dq'``; for an angular velocity the angular momentum, in the axes of the body."""
+        return tuple(map(objects.formula, self.written.momenta))
+
+    @property
+    def mass_matrix(self) -> Sympy:
+        """The mass matrix M."""
+        return _sympy_matrix(self.mass)
+
+    @property
+    def velocity_terms(self) -> tuple[Sympy, ...]:
+        """What is left of ``d/dt dT/dq' - dT/dq`` where accelerations are zero."""
+        return tuple(map(objects.formula, self.written.velocity_terms))
+
+    @property
+    def generalized_forces(self) -> tuple[Sympy, ...]:
+        """The generalized forces Q of loads: those that neither V nor R give."""
+        return tuple(map(objects.formula, self.written.forces))
+
+    @property
+    def constraints(self) -> tuple[Sympy, ...]:
+        """What stays zero: functions g of coordinates and time; of constraints on velocities these themselves."""
+        return tuple(map(objects.formula, self.written.constraints))
+
+    @property
+    def constraint_jacobian(self) -> Sympy:
+        """The matrix G of derivatives of the constraints by the coordinates, or of their rates by the velocities."""
+        return _sympy_matrix(self.slopes)
+
+    @property
+    def rows(self) -> tuple[Sympy, ...]:
+        """The equations of motion: each is zero. ``M a`` and velocity terms, less all forces."""
+        return tuple(map(objects.formula, self.written.rows))
+
+    @property
+    def shared(self) -> tuple[tuple[Sympy, Sympy], ...]:
+        """Names in formulas that are too long to be written out, and what they stand for, in order."""
+        _ = self.written
+        return tuple((objects.formula(name), objects.formula(value)) for name, value in self.book.shared)
+
+    def terms(self, path: str) -> PartOfEquations:
+        """Return what a part contributes, or a model with all its parts.
+
+        Parameters
+        ----------
+        path
+            The part, such as ``"rod1"``.
+
+        Raises
+        ------
+        UsageError
+            If there is no such part.
+        """
+        every = list(self.assembly.mechanism.locals_)
+        chosen = [one for one in every if one == path or one.startswith((f"{path}.", f"{path}["))]
+        if not chosen:
+            raise UsageError("there is no such part", where=path, advice=suggestion(path, every))
+        found = self.expressions
+        own = [one for one in found.parts if one.path in chosen]
+
+        def total(values: Sequence[Expression], energy: bool = False) -> Sympy:
+            return objects.formula(self.formula(sum(values, found.graph.zero), energy=energy))
+
+        shares = rows_by_part(found)
+        rows = [[shares[one][k] for one in shares if one in chosen] for k in range(len(found.velocities))]
+        return PartOfEquations(
+            path,
+            total([one.kinetic for one in own], True),
+            total([one.potential for one in own], True),
+            total([one.lagrangian for one in own], True),
+            total([one.rayleigh for one in own], True),
+            tuple(total([one.forces[k] for one in own]) for k in range(len(found.velocities))),
+            tuple(map(total, rows)) if shares else (),
+        )
+
+    # -- to be shown --------------------------------------------------------------------------------------------------
+
+    def latex(self) -> str:
+        """Return the equations of motion, and the constraints if there are any, as an aligned block of LaTeX."""
+        if not self.is_readable:
+            return rf"\text{{{self.structure.sentence}}}"
+        return page.as_latex(equation_lines(self))
+
+    def markdown(self) -> str:
+        """Return a page with symbols, energies, momenta, equations and matrices, formulas between dollar signs."""
+        if not self.is_readable:
+            return f"# {self.name}\n\n{self.structure.sentence}\n\n```\n{self.structure.picture()}\n```\n"
+        return page.as_markdown(f"{self.name} ({self.form} form)", self.sections, [symbol_table(self)])
+
+    def text(self) -> str:
+        """Return the same in plain text, for a terminal."""
+        if not self.is_readable:
+            return f"{self.structure.sentence}\n\n{self.structure.picture()}"
+        return "\n".join(["Symbols", *(line.rstrip() for line in symbol_lines(self)), "", page.as_text(self.sections)])
+
+    @cached_property
+    def sections(self) -> list[Section]:
+        """What a page of them says, section by section."""
+        return sections_of(self)
+
+    def python(self) -> str:
+        """Return a module of Python that computes and solves the equations, with nothing but `math` and NumPy.
+
+        Raises
+        ------
+        UnsupportedError
+            If the scene calls functions of somebody's own, which cannot be written down.
+        """
+        return module_of(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data: symbols with paths and units, formulas in LaTeX and as expressions of Python."""
+        return as_data(self)
+
+    def __repr__(self) -> str:
+        n, m = len(self.expressions.velocities), len(self.expressions.constraints)
+        held = f", {m} constraint{'s' if m > 1 else ''}" if m else ""
+        return f"EquationsOfMotion({self.name!r}, {self.form}: {n} equation{'s' if n > 1 else ''} of motion{held})"
+
+    def _repr_latex_(self) -> str:
+        return f"$\\displaystyle {self.latex()}$"
+
+    def _repr_html_(self) -> str:
+        if not self.is_readable:
+            return f"<p>{self.structure.sentence}</p>{self.structure.svg()}"
+        return html_of(self)
+
+
+@dataclass(frozen=True)
+class Written:
+    """The formulas of a scene."""
+
+    kinetic: Sum
+    potential: Sum
+    linear: Sum
+    rayleigh: Sum
+    momenta: tuple[Sum, ...]
+    forces: tuple[Sum, ...]
+    velocity_terms: tuple[Sum, ...]
+    rows: tuple[Sum, ...]
+    constraints: tuple[Sum, ...]
+    rates: tuple[Sum, ...]
+
+
+def _sympy_matrix(entries: Sequence[Sequence[Sum]]) -> Sympy:
+    import sympy
+
+    columns = len(entries[0]) if entries else 0
+    return sympy.ImmutableMatrix(len(entries), columns, [objects.formula(one) for row in entries for one in row])
+
+
+def _as_condition(one: Relation) -> Expression:
+    """Return what a relation of time says, for people to read."""
+    zero = one.difference.graph.zero
+    if one.kind in ("less", "less_equal"):
+        return one.difference.graph.node(one.kind, (one.difference, zero))
+    return one.difference if one.kind == "nonzero" else algebra.unary(one.kind, one.difference)

@@ -1,0 +1,102 @@
+"""Formulas as Python code."""
+
+from __future__ import annotations
+
+import keyword
+from fractions import Fraction
+from math import isqrt
+
+from atwood.analysis.formulas.tree import Call, Name, Node, Number, Symbol, Term
+
+__all__ = ["KNOWN", "MATH", "formula", "identifier"]
+
+_ENDS = ("", "_dot", "_ddot", "_dddot")
+_BINARY = {"less": "<", "less_equal": "<=", "logical_and": "and", "logical_or": "or", "pow": "**"}
+_NAMES = {"absolute": "abs", "minimum": "min", "maximum": "max"}
+
+
+MATH = (
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "atan2",
+    "exp",
+    "log",
+    "sinh",
+    "cosh",
+    "tanh",
+    "sqrt",
+    "floor",
+    "pi",
+)
+"""The names of `math` that formulas use."""
+
+KNOWN = frozenset({*MATH, *_BINARY, *_NAMES, "select", "logical_not", "sign", "component"})
+"""The functions that can be written down."""
+
+
+def identifier(symbol: Symbol, dots: int = 0) -> str:
+    """Return a symbol as a name of Python."""
+    name = "".join(one if one.isalnum() or one == "_" else "_" for one in symbol.name) + _ENDS[dots]
+    return f"{name}_" if keyword.iskeyword(name) or name in _NAMES.values() else name
+
+
+def formula(node: Node) -> str:
+    """Return a formula as an expression of Python with the functions of `math`."""
+    if isinstance(node, Name):
+        return identifier(node.symbol, node.dots)
+    if isinstance(node, Call):
+        return _call(node)
+    text = ""
+    for term in node.terms:
+        sign = "-" if term.number < 0 else "+"
+        text += f" {sign} {_term(term)}" if text else (f"-{_term(term)}" if sign == "-" else _term(term))
+    return text or "0.0"
+
+
+def _term(term: Term) -> str:
+    above = [_power(node, power) for node, power in term.factors if power > 0]
+    below = [_power(node, -power) for node, power in term.factors if power < 0]
+    head = [] if abs(term.number) == 1 and above else [_number(term.number)]
+    text = " * ".join((*head, *above))
+    if not below:
+        return text
+    return f"{text} / {below[0]}" if len(below) == 1 else f"{text} / ({' * '.join(below)})"
+
+
+def _number(value: Number) -> str:
+    if isinstance(value, Fraction):
+        size = abs(value)
+        return f"{size.numerator}.0" if size.denominator == 1 else f"({size.numerator} / {size.denominator})"
+    return repr(abs(value))
+
+
+def _power(node: Node, power: Fraction) -> str:
+    if power == Fraction(1, 2):
+        return f"sqrt({formula(node)})"
+    text = formula(node)
+    if not isinstance(node, Name) and not (isinstance(node, Call) and node.function not in _BINARY):
+        text = f"({text})"
+    if power == 1:
+        return text
+    return f"{text} ** {power}" if power.denominator == 1 else f"{text} ** ({power})"
+
+
+def _call(node: Call) -> str:
+    arguments = [formula(one) for one in node.arguments]
+    if node.function in _BINARY:
+        return f"({arguments[0]}) {_BINARY[node.function]} ({arguments[1]})"
+    if node.function == "select":
+        return f"({arguments[1]} if {arguments[0]} else {arguments[2]})"
+    if node.function == "logical_not":
+        return f"not ({arguments[0]})"
+    if node.function == "sign":
+        return f"(({arguments[0]} > 0.0) - ({arguments[0]} < 0.0))"
+    if node.function == "component":
+        size = isqrt(len(arguments) - 1)
+        matrix, right = ", ".join(arguments[: size * size]), ", ".join(arguments[size * size : -1])
+        return f"solve(np.reshape([{matrix}], ({size}, {size})), [{right}])[int({arguments[-1]})]"
+    return f"{_NAMES.get(node.function, node.function)}({', '.join(arguments)})"
