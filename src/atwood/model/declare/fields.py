@@ -129,6 +129,9 @@ LARGEST_ANGLE = 1e9
 
 _LARGEST = 1e100
 
+_SLANT = 1e-13
+"""Components of a unit vector that are no larger are what rounding left: some hundred roundings of the machine's."""
+
 
 def too_large_an_angle(angle: float, where: str, error: type[AtwoodError] = ParameterError) -> AtwoodError:
     """Return the error that says that an angle, rad, has lost too many of its digits."""
@@ -232,7 +235,8 @@ class ParameterSpec(Field):
             raise ParameterError(
                 "a direction cannot be zero", where=where, advice="Give three numbers, or an axis as 'z'."
             )
-        return tuple(number / length for number in numbers)
+        unit = (number / length for number in numbers)
+        return tuple(number if abs(number) > _SLANT else 0.0 for number in unit)
 
     def _check_number(self, value: Any, where: str) -> float | int:
         number = parse_quantity(value, self.unit, where) if isinstance(value, str) else _plain_number(value)
@@ -372,7 +376,7 @@ def parameter(
         parameter is a number that can change without anything being derived again.
     direction
         Whether it is a direction: three numbers, not all zero, of which a unit vector is made, or an axis such as
-        ``"z"`` or ``"-x"``.
+        ``"z"`` or ``"-x"``. Components that are nothing but rounding, as of ``(cos(pi/2), 0, 1)``, are zero.
     turning
         Whether it is a direction about which something turns; in a plane it can only be the plane's normal.
     text

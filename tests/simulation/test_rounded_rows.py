@@ -1,0 +1,73 @@
+"""What a scene is does not hang on digits that rounding made: in directions that were computed, in constant rows."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from atwood import Component, Frame, Point, Scalar, Scene, connector, constraint, parameter, simulate
+from atwood.pipeline import assemble
+from atwood.simulation.initialization.start import find_start, own_state
+from atwood.simulation.problem.problem import make_plan
+from atwood_library import Ground, Link, Pivot, PointMass, Rod, Weld
+
+FORMS = ("reduced", "dae")
+
+
+class Balance(Component):
+    """Says that three times a tenth is three tenths; where its point is hardly matters, a row of 1e-30."""
+
+    at: Point = connector(Point, "Any point.")
+    a: Frame = connector(Frame, "Any frame.")
+    tenth: float = parameter(0.1, unit="m", doc="A tenth.")
+    whole: float = parameter(0.3, unit="m", doc="Three tenths.")
+
+    @constraint(reaction="nothing", unit="N", doc="Force of nothing.")
+    def holds(self) -> Scalar:
+        """Return what is left."""
+        return 3.0 * self.tenth - self.whole + 1e-30 * (self.at.position.z - self.a.position.z)
+
+
+def freedom(scene: Scene, form: str) -> int:
+    assembly = assemble(scene, form=form)
+    start = find_start(assembly)
+    plan = make_plan(assembly, start.time, *own_state(assembly, start), start.length, 1.0)
+    return len(plan.sizes) - plan.finding.rank
+
+
+def test_a_row_that_says_nothing_of_the_place_hides_no_other_row() -> None:
+    """What is left of its constant does not locate the place, so that other rows are as well known as without it."""
+    scene = Scene(space="plane")
+    ground, rod = scene.add("ground", Ground()), scene.add("rod", Rod(length=1.0, mass=0.0))
+    bob, balance = scene.add("bob", PointMass(mass=1.0)), scene.add("balance", Balance())
+    joins = [(ground.frame, rod.a), (rod.b, bob.point), (bob.point, balance.at), (ground.frame, balance.a)]
+    for one, other in joins:
+        scene.connect(one, other)
+    scene.start["rod.angle"] = 0.5
+    assert freedom(scene, "dae") == 1
+    found = simulate(scene, form="dae", t_end=0.2, outputs=2, rtol=1e-9)
+    assert math.hypot(found["bob.position.x"][-1], found["bob.position.z"][-1]) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("slant", [math.cos(math.pi / 2.0), -1e-15, 3e-14])
+def test_an_axis_that_was_computed_is_the_axis(slant: float, form: str) -> None:
+    """A four-bar with pivots along y, of which cosines of right angles are left in other directions, turns."""
+    scene = Scene(space="space", gravity=0.0)
+    ground, far = scene.add("ground", Ground()), scene.add("far", Weld(displacement=(2.5, 0.0, 0.0)))
+    scene.connect(ground.frame, far.a)
+    lengths = {"crank": 1.0, "coupler": 2.5, "rocker": 2.0}
+    bars = [scene.add(name, Link(length=size, mass=size, axial_moment=1e-3)) for name, size in lengths.items()]
+    joins = [(ground.frame, bars[0].a), (bars[0].b, bars[1].a), (bars[1].b, bars[2].b), (far.b, bars[2].a)]
+    for i, (one, other) in enumerate(joins):
+        pivot = scene.add(f"pivot{i}", Pivot(axis=(slant * (i - 1.4), -1.0, slant * (0.6 - i))))
+        scene.connect(one, pivot.a)
+        scene.connect(pivot.b, other)
+    scene.start.update({"pivot0.angle": 1.0, "pivot0.angular_velocity": 2.0})
+    scene.guess.update({"pivot1.angle": -0.7, "pivot3.angle": 1.9})
+    assert freedom(scene, form) == 1
+
+
+def test_in_a_plane_an_axis_that_was_computed_is_the_normal() -> None:
+    assert Pivot(axis=(math.cos(math.pi / 2.0), -1.0, 0.0)).axis == (0.0, -1.0, 0.0)
