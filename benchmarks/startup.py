@@ -1,9 +1,18 @@
-"""From starting a process to its printed result, with an empty and with a filled cache; and what imports cost."""
+"""How soon something happens: from starting a process to its printed result, and from a known scene to its next run.
+
+Processes are started in turn, in at least 15 rounds, and each is divided by the import of NumPy of its own round; the
+medians of these ratios are shown, of time on the clock and of processor time (what others do on the machine changes the
+first far more than the second). On both sides byte code is written before, BLAS has one thread, and output goes to a
+pipe.
+"""
 
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
+import resource
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -11,73 +20,137 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from timing import best_of, options, print_table, ratio, save
+from timing import options, print_table, save
 
 ROOT = Path(__file__).resolve().parents[1]
+ROUNDS = 15
 CHAIN = "from atwood_library.scenes import Chain\n\nscene = Chain(links=40, mass=1.0 / 40)\n"
-IMPORTS = ("", "numpy", "atwood", "atwood_library.scenes", "scipy.integrate", "sksundae", "networkx", "sympy")
+IMPORTS = {
+    "empty process": "pass",
+    "numpy": "import numpy",
+    "numpy, llvmlite": "import numpy, llvmlite.binding",
+    "numpy, click": "import numpy, click",
+    "atwood": "import atwood",
+    "a scene of the library": "from atwood_library.scenes import DoublePendulum",
+    "atwood.pipeline": "import atwood.pipeline",
+}
+GOALS = {
+    "atwood": 1.3,
+    "warm run double-pendulum --t-end 10": 3.2,
+    "cold run double-pendulum --t-end 10": "warm + 1.5",
+}
 PEERS = ("mujoco", "pinocchio", "exudyn", "heyoka", "casadi")
+AGAIN = """
+import json, sys, time
+from atwood import assemble, simulate
+from atwood_library.scenes import Chain, DoublePendulum, FourBar
+
+rounds = int(sys.argv[1])
+found = {}
+for name, scene, end, path in (
+    ("double pendulum, 10 s", DoublePendulum(), 10.0, "mass2"),
+    ("four-bar, 1 s", FourBar(), 1.0, "coupler_length"),
+    ("chain of 10, 1 s", Chain(links=10), 1.0, "mass"),
+):
+    assembly = assemble(scene)
+    simulate(assembly, t_end=end)
+    value = getattr(scene, path)
+    again, other = [], []
+    for i in range(rounds):
+        began = time.perf_counter()
+        result = simulate(assembly, t_end=end)
+        again.append(1e3 * (time.perf_counter() - began - result.statistics.seconds))
+        began = time.perf_counter()
+        result = simulate(assembly.with_values({path: value * (1.0 + 1e-3 * (i + 1))}), t_end=end, max_steps=1)
+        other.append(1e3 * (time.perf_counter() - began - result.statistics.seconds))
+    found[name] = {"again": min(again), "other values": min(other)}
+print(json.dumps(found))
+"""
+
+Spent = tuple[float, float]
+"""Seconds on the clock, and of the processor."""
 
 
-def process(arguments: Sequence[str], cache: str = "") -> float:
-    """Return the seconds of a process from its start to its end; byte code is cached."""
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-    paths = [str(ROOT / "src"), str(ROOT / "library"), environment.get("PYTHONPATH", "")]
-    environment["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
-    if cache:
-        environment["ATWOOD_CACHE_DIR"] = cache
-    began = time.perf_counter()
-    done = subprocess.run([sys.executable, *arguments], env=environment, capture_output=True, text=True)
-    spent = time.perf_counter() - began
+def environment() -> dict[str, str]:
+    found = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    paths = [str(ROOT / "src"), str(ROOT / "library"), found.get("PYTHONPATH", "")]
+    found["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
+    return found | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+
+def process(arguments: Sequence[str], cache: str = "") -> Spent:
+    """Return what a process takes from its start to its end."""
+    told = environment() | ({"ATWOOD_CACHE_DIR": cache} if cache else {})
+    before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    done = subprocess.run([sys.executable, *arguments], env=told, capture_output=True, text=True)
+    spent, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode != 0:
         raise SystemExit(f"{' '.join(arguments)} failed:\n{done.stderr}")
+    return spent, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def processes(folder: Path, quick: bool) -> dict[str, Callable[[], Spent]]:
+    """Return what starts each process; caches are filled, and byte code is written."""
+    file = folder / "chain40.py"
+    file.write_text(CHAIN, encoding="utf-8")
+    runs = {"double-pendulum --t-end 10": ["double-pendulum", "--t-end", "10"]}
+    imports = dict(IMPORTS)
+    if not quick:
+        runs["chain of 40 --t-end 1"] = [f"{file}:scene", "--t-end", "1"]
+        imports |= {name: f"import {name}" for name in PEERS if importlib.util.find_spec(name) is not None}
+    measures: dict[str, Callable[[], Spent]] = {}
+    for name, code in imports.items():
+        measures[name] = lambda code=code: process(["-c", code])
+    warm = str(folder / "warm")
+
+    def cold(command: Sequence[str]) -> Spent:
+        with tempfile.TemporaryDirectory() as empty:
+            return process(["-m", "atwood", "run", *command], empty)
+
+    for name, command in runs.items():
+        measures[f"warm run {name}"] = lambda command=command: process(["-m", "atwood", "run", *command], warm)
+        measures[f"cold run {name}"] = lambda command=command: cold(command)
+    return measures
+
+
+def in_turn(measures: dict[str, Callable[[], Spent]], rounds: int) -> dict[str, list[Spent]]:
+    """Return what each process took in each round; the first round of all is not kept."""
+    spent: dict[str, list[Spent]] = {name: [] for name in measures}
+    for number in range(rounds + 1):
+        for name, measure in measures.items():
+            one = measure()
+            if number:
+                spent[name].append(one)
     return spent
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print."""
     chosen = options(__doc__, arguments)
-    repeat = min(chosen.repeat, 5)
+    rounds = 1 if chosen.quick else max(ROUNDS, chosen.repeat)
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "chain40.py"
-        file.write_text(CHAIN, encoding="utf-8")
-        runs = {"double-pendulum --t-end 10": ["double-pendulum", "--t-end", "10"]}
-        if not chosen.quick:
-            runs["chain of 40, 1 s"] = [f"{file}:scene", "--t-end", "1"]
-        warm = str(Path(folder) / "warm")
-
-        def cold(command: Sequence[str]) -> float:
-            with tempfile.TemporaryDirectory() as empty:
-                return process(["-m", "atwood", "run", *command], empty)
-
-        measures: dict[str, Callable[[], float]] = {}
-        for name, command in runs.items():
-            process(["-m", "atwood", "run", *command], warm)  # fill the cache, and write byte code
-            measures[f"cold {name}"] = lambda command=command: cold(command)
-            measures[f"warm {name}"] = lambda command=command: process(["-m", "atwood", "run", *command], warm)
-        installed = [name for name in PEERS if importlib.util.find_spec(name) is not None]
-        for name in IMPORTS[:3] if chosen.quick else [*IMPORTS, *installed]:
-            measures[f"import {name}"] = lambda name=name: process(["-c", f"import {name}" if name else "pass"])
-        best = best_of(measures, repeat)
-    rows = [
-        [
-            name,
-            ratio(best[f"cold {name}"], best[f"warm {name}"]),
-            best[f"cold {name}"],
-            best[f"warm {name}"],
-            "0.8, 0.5" if name.startswith("double") else "2, -",
-        ]
-        for name in runs
-    ]
-    print_table("atwood run, whole process", ["scene", "cold / warm", "cold s", "warm s", "goals s"], rows)
-    empty = best["import "]
-    rows = [
-        [name[7:] or "(nothing)", ratio(seconds - empty, empty), seconds - empty, seconds]
-        for name, seconds in best.items()
-        if name.startswith("import ")
-    ]
-    print_table("Imports", ["module", "/ empty process", "s more", "s in all"], rows)
-    save(chosen.json, {"startup": best})
+        spent = in_turn(processes(Path(folder), chosen.quick), rounds)
+    rows, kept = [], {}
+    for name, taken in spent.items():
+        on_clock, of_processor = (
+            statistics.median(one[kind] / other[kind] for one, other in zip(taken, spent["numpy"], strict=True))
+            for kind in (0, 1)
+        )
+        kept[name] = {"clock": on_clock, "processor": of_processor, "seconds": min(one[0] for one in taken)}
+        rows.append([name, on_clock, of_processor, kept[name]["seconds"], GOALS.get(name)])
+    title = f"Processes, as times the import of NumPy; medians of {rounds} rounds"
+    print_table(title, ["process", "clock", "processor", "least s", "goal"], rows)
+    done = subprocess.run(
+        [sys.executable, "-c", AGAIN, str(3 if chosen.quick else 50)],
+        env=environment(), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    again = json.loads(done.stdout)
+    print_table(
+        "A scene that was simulated before: ms beside integration, to the end and to the first step with other values",
+        ["scene", "again", "other values"],
+        [[name, one["again"], one["other values"]] for name, one in again.items()],
+    )
+    save(chosen.json, {"startup": kept, "again": again})
 
 
 if __name__ == "__main__":

@@ -1,0 +1,49 @@
+"""What a run that was made before loads: a budget of modules, since each is time before the first result."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+BUDGET = 265
+"""So many modules beside those of Python and NumPy may be loaded; the run below needs some 250 of them."""
+
+HEAVY = ("rich", "sympy", "networkx", "matplotlib", "scipy", "sksundae", "numpy.ma", "numpy.polynomial", "subprocess")
+
+
+def loaded(code: str, cache: str) -> set[str]:
+    environment = {**os.environ, "ATWOOD_CACHE_DIR": cache}
+    environment.pop("FORCE_COLOR", None)
+    code = f"import sys\n{code}\nprint('loaded:', *sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    return set(done.stdout.splitlines()[-1].split()[1:])
+
+
+RUN = """
+from atwood.cli import main
+main(["run", "double-pendulum", "--t-end", "1"], standalone_mode=False)
+"""
+
+
+def test_a_run_that_was_made_before_loads_what_it_needs(tmp_path) -> None:
+    cache = str(tmp_path)
+    loaded(RUN, cache)
+    warm = loaded(RUN, cache)
+    own = {name for name in warm if name.split(".")[0] in ("atwood", "atwood_library")}
+    assert len(own) <= BUDGET, sorted(own)
+    assert not [name for name in warm if name in HEAVY]
+    for generator in ("atwood.reporting", "atwood.analysis", "atwood.expr.formulas.sympy_bridge"):
+        assert generator not in warm
+
+
+@pytest.mark.parametrize(
+    ("code", "most"), [("import atwood", 60), ("from atwood_library.scenes import DoublePendulum", 75)]
+)
+def test_to_declare_a_scene_loads_neither_mechanics_nor_solvers(code, most, tmp_path) -> None:
+    found = loaded(code, str(tmp_path))
+    own = {name for name in found if name.split(".")[0] in ("atwood", "atwood_library")}
+    assert len(own) <= most, sorted(own)
+    rooms = {name.split(".")[1] for name in own if name.startswith("atwood.")}
+    assert not rooms & {"mechanics", "topology", "forms", "simulation", "integrators", "codegen", "result", "pipeline"}
+    assert not [name for name in found if name in (*HEAVY, "llvmlite", "click")]
