@@ -1,10 +1,19 @@
-"""Mass properties of rigid bodies: from simple shapes, from closed triangle meshes, composed, and checked."""
+"""Mass properties of rigid bodies: from simple shapes, from closed triangle meshes, composed, and checked.
 
-from atwood.solids.integrals import mesh_solid, stl_solid
-from atwood.solids.mesh import TriangleMesh, closed_mesh
-from atwood.solids.properties import MassProperties, combine, point_mass, subtract
-from atwood.solids.shapes import box, cone, cylinder, disc, ellipsoid, rod, sphere, spherical_shell, tube
-from atwood.solids.stl import read_stl
+Its modules are loaded when a name of theirs is first used: scenes of points and rods need none of them.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from atwood.solids.integrals import mesh_solid, stl_solid
+    from atwood.solids.mesh import TriangleMesh, closed_mesh
+    from atwood.solids.properties import MassProperties, combine, point_mass, subtract
+    from atwood.solids.shapes import box, cone, cylinder, disc, ellipsoid, rod, sphere, spherical_shell, tube
+    from atwood.solids.stl import read_stl
 
 __all__ = [
     "MassProperties",
@@ -26,3 +35,24 @@ __all__ = [
     "subtract",
     "tube",
 ]
+
+_MODULES = {
+    "integrals": ("mesh_solid", "stl_solid"),
+    "mesh": ("TriangleMesh", "closed_mesh"),
+    "properties": ("MassProperties", "combine", "point_mass", "subtract"),
+    "shapes": ("box", "cone", "cylinder", "disc", "ellipsoid", "rod", "sphere", "spherical_shell", "tube"),
+    "stl": ("read_stl",),
+}
+
+if not TYPE_CHECKING:  # so that type checkers know which names there are
+
+    def __getattr__(name):
+        for module, names in _MODULES.items():
+            if name in names:
+                found = getattr(importlib.import_module(f"{__name__}.{module}"), name)
+                globals()[name] = found
+                return found
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+    def __dir__():
+        return sorted({*globals(), *__all__})

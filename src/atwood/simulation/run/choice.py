@@ -19,7 +19,6 @@ from atwood.late import dataclass
 from atwood.simulation.problem.explicit_scene import explicit_problem
 from atwood.simulation.problem.options import SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
-from atwood.simulation.problem.taylor_scene import recurrences
 from atwood.simulation.run.stiffness import Stiffness, can_be_stiff, find_stiffness
 
 __all__ = [
@@ -133,6 +132,7 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
 
 def _has_series(assembly: Assembly) -> bool:
     """Return whether the accelerations of a scene have Taylor series: nothing switches, nothing is called in Python."""
+    from atwood.simulation.problem.taylor_scene import recurrences
 
     def find() -> bool:
         try:
