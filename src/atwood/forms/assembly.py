@@ -18,6 +18,7 @@ from atwood.expr.core.relations import Relation, values_just_after
 from atwood.expr.simplify.collect import collect
 from atwood.forms.dae import dae_form, keep_constraints
 from atwood.forms.derived import derive_once
+from atwood.forms.kept import Kept
 from atwood.forms.places import with_reactions
 from atwood.forms.program import (
     BalanceProgram,
@@ -89,6 +90,10 @@ class Assembly:
         See `relation_values`; None for those that hold just after the scene's start.
     held
         Values of the discrete states of its parts; None for those that the parts declare.
+    given_values
+        Values of the parameters from sample to sample, shape (parameters, samples); None for those of the mechanism.
+    kept
+        What was made with these values: where it starts, for one.
     """
 
     flat: FlatScene
@@ -102,7 +107,9 @@ class Assembly:
     orientation: Orientation = field(default_factory=Orientation)
     given_relations: tuple[float, ...] | None = None
     held: tuple[float, ...] | None = None
-    _kernels: dict[Any, Any] = field(default_factory=dict, repr=False)
+    given_values: FloatArray | None = None
+    kept: Kept = field(default_factory=Kept, init=False, repr=False)
+    _kernels: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __copy__(self) -> Assembly:
         return self
@@ -203,7 +210,7 @@ class Assembly:
 
     def with_relations(self, values: Iterable[float]) -> Assembly:
         """Return the same in another piece of a run, with the same programs."""
-        return replace(self, given_relations=tuple(map(float, values)), _kernels={})
+        return replace(self, given_relations=tuple(map(float, values)))
 
     @property
     def discrete_states(self) -> tuple[DiscreteState, ...]:
@@ -220,7 +227,7 @@ class Assembly:
 
     def with_held(self, values: Sequence[float]) -> Assembly:
         """Return the same with other values of the discrete states, with the same programs."""
-        return replace(self, held=tuple(values), _kernels={})
+        return replace(self, held=tuple(values))
 
     @cached_property
     def parameters(self) -> tuple[Expression, ...]:
@@ -231,6 +238,8 @@ class Assembly:
     @cached_property
     def parameter_values(self) -> FloatArray:
         """The values of the parameters."""
+        if self.given_values is not None:
+            return self.given_values
         held = self.held_at_start if self.held is None else self.held
         return np.array([*self.mechanism.table.values.values(), *held, *self.relation_values], dtype=float)
 
@@ -280,9 +289,7 @@ class Assembly:
         rows
             Values of the parameters, shape (parameters, samples).
         """
-        found = replace(self, _kernels={})
-        found.__dict__["parameter_values"] = rows
-        return found
+        return replace(self, given_values=rows)
 
     def with_flat(self, flat: FlatScene, source: Source | None = None) -> Assembly:
         """Return the assembly of a scene with other values: with the same programs if it has the same structure.
@@ -313,7 +320,7 @@ class Assembly:
         mechanism, reason = moved_to(self, flat)
         if mechanism is None:
             return None, reason
-        fresh: dict[str, Any] = {"source": source, "why_new": "", "given_relations": None, "held": None, "_kernels": {}}
+        fresh: dict[str, Any] = {"source": source, "why_new": "", "given_relations": None, "held": None}
         return replace(self, flat=flat, mechanism=mechanism, **fresh), ""
 
     def other_mode(
@@ -344,7 +351,7 @@ class Assembly:
         mechanism, _ = moved_to(known, self.flat)
         if mechanism is None:
             return make()
-        return replace(known, flat=self.flat, mechanism=mechanism, source=source, why_new="", _kernels={})
+        return replace(known, flat=self.flat, mechanism=mechanism, source=source, why_new="")
 
     # -- programs -------------------------------------------------------------------------------------------------
 

@@ -102,7 +102,6 @@ def _restored(shared: Shared, made_from: _Recipe) -> Assembly:
         given_relations=made_from.relations,
         held=made_from.held,
         why_new=made_from.why_new,
-        _kernels={},
     )
     names = tuple(one.name for one in made.equations.names)
     if names != made_from.coordinates or len(made_from.relations or made.relations) != len(made.relations):

@@ -33,7 +33,7 @@ def starting(assembly: Assembly) -> Assembly:
     values = {symbol: value for symbol, value in mechanism.table.values.items() if symbol not in mechanism.constants}
     table = replace(mechanism.table, values=values)
     before = replace(mechanism, table=table, places=None, constants={}, decisions=decisions)
-    return replace(assembly, mechanism=before, source=None, why_new="", shared=shared, _kernels={})
+    return replace(assembly, mechanism=before, source=None, why_new="", shared=shared)
 
 
 def with_places(assembly: Assembly, places: Mapping[str, Mapping[Expression, float]]) -> Assembly:
@@ -51,7 +51,7 @@ def with_places(assembly: Assembly, places: Mapping[str, Mapping[Expression, flo
     # Constants of integration are further parameters.
     table = replace(assembly.mechanism.table, values=dict(assembly.mechanism.table.values))
     mechanism = replace(assembly.mechanism, table=table, places=places, constants={}, decisions=[])
-    made = replace(assembly, mechanism=mechanism, shared=shared, _kernels={})
+    made = replace(assembly, mechanism=mechanism, shared=shared)
     _ = made.reduced, made.maximal  # the constants must be there before anything is bound
     return made
 
@@ -93,7 +93,7 @@ def moved_to(assembly: Assembly, flat: FlatScene) -> tuple[Mechanism | None, str
     if own.constants:
         if assembly.source is None:
             return None, "the start gives constants of integration"
-        there = replace(before, flat=flat, mechanism=mechanism, given_relations=None, _kernels={})
+        there = replace(before, flat=flat, mechanism=mechanism, given_relations=None)
         places = assembly.source.places(there)
     assert places is not None
     values = {**own.table.values, **mechanism.table.values}

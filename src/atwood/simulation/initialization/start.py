@@ -15,6 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, KernelEvaluationError, StartError
 from atwood.expr import evaluate, jacobian
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.forms.starting import starting
 from atwood.late import dataclass
@@ -61,6 +62,9 @@ class Start:
     rough: FloatArray
 
 
+_START: Key[Start] = Key("start")
+
+
 def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
     """Return a start in the coordinates of the form of an assembly."""
     if assembly.form == "reduced":
@@ -90,7 +94,7 @@ def settle(assembly: Assembly, start: Start, reassemble: Reassemble) -> tuple[As
 
 
 def find_start(assembly: Assembly) -> Start:
-    """Find a consistent start.
+    """Find a consistent start; it is found once for an assembly.
 
     Parameters
     ----------
@@ -102,6 +106,17 @@ def find_start(assembly: Assembly) -> Start:
     StartError
         If a start value names no quantity, or they contradict each other or the constraints.
     """
+    return assembly.kept.get(_START, lambda: _find(assembly))
+
+
+def _find(assembly: Assembly) -> Start:
+    start = _solved(assembly)
+    for values in (start.coordinates, start.speeds, start.rough):
+        values.flags.writeable = False
+    return start
+
+
+def _solved(assembly: Assembly) -> Start:
     before = starting(assembly)
     if before is not assembly:
         return _taken_up(assembly, before, find_start(before))

@@ -15,6 +15,7 @@ from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError, SolveError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import keep_constraints
+from atwood.forms.kept import Key
 from atwood.forms.program import FormProgram
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.late import dataclass
@@ -334,6 +335,9 @@ def _kept_or_none(finding: RankFinding) -> tuple[int, ...] | None:
     return finding.kept if finding.redundant else None
 
 
+_PLAN: Key[Plan] = Key("plan")
+
+
 def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
     """Prepare a run from a consistent state in the coordinates of the form.
 
@@ -353,6 +357,14 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     StartError
         If the forces do not determine the accelerations.
     """
+    about = t, q.tobytes(), u.tobytes(), length, span
+    made = assembly.kept.get(_PLAN, lambda: _make_plan(assembly, t, q, u, length, span), *about)
+    if made.not_compilable:
+        announce(assembly, made.not_compilable)
+    return replace(made)  # its dependent coordinates change on the way
+
+
+def _make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
     equations = assembly.equations
     balance = balance_of(assembly, assembly.form)
     sizes, coordinate_sizes = motion_scales(equations, length), coordinate_scales(equations, length)
@@ -378,8 +390,6 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     accelerations, _ = solve_balance(now, kept, t)
     scales = find_scales(assembly, length, u, accelerations, sizes, span)
     not_compilable = find_not_compilable(assembly, program.residual)
-    if not_compilable:
-        announce(assembly, not_compilable)
     return Plan(
         assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent, not_compilable=not_compilable
     )

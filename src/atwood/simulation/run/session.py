@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from atwood.errors import UsageError
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents
@@ -22,7 +23,9 @@ from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.options import SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
-from atwood.simulation.singular.monitor import SingularityMonitor
+
+if TYPE_CHECKING:
+    from atwood.simulation.singular.monitor import SingularityMonitor
 
 __all__ = ["SolverRequest", "open_explicit_session", "open_implicit_session"]
 
