@@ -16,7 +16,7 @@ from typing import Any
 from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.consistency.check import check_laws, check_names
-from atwood.errors import StartError
+from atwood.errors import StartError, UsageError
 from atwood.expr import Expression, Graph
 from atwood.expr.core.relations import TimeRelations
 from atwood.forms.assembly import Assembly
@@ -38,6 +38,7 @@ from atwood.result.result import Result
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
 from atwood.simulation.initialization.start import Start, find_start
 from atwood.simulation.problem.arguments import (
+    ATOL,
     CONDITIONS,
     FORM,
     LEVEL,
@@ -221,11 +222,12 @@ def read_mechanism(
 
 @takes(
     scene=SCENE,
-    form=FORM,
-    level=LEVEL,
-    orientation=ORIENTATION,
+    form=optional(FORM),
+    level=optional(LEVEL),
+    orientation=optional(ORIENTATION),
     t_end=T_END,
     rtol=RTOL,
+    atol=ATOL,
     outputs=OUTPUTS,
     max_step=optional(number("a number of seconds above 0", above=0.0)),
     solver=SOLVER,
@@ -239,11 +241,12 @@ def read_mechanism(
 def simulate(
     scene: Model | Assembly,
     *,
-    form: str = "reduced",
-    level: str = "ggl",
-    orientation: str = "quaternion",
+    form: str | None = None,
+    level: str | None = None,
+    orientation: str | None = None,
     t_end: float | str | None = None,
     rtol: float = 1e-8,
+    atol: float | None = None,
     outputs: Any = 201,
     max_steps: int | None = None,
     max_seconds: float | None = None,
@@ -260,15 +263,21 @@ def simulate(
     Parameters
     ----------
     scene
-        The scene, or an assembly of it, which then says the form.
+        The scene, or an assembly of it.
     form, level, orientation
-        See `assemble`.
+        See `assemble`. An assembly has them already; what contradicts it is refused.
     t_end
         Time of the end, s, or text such as ``"2 min"``; the scene's own if not given.
     rtol
-        Relative tolerance of the solver; absolute tolerances are this share of the scene's own sizes.
+        Relative tolerance of the solver.
+    atol
+        Absolute tolerance of the solver, as a share of the scene's own sizes: `atol` times the extent of the scene for
+        lengths, `atol` rad for angles, and these divided by the scene's time scale for speeds. So it depends on no
+        unit. The same number as `rtol` if not given.
     outputs
-        Number of output times, evenly spread over the run, or the times themselves, s.
+        Number of output times, evenly spread over the run, or the times themselves, s. Results have just the times
+        that are given and were reached, and the last state where none was; with a number of times they also have the
+        states before and after each event.
     max_steps, max_seconds
         Limits; a run that meets one returns what it has, and says so in its status. The time counts from this call
         on; a result may have no samples where it does not last to find the start.
@@ -305,20 +314,23 @@ def simulate(
     TopologyError
         If joints and ties let nothing move, and no structure is meant.
     UsageError
-        If the end is not after the start.
+        If the end is not after the start, or an argument contradicts the assembly.
     SolveError
         If the solver fails.
     """
     clock = Clock(max_seconds)
-    assembly = (
-        scene if isinstance(scene, Assembly) else assemble(scene, form=form, level=level, orientation=orientation)
-    )
+    asked = {"form": form, "level": level, "orientation": orientation}
+    given = {name: value for name, value in asked.items() if value is not None}
+    if isinstance(scene, Assembly):
+        _refuse_contradictions(scene, given)
+    assembly = scene if isinstance(scene, Assembly) else assemble(scene, **given)
     flat = assembly.flat
     end = flat.t_end if t_end is None else float(t_end)
     with told(progress, flat.name, partial(_share, flat.t_start, end)) as watch:
         options = RunOptions(
             t_end=end,
             relative_tolerance=rtol,
+            absolute_tolerance=atol,
             outputs=outputs,
             max_steps=max_steps,
             max_seconds=max_seconds,
@@ -350,6 +362,19 @@ def _listed(conditions: Any) -> list[Any]:
     if conditions is None:
         return []
     return [conditions] if callable(conditions) or isinstance(conditions, str) else list(conditions)
+
+
+def _refuse_contradictions(assembly: Assembly, given: Mapping[str, str]) -> None:
+    """Refuse arguments that say something else than the assembly that is to be run."""
+    has = {"form": assembly.form, "level": assembly.level, "orientation": assembly.orientation.kind}
+    for name, value in given.items():
+        if value != has[name]:
+            told = f"has {name} {has[name]!r}" if has[name] else "is in the reduced form, which has no level"
+            raise UsageError(
+                f"{name}={value!r} contradicts the assembly, which {told}",
+                where=assembly.flat.name,
+                advice=f"Leave {name} out, or assemble the scene with it.",
+            )
 
 
 def _with_line_signs(assembly: Assembly) -> tuple[Assembly, Start]:

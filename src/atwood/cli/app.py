@@ -150,6 +150,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @_ORIENTATION
 @click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
 @click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative tolerance of the solver.")
+@click.option("--atol", type=float, help="Absolute tolerance, as a share of the scene's sizes; as --rtol if not given.")
 @click.option(
     "--solver",
     type=_SOLVER,

@@ -35,6 +35,7 @@ class RunRequest:
     orientation: str = "quaternion"
     t_end: float | None = None
     rtol: float = 1e-8
+    atol: float | None = None
     solver: str = "auto"
     outputs: int = 201
     max_steps: int | None = None
@@ -75,6 +76,7 @@ def run_scene(request: RunRequest) -> None:
                 assembly,
                 t_end=request.t_end,
                 rtol=request.rtol,
+                atol=request.atol,
                 outputs=request.outputs,
                 max_steps=request.max_steps,
                 max_seconds=request.max_seconds,

@@ -91,6 +91,7 @@ def describe_run(result: Result) -> dict[str, Any]:
         "asked": {
             "t_end": options.t_end,
             "rtol": options.relative_tolerance,
+            "atol": options.absolute_tolerance,
             "outputs": int(outputs) if isinstance(outputs, (int, np.integer)) else len(outputs),
             "max_steps": options.max_steps,
             "max_seconds": options.max_seconds,

@@ -28,6 +28,7 @@ from atwood.simulation.problem.options import SOLVERS
 from atwood.topology.orientation_coordinates import ORIENTATIONS
 
 __all__ = [
+    "ATOL",
     "CONDITIONS",
     "FORM",
     "FORMS",
@@ -93,6 +94,7 @@ SOLVER = one_of(("auto", *SOLVERS))
 NAME = optional(TEXT)
 T_END = optional(Kind(f"seconds, at most {_LONGEST:g}, or text such as '2 min'", _time))
 RTOL = number("a relative tolerance between 0 and 1, such as 1e-8", above=0.0, below=1.0)
+ATOL = optional(number("an absolute tolerance between 0 and 1, as a share of the scene's sizes", above=0.0, below=1.0))
 OUTPUTS = either(
     whole(f"the number of output times, 2 to {_MOST:,}", 2, _MOST),
     Kind("the times themselves, s, finite and rising", _times),

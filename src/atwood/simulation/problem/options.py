@@ -33,7 +33,9 @@ class RunOptions:
     t_end
         Time of the end, s.
     relative_tolerance
-        Error allowed in a step; absolute tolerances are this share of the scene's sizes.
+        Error allowed in a step, as a share of the unknowns.
+    absolute_tolerance
+        The same as a share of the scene's sizes; the relative one if None.
     outputs
         Number of output times, evenly spread, or the times themselves.
     max_steps, max_seconds
@@ -56,6 +58,7 @@ class RunOptions:
 
     t_end: float
     relative_tolerance: float = 1e-8
+    absolute_tolerance: float | None = None
     outputs: int | FloatArray = 201
     max_steps: int | None = None
     max_seconds: float | None = None

@@ -443,8 +443,28 @@ class _Walk:
         return made
 
     def _run_so_far(self, status: str, message: str) -> Run:
-        parts = (self.first, tuple(self.segments), tuple(self.events), self.statistics, status, message)
+        segments = _as_asked(self.segments, self.options.outputs)
+        parts = (self.first, segments, tuple(self.events), self.statistics, status, message)
         return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.coordinate_switches), self.again)
+
+
+def _as_asked(segments: Sequence[SegmentRecord], outputs: int | FloatArray) -> tuple[SegmentRecord, ...]:
+    """Return segments that show just the times that were asked for, if these were given.
+
+    At an event the state after it is shown. Where no time that was asked for is reached, the last state is.
+    """
+    if isinstance(outputs, (int, np.integer)):
+        return tuple(segments)
+    made: list[SegmentRecord] = []
+    later = np.inf
+    for one in reversed(segments):
+        place = np.minimum(np.searchsorted(outputs, one.time), len(outputs) - 1)
+        shown = (outputs[place] == one.time) & (one.time < later)
+        later = min(later, float(one.time[0])) if len(one.time) else later
+        made.append(replace(one, shown=shown))
+    if made and not any(one.shown.any() for one in made):
+        made[0].shown[-1] = True
+    return tuple(reversed(made))
 
 
 def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:

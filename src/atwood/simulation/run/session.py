@@ -58,7 +58,7 @@ class SolverRequest:
         relative = min(options.relative_tolerance, loosest)
         return SolverOptions(
             relative_tolerance=relative,
-            absolute_tolerances=self.plan.tolerances(relative),
+            absolute_tolerances=self.plan.tolerances(min(options.absolute_tolerance or relative, loosest)),
             max_step=options.max_step,
             max_order=options.max_order,
             horizon=options.t_end - t if options.t_end > t else 1.0,
