@@ -91,8 +91,14 @@ if TYPE_CHECKING:
     from atwood_library.sensors.position_sensor import PositionSensor as PositionSensor
     from atwood_library.sensors.relative_position_sensor import RelativePositionSensor as RelativePositionSensor
     from atwood_library.sensors.totals_sensor import TotalsSensor as TotalsSensor
+    from atwood_library.sources.minimum_jerk import MinimumJerk as MinimumJerk
+    from atwood_library.sources.point_to_point import PointToPoint as PointToPoint
+    from atwood_library.sources.pulse import Pulse as Pulse
+    from atwood_library.sources.quintic import Quintic as Quintic
     from atwood_library.sources.ramp import Ramp as Ramp
     from atwood_library.sources.sine import Sine as Sine
+    from atwood_library.sources.step import Step as Step
+    from atwood_library.sources.table import Table as Table
 
 _MODULES = {
     "Add": "blocks.add",
@@ -130,11 +136,12 @@ _MODULES = {
     "LorentzForce": "fields.lorentz_force",
     "Mass1D": "parts.mass_1d",
     "MeshBody": "parts.mesh_body",
+    "MinimumJerk": "sources.minimum_jerk",
     "MutualPotential": "fields.mutual_potential",
     "OrientationSensor": "sensors.orientation_sensor",
+    "PairPotential": "fields.pair_potential",
     "PI": "blocks.pi",
     "PID": "blocks.pid",
-    "PairPotential": "fields.pair_potential",
     "Pivot": "joints.pivot",
     "Planar": "joints.planar",
     "PlanetaryGear": "joints.planetary_gear",
@@ -145,9 +152,12 @@ _MODULES = {
     "PointOnLine": "joints.point_on_line",
     "PointOnPlane": "joints.point_on_plane",
     "PointOnSurface": "joints.point_on_surface",
+    "PointToPoint": "sources.point_to_point",
     "PositionSensor": "sensors.position_sensor",
     "Potential": "fields.potential",
     "Pulley": "ropes.pulley",
+    "Pulse": "sources.pulse",
+    "Quintic": "sources.quintic",
     "RackAndPinion": "joints.rack_and_pinion",
     "Ramp": "sources.ramp",
     "RelativePositionSensor": "sensors.relative_position_sensor",
@@ -169,6 +179,8 @@ _MODULES = {
     "Spherical": "joints.spherical",
     "Spring": "forces.spring",
     "StateSpace": "blocks.state_space",
+    "Step": "sources.step",
+    "Table": "sources.table",
     "Torque": "forces.torque",
     "TorsionDamper": "forces.torsion_damper",
     "TorsionSpring": "forces.torsion_spring",

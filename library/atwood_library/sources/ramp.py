@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, observable, parameter
+from atwood import Component, ParameterError, Scalar, maximum, minimum, observable, parameter
 
 
 class Ramp(Component):
-    """A function of time that rises evenly, ``offset + slope t``.
+    """A function of time that rises evenly, ``offset + slope t``, perhaps from a time on and for a while only.
 
     Its `value` is connected to an input and takes the input's unit.
     """
 
-    synonyms = ("ContinuousClock", "Linear function of time")
+    synonyms = ("ContinuousClock", "Linear function of time", "Sources.Ramp")
 
     slope: float = parameter(1.0, unit="any", doc="Rise in a second, in the unit of the input.")
-    offset: float = parameter(0.0, unit="any", doc="Value at time zero, in the unit of the input.")
+    offset: float = parameter(0.0, unit="any", doc="Value where it begins to rise, in the unit of the input.")
+    start_time: float | None = parameter(None, unit="s", doc="When it begins to rise; none if always.")
+    duration: float | None = parameter(None, unit="s", minimum=0.0, doc="For how long it rises; none if for ever.")
+
+    def check_values(self) -> None:
+        """Refuse an end without a beginning."""
+        if self.duration is not None and self.start_time is None:
+            raise ParameterError("it is given, and no start_time", where=f"{self.path}.duration", advice="Give both.")
 
     @observable(unit="any", doc="Value of the function, in the unit of the input.")
     def value(self) -> Scalar:
         """Return the value."""
-        return self.offset + self.slope * self.time
+        if self.start_time is None:
+            return self.offset + self.slope * self.time
+        since = maximum(self.time - self.start_time, 0.0)
+        return self.offset + self.slope * (since if self.duration is None else minimum(since, self.duration))

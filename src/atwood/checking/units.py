@@ -272,6 +272,8 @@ def _of_derivative(trial: Trial, law: Law, made: Any) -> Iterator[tuple[float, E
 
 
 def _of_event(trial: Trial, law: Law, made: Any) -> Iterator[tuple[float, Exponents]]:
+    if any(spec.array for spec in trial.component.parameter_specs().values()):
+        return  # what stands in its columns has units that nobody says
     yield float(made), parse_unit(law.options.unit).exponents
 
 

@@ -102,8 +102,12 @@ def _wrong_update(cls: type[Component], law: Law) -> Iterator[tuple[str, str]]:
     for given in (options.every, options.offset):
         yield from _named("a parameter", (given,) if isinstance(given, str) else (), cls.parameter_specs())
     yield from _named("an event", (options.at,) if options.at else (), [one.name for one in cls.laws("event")])
-    if (options.every is None) == (not options.at):
-        yield "it says neither a sample time nor an event, or both", "Give every=, or at= with the name of an event."
+    yield from _named("a method", (options.when,) if options.when else (), dir(cls))
+    if sum((options.every is not None, bool(options.at), bool(options.when))) != 1:
+        yield (
+            "it says no moment, or more than one kind",
+            "Give every=, at= with the name of an event, or when= with that of a method.",
+        )
 
 
 def _wrong_arguments(cls: type[Component], law: Law) -> Iterator[tuple[str, str]]:

@@ -222,7 +222,7 @@ class Assembly:
         """Values of the discrete states before their first update."""
         if not self.discrete_states:
             return ()
-        declared, flat = declared_starts(self.flat.parts, is_discrete=True), self.flat
+        declared, flat = declared_starts(self.flat.parts, self.flat.t_start, is_discrete=True), self.flat
         return tuple({**declared, **flat.guess, **flat.start}[one.path] for one in self.discrete_states)
 
     def with_held(self, values: Sequence[float]) -> Assembly:

@@ -14,6 +14,7 @@ from atwood.late import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, plain, rotate
 from atwood.model.local.laws import LocalPart, ParameterTable
 from atwood.model.local.parts import DiscreteState
+from atwood.model.local.states import declared_starts
 from atwood.model.values.rotation import as_rotation, compose
 from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector, as_vector
@@ -88,11 +89,14 @@ class Mechanism:
     idle_spins: Mapping[int, Vector] = field(default_factory=dict)
 
     def known_at_start(self) -> dict[Expression, float]:
-        """Return the values of parameters, of time and of relations of it at the start of a run."""
+        """Return the values of parameters, of discrete states, of time and of relations of it at the start of a run."""
         values, relations = self.table.values, self.relations.found
         after = values_just_after(relations, values, self.t_start)
         symbols = (one.symbol for one in relations)
-        return {**values, self.time: self.t_start, **dict(zip(symbols, after, strict=True))}
+        parts = {path: local.part for path, local in self.locals_.items() if local.discrete_states}
+        starts = declared_starts(parts, self.t_start, is_discrete=True)
+        held = {one.symbol: starts[one.path] for one in discrete_states_of(self)} if parts else {}
+        return {**values, **held, self.time: self.t_start, **dict(zip(symbols, after, strict=True))}
 
     @property
     def relations(self) -> TimeRelations:

@@ -257,6 +257,22 @@ class Component(metaclass=ComponentType):
             If they do not, with the path of the parameter and what to do.
         """
 
+    def check_run(self, start: float, end: float) -> None:
+        """Refuse a run that the component is not made for, as one that goes on beyond the end of a table.
+
+        A component overrides this; it is called before each run, and its parameters are then plain numbers.
+
+        Parameters
+        ----------
+        start, end
+            Times of the start and of the end of the run, s.
+
+        Raises
+        ------
+        ParameterError
+            If it is not made for it.
+        """
+
     def outline(self) -> Outline | None:
         """Return what it looks like, for pictures; None for what has no shape of its own. Parameters are numbers."""
         return None

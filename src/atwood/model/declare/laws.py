@@ -154,6 +154,7 @@ class UpdateOptions:
     every: str | float | None
     offset: str | float
     at: str
+    when: str
     reads: tuple[str, ...] | None
 
 
@@ -454,6 +455,7 @@ _MOMENT = either(NAME, number())
     every=optional(_MOMENT),
     offset=_MOMENT,
     at=TEXT,
+    when=TEXT,
     reads=optional(_NAMES),
 )
 def update(
@@ -462,6 +464,7 @@ def update(
     every: str | float | None = None,
     offset: str | float = 0.0,
     at: str = "",
+    when: str = "",
     reads: Sequence[str] | None = None,
 ) -> Callable[[_F], _F]:
     """Mark a method that is called at moments, on numbers, and returns new values of states.
@@ -480,12 +483,14 @@ def update(
         When it is called first, after the start of the run, s: a number, or the name of a parameter.
     at
         In place of a sample time, the name of an event of the component: it is called just after that.
+    when
+        In place of both, the name of a method that returns the times, s, from parameters that are numbers.
     reads
         The inputs that it reads; all when None. A method that passes on only what was stored before reads none, ``()``,
         and comes first.
     """
     names = (sets,) if isinstance(sets, str) else tuple(sets)
-    options = UpdateOptions(names, every, offset, at, None if reads is None else tuple(reads))
+    options = UpdateOptions(names, every, offset, at, when, None if reads is None else tuple(reads))
     return lambda function: _mark(function, Law("update", function.__name__, options))
 
 

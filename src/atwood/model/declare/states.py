@@ -51,6 +51,8 @@ class StateSpec(Field):
         ParameterError
             If it is no finite number in the right unit.
         """
+        if callable(value):
+            return value
         if isinstance(value, FieldReference) and value.operation == "parameter":
             return self._check_expression(value, where)
         if isinstance(value, ParameterExpression):
@@ -70,9 +72,11 @@ class StateSpec(Field):
         size = self.size(values)
         return [self.name] if size is None else [f"{self.name}[{i}]" for i in range(size)]
 
-    def starts(self, values: Any) -> list[float]:
-        """Return the start value of each of its numbers, for given values of the parameters."""
+    def starts(self, values: Any, t: float) -> list[float]:
+        """Return the start value of each of its numbers, for given values of the parameters and a time, s."""
         size = self.size(values)
+        if callable(self.default):
+            return [float(one) for one in self.default(values, t)]
         start = values[self.default.name] if isinstance(self.default, FieldReference) else self.default
         return [float(start)] * (1 if size is None else size)
 
@@ -141,7 +145,8 @@ def discrete_state(
     Parameters
     ----------
     start
-        Its value before the first update, as for `state`.
+        Its value before the first update, as for `state`; or a function of the parameters by name, and the time of
+        the start, that returns one number for each of it.
     unit, doc, count
         As for `state`.
 

@@ -393,19 +393,21 @@ def variation_names(path: str) -> tuple[str, str, str]:
 
 
 def _is_source(part: Part, flat: FlatScene) -> bool:
-    """Return whether a part's outputs are functions of time and parameters alone."""
+    """Return whether a part's outputs are functions of time, parameters and what is held alone."""
     own = part.component
     is_linked = any((part.path, name) in flat.links for name in part.signals)
-    return not own.connectors() and not own.state_specs() and not is_linked
+    moves = any(not spec.is_discrete for spec in own.state_specs().values())
+    return not own.connectors() and not moves and not is_linked
 
 
 def _source_value(source: Part, observable: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
     """Return the output of a part that depends on time and parameters alone."""
     values = {name: _parameter(source, spec, table) for name, spec in source.component.parameter_specs().items()}
     values |= {name: _signal(source, name, given, flat, time, table, {}) for name, given in source.signals.items()}
+    values |= state_values(source, table.graph)
     bound = bind(source.component, Binding(values=values, time=time))
     law = next(law for law in source.component.laws("observable") if law.name == observable)
-    return table.graph.convert(call_law(source.path, law, getattr(bound, law.name)))
+    return table.graph.convert(call_law(source.path, law, partial(law_value, bound, law.name)))
 
 
 def _local_connector(path: str, is_frame: bool, space: Space, graph: Graph) -> LocalConnector:

@@ -31,13 +31,15 @@ def state_values(part: Part, graph: Graph) -> dict[str, Any]:
     return found
 
 
-def declared_starts(parts: Mapping[str, Part], is_discrete: bool = False) -> dict[str, float]:
+def declared_starts(parts: Mapping[str, Part], t_start: float, is_discrete: bool = False) -> dict[str, float]:
     """Return the start of each number of the states of all parts, by path, unless the scene says otherwise.
 
     Parameters
     ----------
     parts
         The parts.
+    t_start
+        When the scene starts, s.
     is_discrete
         Whether of the states that change at moments only, or of the continuous ones.
     """
@@ -46,7 +48,7 @@ def declared_starts(parts: Mapping[str, Part], is_discrete: bool = False) -> dic
         for path, part in parts.items()
         for spec in part.component.state_specs().values()
         if spec.is_discrete == is_discrete
-        for name, start in zip(spec.names(part.values), spec.starts(part.values), strict=True)
+        for name, start in zip(spec.names(part.values), spec.starts(part.values, t_start), strict=True)
     }
 
 

@@ -129,7 +129,8 @@ def _switching(assembly: Assembly) -> list[str]:
     """Return the parts with a constraint that reads a relation of functions of time, or may do so through a link."""
     found = []
     for path, local in assembly.mechanism.locals_.items():
-        read = (*assembly.mechanism.relations.symbols, *local.signal_symbols.values())
+        held = (one.symbol for one in assembly.discrete_states)
+        read = (*assembly.mechanism.relations.symbols, *held, *local.signal_symbols.values())
         if any(depends_on(one.value, read) for one in local.constraints):
             found.append(path)
     return found

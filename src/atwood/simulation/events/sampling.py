@@ -20,7 +20,7 @@ from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.model.declare.binding import Binding
-from atwood.model.declare.component import bind
+from atwood.model.declare.component import Component, bind
 from atwood.model.declare.laws import Law
 
 __all__ = ["Sampler", "Updated", "find_sampler"]
@@ -324,10 +324,13 @@ def find_sampler(assembly: Assembly, start: float, end: float, moments: FloatArr
     DeclarationError
         If parts feed each other in a circle within one moment.
     """
+    for path, part in assembly.flat.parts.items():
+        if type(part.component).check_run is not Component.check_run:
+            _bound(assembly, path, start).check_run(start, end)
     updates = tuple(_updates(assembly))
     times: dict[float, list[int]] = {}
     for number, one in enumerate(updates):
-        for t in _times(one, start, end):
+        for t in _times(one, assembly, start, end):
             times.setdefault(t, []).append(number)
     order = sorted(times)
     merged: list[float] = []
@@ -366,8 +369,17 @@ def _seconds(part: Any, law: Law, option: str) -> float:
     return float(part.values[given] if isinstance(given, str) else given)
 
 
-def _times(one: _Update, start: float, end: float) -> list[float]:
+def _bound(assembly: Assembly, path: str, t: float) -> Any:
+    """Return a component with its parameters as numbers."""
+    component = assembly.flat.parts[path].component
+    return bind(component, Binding(values=assembly.flat.parts[path].values, time=t))
+
+
+def _times(one: _Update, assembly: Assembly, start: float, end: float) -> list[float]:
     """Return when an update is due; not at the very end of a run, at which values are those before it."""
+    if one.law.options.when:
+        given = np.array([start, *getattr(_bound(assembly, one.path, start), one.law.options.when)()], dtype=float)
+        return [float(t) for t in np.unique(given) if start <= t < end - _ROUNDING * np.spacing(abs(end))]
     if one.every is None:
         return []
     span = end - start - one.offset

@@ -75,7 +75,7 @@ def solve_positions(
     StartError
         If a loop cannot close, or what is fixed contradicts itself or the constraints.
     """
-    level, start = _without_states(assembly, equations, level)
+    level, start = _without_states(assembly, equations, level, t)
     every = [*level.guessed, *level.fixed]
     kinematic_map = kinematic_map_of(assembly, "regular")
     q, is_direct = said(equations.coordinates, every, start)
@@ -107,10 +107,10 @@ def solve_positions(
     return Positions(q, rough, *counted(names, tangent, level.fixed, system.constraints, matrix, errors))
 
 
-def _without_states(assembly: Assembly, equations: Equations, level: Level) -> tuple[Level, FloatArray]:
+def _without_states(assembly: Assembly, equations: Equations, level: Level, t: float) -> tuple[Level, FloatArray]:
     """Return what is said of places alone, and coordinates at rest in which the states of parts have their starts."""
     q = reference_coordinates(equations)
-    known = declared_starts(assembly.flat.parts) if equations.states else {}
+    known = declared_starts(assembly.flat.parts, t) if equations.states else {}
     q[equations.placing :] = [known[one.path] for one in equations.states]
     symbols = {one.symbol: i for i, one in enumerate(equations.states, start=equations.placing)}
     for one in (*level.guessed, *level.fixed) if symbols else ():

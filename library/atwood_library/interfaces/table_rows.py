@@ -1,0 +1,94 @@
+"""Rows of tables from anything that holds them, and the polynomials between them."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from atwood import ParameterError
+
+__all__ = ["piece_at", "pieces_of", "read_table"]
+
+
+def read_table(value: Any, where: str) -> Any:
+    """Return the rows of a table from anything that holds one.
+
+    Parameters
+    ----------
+    value
+        Rows, an array, a data frame or a series of pandas, a spline of scipy, or the path of a CSV file.
+    where
+        The path of the parameter.
+    """
+    if isinstance(value, (str, Path)):
+        return _read_csv(Path(value), where)
+    if hasattr(value, "index") and hasattr(value, "to_numpy"):  # a series, or a frame of pandas
+        values = value.to_numpy()
+        return np.column_stack([value.index.to_numpy(), values]) if values.ndim == 1 or values.shape[1] == 1 else values
+    if callable(getattr(value, "antiderivative", None)):
+        return _polynomials(value, where)
+    return value
+
+
+def _read_csv(file: Path, where: str) -> list[list[float]]:
+    import csv
+
+    try:
+        with file.open(newline="") as stream:
+            lines = list(csv.reader(stream, delimiter=","))
+    except OSError as error:
+        raise ParameterError(f"the file {str(file)!r} cannot be read ({error.strerror})", where=where) from None
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, start=1):
+        if not line or line[0].lstrip().startswith("#"):
+            continue
+        try:
+            rows.append([float(text) for text in line[:2]])
+        except ValueError:
+            if rows:
+                raise ParameterError(f"line {number} of {str(file)!r} is no row of numbers", where=where) from None
+    if not rows:
+        raise ParameterError(f"{str(file)!r} has no rows of numbers", where=where)
+    return rows
+
+
+def _polynomials(spline: Any, where: str) -> list[list[float]]:
+    """Return the pieces of a spline of scipy, and a last row with its end."""
+    from scipy.interpolate import BSpline, PPoly
+
+    pieces: Any = PPoly.from_spline(spline) if isinstance(spline, BSpline) else spline  # type: ignore[arg-type]
+    if not isinstance(pieces, PPoly) or pieces.c.ndim != 2:
+        raise ParameterError(
+            f"{type(spline).__name__} is no spline with one value", where=where, advice="Give a PPoly, or a BSpline."
+        )
+    spans = zip(pairwise(pieces.x.tolist()), pieces.c.T.tolist(), strict=True)
+    rows = [[begin, *coefficients] for (begin, end), coefficients in spans if end > begin]
+    last = float(pieces.x[-1])
+    return [*rows, [last, *[0.0] * (len(pieces.c) - 1), float(pieces(last))]]
+
+
+@lru_cache(maxsize=64)
+def pieces_of(table: tuple[tuple[float, ...], ...], interpolation: str) -> tuple[tuple[float, ...], ...]:
+    """Return its polynomials: when each begins, and its coefficients of falling powers; the last one is constant."""
+    if len(table[0]) > 2:
+        return table
+    if interpolation == "linear" or len(table) < 3:
+        rows = [(a, (y - x) / (b - a), x) for (a, x), (b, y) in pairwise(table)]
+        return (*rows, (table[-1][0], 0.0, table[-1][1]))
+    from scipy.interpolate import Akima1DInterpolator, CubicSpline
+
+    kind: Any = Akima1DInterpolator if interpolation == "akima" else CubicSpline
+    times, values = np.array(table).T
+    return tuple(tuple(row) for row in _polynomials(kind(times, values), "table"))
+
+
+def piece_at(known: Any, t: float) -> tuple[float, ...]:
+    """Return the piece at a time; at its very beginning, the one that begins."""
+    pieces = pieces_of(known["table"], known["interpolation"])
+    begins = [row[0] for row in pieces]
+    number = int(np.searchsorted(begins, t + 32.0 * float(np.spacing(abs(t))), side="right"))
+    return pieces[max(number, 1) - 1]

@@ -1,0 +1,39 @@
+"""PointToPoint: from rest to rest with a largest speed and a largest acceleration."""
+
+from __future__ import annotations
+
+from atwood import Component, Scalar, absolute, maximum, minimum, observable, parameter, select, sign, sqrt
+
+
+class PointToPoint(Component):
+    """The fastest way from rest to rest with a largest speed and a largest acceleration: a trapezoid of speed.
+
+    Short ways never reach the largest speed. Its `value` is connected to an input, such as that of a drive, and takes
+    the input's unit.
+    """
+
+    synonyms = ("KinematicPTP", "KinematicPTP2", "Trapezoidal speed profile", "Bang-bang trajectory")
+
+    travel: float = parameter(1.0, unit="any", doc="How far it goes, in the unit of the input.")
+    largest_rate: float = parameter(1.0, unit="any", above=0.0, doc="Largest rate.")
+    largest_acceleration: float = parameter(1.0, unit="any", above=0.0, doc="Largest second rate.")
+    start_time: float = parameter(0.0, unit="s", doc="When it begins.")
+    offset: float = parameter(0.0, unit="any", doc="Where it begins, in the unit of the input.")
+
+    def times(self) -> tuple[Scalar, Scalar]:
+        """Return for how long it speeds up, and when it begins to slow down."""
+        way, v, a = absolute(self.travel), self.largest_rate, self.largest_acceleration
+        reaches = way * a > v * v
+        up = select(reaches, v / a, sqrt(maximum(way, 0.0) / a))
+        return up, select(reaches, way / v, up)
+
+    @observable(unit="any", doc="Value of the function, in the unit of the input.")
+    def value(self) -> Scalar:
+        """Return the value: the integral of a rate that rises, stays and falls."""
+        up, slow = self.times()
+        t = self.time - self.start_time
+        first = minimum(maximum(t, 0.0), up)
+        last = minimum(maximum(t - slow, 0.0), up)
+        between = minimum(maximum(t - up, 0.0), slow - up)
+        a = self.largest_acceleration * sign(self.travel)
+        return self.offset + a * (0.5 * first * first + up * between + up * last - 0.5 * last * last)
