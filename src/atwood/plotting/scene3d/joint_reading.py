@@ -42,7 +42,7 @@ def read_joint(
         Node of each of its connectors.
     """
     options, placement = joint.law.options, joint.placement
-    if options.rigid or options.a == "world":
+    if options.rigid or options.a == "world" or _is_idle(mechanism, path, joint):
         return []
     a, b = nodes[options.a], nodes[options.b]
     turn = reading.turns[a] if placement.axes == "a" else np.eye(3)
@@ -52,6 +52,8 @@ def read_joint(
         return _meeting(reading, path, (a, b), axes, isinstance(placement.rotation, FreeRotation))
     moving = [c for c in joint.coordinates if _depends(shift, c)]
     if len(moving) == 2:
+        if not _is_flat(mechanism, joint, shift, moving):
+            return _sheet(mechanism, path, joint, (a, b), turn)
         first, second = (_step(mechanism, joint, shift, one, 1.0) for one in moving)
         normal = turn @ np.cross(first, second)
         return [Joining(path, "plane", (a, b), (normal / np.linalg.norm(normal),), reach=_touched(mechanism, path))]
@@ -60,8 +62,8 @@ def read_joint(
     if len(moving) == 1:
         one, two = (_step(mechanism, joint, shift, moving[0], size) for size in (1.0, 2.0))
         if not np.allclose(two, 2.0 * one, rtol=1e-9, atol=0.0):
-            angles = np.linspace(0.0, 2.0 * np.pi, 73)
-            points = np.array([_shift(mechanism, joint, shift, moving[0], angle) for angle in angles])
+            angles = np.linspace(*_ends(mechanism, path), 73)
+            points = np.array([_shift(mechanism, joint, shift, {moving[0]: angle}) for angle in angles])
             return [Joining(path, "curve", (a, b), curve=points @ turn.T)]
         axis = turn @ one
     else:
@@ -71,6 +73,51 @@ def read_joint(
     axis = axis / np.linalg.norm(axis)
     along = _seen_from(reading, a, b) @ axis
     return [Joining(path, "slide", (a, b), (axis,), bool(axes), (float(along.min()), float(along.max())))]
+
+
+def _is_idle(mechanism: Mechanism, path: str, joint: LocalJoint) -> bool:
+    """Return whether nothing is joined to the end that a joint places beside that of another, as a mere marker."""
+    own = mechanism.locals_[path].joints
+    if not any(one is not joint and set(one.coordinates) & set(joint.coordinates) for one in own):
+        return False
+    members = mechanism.graph.nodes[mechanism.graph.node_of[path, joint.law.options.b]].members
+    return len(members) == 1
+
+
+def _ends(mechanism: Mechanism, path: str) -> tuple[float, float]:
+    """Return between which values of its coordinate a curve is drawn: its ends, or once round."""
+    values = mechanism.locals_[path].part.values
+    low, high = values.get("lower_end"), values.get("upper_end")
+    if isinstance(low, float) and isinstance(high, float):
+        return low, high
+    if isinstance(low, float):
+        return low, low + 2.0 * np.pi
+    return (high - 2.0 * np.pi, high) if isinstance(high, float) else (-np.pi, np.pi)
+
+
+def _is_flat(
+    mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], moving: Sequence[Expression]
+) -> bool:
+    """Return whether a joint moves its end in a plane, evenly with two coordinates."""
+    places = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [2.0, 3.0]]
+    origin, one, two, far = (_shift(mechanism, joint, shift, dict(zip(moving, place, strict=True))) for place in places)
+    return bool(np.allclose(far - origin, 2.0 * (one - origin) + 3.0 * (two - origin), rtol=1e-9, atol=1e-12))
+
+
+def _sheet(
+    mechanism: Mechanism, path: str, joint: LocalJoint, nodes: tuple[int, int], turn: FloatArray
+) -> list[Joining]:
+    """Return lines on a curved surface, along either of its coordinates."""
+    shift = [mechanism.table.graph.convert(c) for c in joint.placement.displacement]
+    first, second = [c for c in joint.coordinates if _depends(shift, c)]
+    steps, lines = np.linspace(-np.pi, np.pi, 49), np.linspace(-np.pi, np.pi, 9)
+    found = []
+    for along, across in ((first, second), (second, first)):
+        for held in lines:
+            points = np.array([_shift(mechanism, joint, shift, {along: step, across: held}) for step in steps])
+            if np.all(np.isfinite(points)):
+                found.append(Joining(path, "curve", nodes, curve=points @ turn.T))
+    return found
 
 
 def _touched(mechanism: Mechanism, path: str) -> tuple[float, float]:
@@ -106,9 +153,9 @@ def _meeting(
 
 
 def _shift(
-    mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], one: Expression, value: float
+    mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], values: Mapping[Expression, float]
 ) -> FloatArray:
-    known = {**dict.fromkeys((*joint.coordinates, *mechanism.relations.roots), 0.0), one: value}
+    known = {**dict.fromkeys((*joint.coordinates, *mechanism.relations.roots), 0.0), **values}
     for axes in joint.axes:  # whichever way they are turned, the step along a coordinate is the same
         known.update((c, float(i == k)) for i, axis in enumerate(axes) for k, c in enumerate(axis))
     return numbers(mechanism, shift, known)
@@ -118,7 +165,8 @@ def _step(
     mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], one: Expression, value: float
 ) -> FloatArray:
     """Return by how much a joint's displacement changes when one of its coordinates goes from zero to a value."""
-    found: FloatArray = _shift(mechanism, joint, shift, one, value) - _shift(mechanism, joint, shift, one, 0.0)
+    ends = [_shift(mechanism, joint, shift, {one: place}) for place in (value, 0.0)]
+    found: FloatArray = ends[0] - ends[1]
     return found
 
 
