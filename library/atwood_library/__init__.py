@@ -54,6 +54,8 @@ if TYPE_CHECKING:
     from atwood_library.joints.point_on_surface import PointOnSurface as PointOnSurface
     from atwood_library.joints.rack_and_pinion import RackAndPinion as RackAndPinion
     from atwood_library.joints.rolling_disc import RollingDisc as RollingDisc
+    from atwood_library.joints.rolling_ellipsoid import RollingEllipsoid as RollingEllipsoid
+    from atwood_library.joints.rolling_on_round import RollingOnRound as RollingOnRound
     from atwood_library.joints.rolling_sphere import RollingSphere as RollingSphere
     from atwood_library.joints.rotary_drive import RotaryDrive as RotaryDrive
     from atwood_library.joints.screw import Screw as Screw
@@ -165,6 +167,8 @@ _MODULES = {
     "Rim": "parts.rim",
     "Rod": "parts.rod",
     "RollingDisc": "joints.rolling_disc",
+    "RollingEllipsoid": "joints.rolling_ellipsoid",
+    "RollingOnRound": "joints.rolling_on_round",
     "RollingSphere": "joints.rolling_sphere",
     "Rope": "ropes.rope",
     "RotaryDrive": "joints.rotary_drive",

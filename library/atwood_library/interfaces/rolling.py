@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from atwood import (
     FREE,
     Component,
@@ -32,7 +34,7 @@ class Rolling(Component):
     may itself move. Nothing keeps the body from pulling: a negative `normal_force` says that it would lift off.
     """
 
-    spaces = ("plane", "space")
+    spaces: ClassVar[tuple[str, ...]] = ("plane", "space")
 
     radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius.")
     normal: tuple[float, float, float] = parameter(

@@ -14,10 +14,12 @@ from atwood import Scene
 
 if TYPE_CHECKING:
     from atwood_library.scenes.atwood import Atwood as Atwood
+    from atwood_library.scenes.ball_in_shell import BallInShell as BallInShell
     from atwood_library.scenes.bead_on_surface import BeadOnSurface as BeadOnSurface
     from atwood_library.scenes.bead_on_wire import BeadOnWire as BeadOnWire
     from atwood_library.scenes.bricard import Bricard as Bricard
     from atwood_library.scenes.chain import Chain as Chain
+    from atwood_library.scenes.chaplygin_sleigh import ChaplyginSleigh as ChaplyginSleigh
     from atwood_library.scenes.charged_particle import ChargedParticle as ChargedParticle
     from atwood_library.scenes.double_atwood import DoubleAtwood as DoubleAtwood
     from atwood_library.scenes.double_pendulum import DoublePendulum as DoublePendulum
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
     from atwood_library.scenes.overhead_crane import OverheadCrane as OverheadCrane
     from atwood_library.scenes.pendulum_on_cart import PendulumOnCart as PendulumOnCart
     from atwood_library.scenes.pulley_with_inertia import PulleyWithInertia as PulleyWithInertia
+    from atwood_library.scenes.rattleback import Rattleback as Rattleback
     from atwood_library.scenes.rigid_bodies import RigidBodies as RigidBodies
     from atwood_library.scenes.rolling_ball import RollingBall as RollingBall
     from atwood_library.scenes.rolling_disc import RollingDisc as RollingDisc
@@ -107,6 +110,9 @@ _CLASSES = {
     "swinging-atwood": "SwingingAtwood",
     "overhead-crane": "OverheadCrane",
     "trebuchet": "Trebuchet",
+    "chaplygin-sleigh": "ChaplyginSleigh",
+    "rattleback": "Rattleback",
+    "ball-in-shell": "BallInShell",
 }
 """The class of each scene by the name that the command line knows it by."""
 
