@@ -78,13 +78,17 @@ if TYPE_CHECKING:
     from atwood.checking import CheckReport, check
     from atwood.expr.formulas.formula import Formula, formula
     from atwood.linearization import (
+        BranchPoint,
         Equilibria,
         Equilibrium,
+        EquilibriumBranch,
+        EquilibriumBranches,
         LinearModel,
         NormalModes,
         RootLocus,
         Trim,
         equilibria,
+        equilibrium_branches,
         linearize,
         normal_modes,
         root_locus,
@@ -94,7 +98,7 @@ if TYPE_CHECKING:
     from atwood.pipeline import Assembly, assemble, simulate
     from atwood.plotting.drawing import animate, plot_mechanism
     from atwood.plotting.mode_shapes import plot_mode
-    from atwood.plotting.plots.linear import plot_bode, plot_nyquist, plot_root_locus
+    from atwood.plotting.plots.linear import plot_bode, plot_branches, plot_nyquist, plot_root_locus
     from atwood.plotting.plots.precision import plot_comparison
     from atwood.plotting.plots.quantities import plot
     from atwood.plotting.plots.sweep import plot_sweep
@@ -113,6 +117,7 @@ __all__ = [
     "Assembly",
     "AtwoodError",
     "BodyInertia",
+    "BranchPoint",
     "CheckReport",
     "Comparison",
     "ComparisonRow",
@@ -123,6 +128,8 @@ __all__ = [
     "EquationsOfMotion",
     "Equilibria",
     "Equilibrium",
+    "EquilibriumBranch",
+    "EquilibriumBranches",
     "Expression",
     "ExternalFunction",
     "Formula",
@@ -180,6 +187,7 @@ __all__ = [
     "dot",
     "equations",
     "equilibria",
+    "equilibrium_branches",
     "event",
     "exp",
     "external",
@@ -206,6 +214,7 @@ __all__ = [
     "parameter",
     "plot",
     "plot_bode",
+    "plot_branches",
     "plot_comparison",
     "plot_mechanism",
     "plot_mode",
@@ -237,12 +246,15 @@ __all__ = [
 
 _LATER = {
     "Assembly": "atwood.pipeline",
+    "BranchPoint": "atwood.linearization",
     "CheckReport": "atwood.checking",
     "Comparison": "atwood.study",
     "ComparisonRow": "atwood.study",
+    "EquationsOfMotion": "atwood.theory.equations",
     "Equilibria": "atwood.linearization",
     "Equilibrium": "atwood.linearization",
-    "EquationsOfMotion": "atwood.theory.equations",
+    "EquilibriumBranch": "atwood.linearization",
+    "EquilibriumBranches": "atwood.linearization",
     "Formula": "atwood.expr.formulas.formula",
     "LinearModel": "atwood.linearization",
     "MechanismReport": "atwood.reporting",
@@ -257,17 +269,19 @@ _LATER = {
     "assemble": "atwood.pipeline",
     "check": "atwood.checking",
     "compare": "atwood.study",
-    "equilibria": "atwood.linearization",
     "equations": "atwood.theory.equations",
+    "equilibria": "atwood.linearization",
+    "equilibrium_branches": "atwood.linearization",
     "formula": "atwood.expr.formulas.formula",
     "from_data": "atwood.model.compose.serialization",
     "linearize": "atwood.linearization",
     "load_result": "atwood.result.files",
-    "load_sweep": "atwood.study",
     "load_scene": "atwood.model.compose.serialization",
+    "load_sweep": "atwood.study",
     "normal_modes": "atwood.linearization",
     "plot": "atwood.plotting",
     "plot_bode": "atwood.plotting.plots.linear",
+    "plot_branches": "atwood.plotting.plots.linear",
     "plot_comparison": "atwood.plotting",
     "plot_mechanism": "atwood.plotting",
     "plot_mode": "atwood.plotting.mode_shapes",

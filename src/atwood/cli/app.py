@@ -329,6 +329,8 @@ def modes_command(scene: str, **options: Any) -> None:
     metavar="PATH=FROM:TO",
     help="Where to look, such as rod.angle=-90deg:90deg; everywhere if not given. Can be repeated.",
 )
+@click.option("--along", metavar="PATH=FROM:TO", help="Follow them while a parameter changes, SI units.")
+@click.option("--plot", type=_FILE, help="With --along: save a picture of the branches (.png, .svg, .pdf).")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output.")
 @reporting_errors
 def equilibria_command(scene: str, **options: Any) -> None:

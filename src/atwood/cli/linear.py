@@ -153,11 +153,69 @@ def _values(values: Mapping[str, float], most: int = 6) -> str:
     return ", ".join(shown) + (", ..." if len(values) > most else "")
 
 
-def show_equilibria(scene: str, settings: Sequence[str], region: Sequence[str], as_json: bool) -> None:
+def show_equilibria(
+    scene: str,
+    settings: Sequence[str],
+    region: Sequence[str],
+    along: str | None,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
     """Show the equilibria of a scene; see the options of `atwood equilibria`."""
     from atwood.linearization import equilibria
 
     model, name = prepare(scene, settings, ())
+    bounds = _region(region)
+    if along is not None:
+        _show_branches(model, name, along, bounds, plot, as_json)
+        return
+    if plot is not None:
+        raise UsageError("there is nothing to draw", where="--plot", advice="Give --along PATH=FROM:TO too.")
+    found = equilibria(model, region=bounds or None)
+    if as_json:
+        print_json({"scene": name, "equilibria": found.to_data()})
+        return
+    out = writer()
+    out.line((name, "bold"), (f": {len(found)} equilibri{'um' if len(found) == 1 else 'a'}", ""))
+    rows = [["stable" if one.stable else "unstable", f"{one.growth_rate:.6g}", _values(one.values)] for one in found]
+    out.table(["", "growth, 1/s>", "where"], rows)
+
+
+def _show_branches(
+    model: Model, name: str, along: str, region: dict[str, Any], plot: Path | None, as_json: bool
+) -> None:
+    from atwood.linearization import equilibrium_branches
+
+    ((path, text),) = pairs([along], "--along")
+    low, _, high = text.partition(":")
+    try:
+        span = float(low), float(high)
+    except ValueError:
+        raise UsageError(f"{text!r} is no range", where=path, advice="Write --along PATH=FROM:TO, SI units.") from None
+    found = equilibrium_branches(model, path, span, region=region or None)
+    if plot is not None:
+        from atwood.plotting.plots.linear import plot_branches
+
+        plot_branches(found, file=plot)
+    if as_json:
+        print_json({**found.to_data(), "scene": name})
+        return
+    out = writer()
+    out.line((name, "bold"), (f": {len(found.branches)} branches of equilibria over {path}", ""))
+    rows = []
+    for branch in found.branches:
+        shares = f"{int(branch.stable.sum())} of {len(branch.stable)} points stable"
+        ends = ", ".join(f"{one} {x[0]:.5g} to {x[-1]:.5g}" for one, x in list(branch.values.items())[:3])
+        rows.append([f"{branch.parameter[0]:.6g} to {branch.parameter[-1]:.6g}", ends, shares])
+    out.table([path, "coordinates at the ends", ""], rows)
+    for kind, points in (("fold", found.folds), ("branch point", found.crossings)):
+        for one in points:
+            out.line((f"{kind} at {path} = {one.parameter:.10g}: {_values(one.values)}", ""))
+    if plot is not None:
+        out.line((f"plotted: {plot}", "dim"))
+
+
+def _region(region: Sequence[str]) -> dict[str, Any]:
     bounds: dict[str, Any] = {}
     for path, text in pairs(region, "--region"):
         low, colon, high = text.partition(":")
@@ -167,14 +225,7 @@ def show_equilibria(scene: str, settings: Sequence[str], region: Sequence[str], 
             )
         unit = "".join(character for character in high if character.isalpha())
         bounds[path] = (_number(low, unit), _number(high, unit))
-    found = equilibria(model, region=bounds or None)
-    if as_json:
-        print_json({"scene": name, "equilibria": found.to_data()})
-        return
-    out = writer()
-    out.line((name, "bold"), (f": {len(found)} equilibri{'um' if len(found) == 1 else 'a'}", ""))
-    rows = [["stable" if one.stable else "unstable", f"{one.growth_rate:.6g}", _values(one.values)] for one in found]
-    out.table(["", "growth, 1/s>", "where"], rows)
+    return bounds
 
 
 def _number(text: str, unit: str) -> float | str:

@@ -1,5 +1,11 @@
 """Linear models of scenes, equilibria, small oscillations: what the equations say near a state."""
 
+from atwood.linearization.branches import (
+    BranchPoint,
+    EquilibriumBranch,
+    EquilibriumBranches,
+    equilibrium_branches,
+)
 from atwood.linearization.equilibria import Equilibria, Equilibrium, equilibria
 from atwood.linearization.linear_model import LinearModel
 from atwood.linearization.linearize import linearize
@@ -8,13 +14,17 @@ from atwood.linearization.root_locus import RootLocus, root_locus
 from atwood.linearization.trim import Trim, trim
 
 __all__ = [
+    "BranchPoint",
     "Equilibria",
     "Equilibrium",
+    "EquilibriumBranch",
+    "EquilibriumBranches",
     "LinearModel",
     "NormalModes",
     "RootLocus",
     "Trim",
     "equilibria",
+    "equilibrium_branches",
     "linearize",
     "normal_modes",
     "root_locus",

@@ -176,11 +176,21 @@ def normal_modes(scene: Model | Assembly, *, at: At = None) -> NormalModes:
     return modes_of(point)
 
 
-def modes_of(point: OperatingPoint) -> NormalModes:
-    """Return the modes about an operating point."""
+def modes_of(point: OperatingPoint, is_steady: bool = False) -> NormalModes:
+    """Return the modes about an operating point.
+
+    Parameters
+    ----------
+    point
+        The operating point.
+    is_steady
+        Whether it is known that nothing changes there.
+    """
     flow = point.scene.flow(point.t, point.q, point.u, point.kept)
-    refuse_switches(point.scene, flow, point.kept)
-    steady = still(flow) if point.is_from_result else find_steady(point.scene, flow, point.kept)
+    known = is_steady or point.is_from_result
+    if not is_steady:
+        refuse_switches(point.scene, flow, point.kept)
+    steady = still(flow) if known else find_steady(point.scene, flow, point.kept)
     if not steady.is_steady:
         raise not_steady(point, flow, steady)
     space = find_state_space(point.scene, flow, steady, point.kept)

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from atwood.arguments import FILE, instance, number, optional, takes
+from atwood.arguments import FILE, TEXT, instance, number, optional, takes
 from atwood.arguments import each as several
 from atwood.arrays import FloatArray
-from atwood.errors import UsageError
-from atwood.linearization import LinearModel, RootLocus
+from atwood.errors import UsageError, suggestion
+from atwood.linearization import EquilibriumBranches, LinearModel, RootLocus
 from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_bode", "plot_nyquist", "plot_root_locus"]
+__all__ = ["plot_bode", "plot_branches", "plot_nyquist", "plot_root_locus"]
 
 _POINTS = 600
 
@@ -148,6 +148,64 @@ def plot_root_locus(locus: RootLocus, file: str | os.PathLike[str] | None = None
     polish(left, locus.path + (f" x {scale:g}" if scale != 1.0 else ""), "real part; imaginary part dashed, 1/s")
     polish(right, "real part, 1/s", "imaginary part, 1/s")
     left.set_title(f"{locus.scene}: eigenvalues", loc="left", fontsize=11, fontweight="bold", color=INK)
+    return _finished(figure, file)
+
+
+@takes(
+    branches=instance("EquilibriumBranches, as equilibrium_branches returns them", EquilibriumBranches),
+    path=optional(TEXT),
+    file=optional(FILE),
+)
+def plot_branches(
+    branches: EquilibriumBranches, path: str | None = None, file: str | os.PathLike[str] | None = None
+) -> Figure:
+    """Draw equilibria over the parameter: stable ones with full lines, unstable ones with dashes.
+
+    Parameters
+    ----------
+    branches
+        What `atwood.equilibrium_branches` gave.
+    path
+        The coordinate that is drawn; the one that changes most if not given.
+    file
+        Where to save the picture.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+
+    Raises
+    ------
+    UsageError
+        If there is no such coordinate.
+    """
+    known = list(branches.branches[0].values)
+    if path is None:
+        spread = {one: np.ptp(np.concatenate([branch.values[one] for branch in branches.branches])) for one in known}
+        path = max(spread, key=lambda one: float(spread[one]))
+    if path not in known:
+        raise UsageError("there is no such coordinate", where=path, advice=suggestion(path, known))
+    figure = new_figure(6.4, 4.6)
+    axes = figure.subplots()
+    for branch, colour in zip(branches.branches, _colours(len(branches.branches)), strict=True):
+        values = branch.values[path]
+        for shown, style in ((branch.stable, "-"), (~branch.stable, "--")):
+            near = shown | np.roll(shown, 1) & np.roll(shown, -1)
+            axes.plot(branch.parameter, np.where(near, values, np.nan), color=colour, linewidth=1.7, linestyle=style)
+    for points, marker in ((branches.crossings, "o"), (branches.folds, "s")):
+        axes.plot(
+            [one.parameter for one in points],
+            [one.values[path] for one in points],
+            color=INK,
+            marker=marker,
+            markersize=5,
+            linestyle="none",
+        )
+    polish(axes, branches.path, path)
+    axes.set_title(
+        f"{branches.scene}: equilibria, stable with full lines", loc="left", fontsize=11, fontweight="bold", color=INK
+    )
     return _finished(figure, file)
 
 
