@@ -77,7 +77,22 @@ from atwood.model.values.vector import Vector, as_vector, cross, dot, norm
 if TYPE_CHECKING:
     from atwood.checking import CheckReport, check
     from atwood.expr.formulas.formula import Formula, formula
-    from atwood.linearization import (
+    from atwood.model.compose.serialization import from_data, load_scene, save_scene, to_data
+    from atwood.pipeline import Assembly, assemble, simulate
+    from atwood.plotting.drawing import animate, plot_mechanism
+    from atwood.plotting.mode_shapes import plot_mode
+    from atwood.plotting.plots.linear import plot_bode, plot_branches, plot_nyquist, plot_root_locus
+    from atwood.plotting.plots.precision import plot_comparison
+    from atwood.plotting.plots.quantities import plot
+    from atwood.plotting.plots.sweep import plot_sweep
+    from atwood.reporting import MechanismReport, report
+    from atwood.result.files import SavedResult, load_result, save_result
+    from atwood.result.result import Result
+    from atwood.study.comparison.compare import Comparison, ComparisonRow, compare
+    from atwood.study.sweeps.files import load_sweep
+    from atwood.study.sweeps.sweep import Sweep, sweep
+    from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
+    from atwood.theory.linearization import (
         BranchPoint,
         Equilibria,
         Equilibrium,
@@ -94,21 +109,6 @@ if TYPE_CHECKING:
         root_locus,
         trim,
     )
-    from atwood.model.compose.serialization import from_data, load_scene, save_scene, to_data
-    from atwood.pipeline import Assembly, assemble, simulate
-    from atwood.plotting.drawing import animate, plot_mechanism
-    from atwood.plotting.mode_shapes import plot_mode
-    from atwood.plotting.plots.linear import plot_bode, plot_branches, plot_nyquist, plot_root_locus
-    from atwood.plotting.plots.precision import plot_comparison
-    from atwood.plotting.plots.quantities import plot
-    from atwood.plotting.plots.sweep import plot_sweep
-    from atwood.reporting import MechanismReport, report
-    from atwood.result.files import SavedResult, load_result, save_result
-    from atwood.result.result import Result
-    from atwood.study.comparison.compare import Comparison, ComparisonRow, compare
-    from atwood.study.sweeps.files import load_sweep
-    from atwood.study.sweeps.sweep import Sweep, sweep
-    from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
 
     __version__: str
 
@@ -246,39 +246,39 @@ __all__ = [
 
 _LATER = {
     "Assembly": "atwood.pipeline",
-    "BranchPoint": "atwood.linearization",
+    "BranchPoint": "atwood.theory.linearization",
     "CheckReport": "atwood.checking",
     "Comparison": "atwood.study",
     "ComparisonRow": "atwood.study",
     "EquationsOfMotion": "atwood.theory.equations",
-    "Equilibria": "atwood.linearization",
-    "Equilibrium": "atwood.linearization",
-    "EquilibriumBranch": "atwood.linearization",
-    "EquilibriumBranches": "atwood.linearization",
+    "Equilibria": "atwood.theory.linearization",
+    "Equilibrium": "atwood.theory.linearization",
+    "EquilibriumBranch": "atwood.theory.linearization",
+    "EquilibriumBranches": "atwood.theory.linearization",
     "Formula": "atwood.expr.formulas.formula",
-    "LinearModel": "atwood.linearization",
+    "LinearModel": "atwood.theory.linearization",
     "MechanismReport": "atwood.reporting",
-    "NormalModes": "atwood.linearization",
+    "NormalModes": "atwood.theory.linearization",
     "PartOfEquations": "atwood.theory.equations",
     "Result": "atwood.result.result",
-    "RootLocus": "atwood.linearization",
+    "RootLocus": "atwood.theory.linearization",
     "SavedResult": "atwood.result.files",
     "Sweep": "atwood.study",
-    "Trim": "atwood.linearization",
+    "Trim": "atwood.theory.linearization",
     "animate": "atwood.plotting",
     "assemble": "atwood.pipeline",
     "check": "atwood.checking",
     "compare": "atwood.study",
     "equations": "atwood.theory.equations",
-    "equilibria": "atwood.linearization",
-    "equilibrium_branches": "atwood.linearization",
+    "equilibria": "atwood.theory.linearization",
+    "equilibrium_branches": "atwood.theory.linearization",
     "formula": "atwood.expr.formulas.formula",
     "from_data": "atwood.model.compose.serialization",
-    "linearize": "atwood.linearization",
+    "linearize": "atwood.theory.linearization",
     "load_result": "atwood.result.files",
     "load_scene": "atwood.model.compose.serialization",
     "load_sweep": "atwood.study",
-    "normal_modes": "atwood.linearization",
+    "normal_modes": "atwood.theory.linearization",
     "plot": "atwood.plotting",
     "plot_bode": "atwood.plotting.plots.linear",
     "plot_branches": "atwood.plotting.plots.linear",
@@ -289,13 +289,13 @@ _LATER = {
     "plot_root_locus": "atwood.plotting.plots.linear",
     "plot_sweep": "atwood.plotting",
     "report": "atwood.reporting",
-    "root_locus": "atwood.linearization",
+    "root_locus": "atwood.theory.linearization",
     "save_result": "atwood.result.files",
     "save_scene": "atwood.model.compose.serialization",
     "simulate": "atwood.pipeline",
     "sweep": "atwood.study",
     "to_data": "atwood.model.compose.serialization",
-    "trim": "atwood.linearization",
+    "trim": "atwood.theory.linearization",
 }
 """Names whose modules are imported when they are first used; each also stands in `__all__` and above."""
 

@@ -11,8 +11,8 @@ from atwood.cli.scenes import pairs, prepare, warn_of_radians
 from atwood.errors import UsageError
 
 if TYPE_CHECKING:
-    from atwood.linearization import LinearModel, NormalModes
     from atwood.model.compose.composite import Model
+    from atwood.theory.linearization import LinearModel, NormalModes
 
 __all__ = ["show_equilibria", "show_linear_model", "show_modes"]
 
@@ -38,7 +38,7 @@ def show_linear_model(
     as_json: bool,
 ) -> None:
     """Show the linear model of a scene; see the options of `atwood linearize`."""
-    from atwood.linearization import linearize
+    from atwood.theory.linearization import linearize
 
     model, name = prepare(scene, settings, ())
     found = linearize(model, at=_state(model, at), inputs=inputs, outputs=outputs, form=form)
@@ -55,7 +55,7 @@ def show_linear_model(
 
 
 def _print_model(found: LinearModel, name: str) -> None:
-    from atwood.linearization.linear_model import complex_text
+    from atwood.theory.linearization.linear_model import complex_text
 
     out = writer()
     out.line((name, "bold"), (f" ({found.form}), linear about a {found.kind}", ""))
@@ -94,7 +94,7 @@ _SHOWN = 8
 
 def show_modes(scene: str, settings: Sequence[str], at: Sequence[str], plot: Path | None, as_json: bool) -> None:
     """Show the normal modes of a scene; see the options of `atwood modes`."""
-    from atwood.linearization import equilibria, normal_modes
+    from atwood.theory.linearization import equilibria, normal_modes
 
     model, name = prepare(scene, settings, ())
     state = _state(model, at)
@@ -133,7 +133,7 @@ _PICTURES = 12
 
 
 def _print_modes(found: NormalModes, name: str) -> None:
-    from atwood.linearization.normal_modes import shape_text
+    from atwood.theory.linearization.normal_modes import shape_text
 
     out = writer()
     out.line((name, "bold"), (f": {len(found)} modes about {_values(found.values)}", ""))
@@ -162,7 +162,7 @@ def show_equilibria(
     as_json: bool,
 ) -> None:
     """Show the equilibria of a scene; see the options of `atwood equilibria`."""
-    from atwood.linearization import equilibria
+    from atwood.theory.linearization import equilibria
 
     model, name = prepare(scene, settings, ())
     bounds = _region(region)
@@ -184,7 +184,7 @@ def show_equilibria(
 def _show_branches(
     model: Model, name: str, along: str, region: dict[str, Any], plot: Path | None, as_json: bool
 ) -> None:
-    from atwood.linearization import equilibrium_branches
+    from atwood.theory.linearization import equilibrium_branches
 
     ((path, text),) = pairs([along], "--along")
     low, _, high = text.partition(":")

@@ -6,9 +6,9 @@ import os
 from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, instance, optional, takes, whole
-from atwood.linearization import NormalModes
 from atwood.plotting.canvas import INK, save_figure
 from atwood.plotting.drawing import plot_mechanism
+from atwood.theory.linearization import NormalModes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

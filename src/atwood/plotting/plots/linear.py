@@ -12,8 +12,8 @@ from atwood.arguments import FILE, TEXT, instance, number, optional, takes
 from atwood.arguments import each as several
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.linearization import EquilibriumBranches, LinearModel, RootLocus
 from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
+from atwood.theory.linearization import EquilibriumBranches, LinearModel, RootLocus
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,13 +15,13 @@ from atwood.arrays import BoolArray, FloatArray
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linearization.equilibria import equilibria
-from atwood.linearization.normal_modes import modes_of
-from atwood.linearization.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble
 from atwood.showing import fitted
 from atwood.simulation.dynamics.balance import balance_of
+from atwood.theory.linearization.equilibria import equilibria
+from atwood.theory.linearization.normal_modes import modes_of
+from atwood.theory.linearization.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 
 __all__ = ["BranchPoint", "EquilibriumBranch", "EquilibriumBranches", "equilibrium_branches"]
 

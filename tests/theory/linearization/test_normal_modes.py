@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.linearization.scenes import bicycle, hoop
+from tests.theory.linearization.scenes import bicycle, hoop
 
 from atwood import ParameterError, Scene, SolveError, UsageError, equilibria, normal_modes, root_locus, trim
 from atwood_library import Damper, Ground, Mass1D, Spring, Weld

@@ -16,8 +16,11 @@ from atwood.arguments import TEXT, each, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
-from atwood.linearization.linear_model import LinearModel
-from atwood.linearization.operating_point import (
+from atwood.model.compose.composite import Model
+from atwood.pipeline import SCENE
+from atwood.simulation.problem.arguments import FORM
+from atwood.theory.linearization.linear_model import LinearModel
+from atwood.theory.linearization.operating_point import (
     AT,
     At,
     OperatingPoint,
@@ -25,10 +28,7 @@ from atwood.linearization.operating_point import (
     speed_name,
     values_at,
 )
-from atwood.linearization.quantities import output_rows
-from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE
-from atwood.simulation.problem.arguments import FORM
+from atwood.theory.linearization.quantities import output_rows
 
 __all__ = ["linearize", "not_steady"]
 

@@ -12,11 +12,18 @@ from atwood.arguments import TEXT, each, takes
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linearization.operating_point import AT, At, OperatingPoint, find_operating_point, moved_to, values_at
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
 from atwood.showing import fitted
 from atwood.simulation.dynamics.balance import balance_of
+from atwood.theory.linearization.operating_point import (
+    AT,
+    At,
+    OperatingPoint,
+    find_operating_point,
+    moved_to,
+    values_at,
+)
 
 __all__ = ["Trim", "trim"]
 

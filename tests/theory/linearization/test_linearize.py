@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 import scipy.optimize
-from tests.linearization.scenes import bicycle, bicycle_matrix, disc, hoop
+from tests.theory.linearization.scenes import bicycle, bicycle_matrix, disc, hoop
 
 import atwood
 from atwood import ParameterError, Scene, StartError, UsageError, absolute, linearize, simulate
 from atwood.analysis.linear.minimal import find_minimal
 from atwood.analysis.linear.variations import Flow
-from atwood.linearization.operating_point import OperatingPoint, find_operating_point
 from atwood.model.local.flatten import flatten
 from atwood.simulation.dynamics.balance import balance_of
+from atwood.theory.linearization.operating_point import OperatingPoint, find_operating_point
 from atwood_library import (
     Damper,
     Drive,

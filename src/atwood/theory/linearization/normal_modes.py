@@ -16,13 +16,13 @@ from atwood.arguments import check, takes, whole
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linearization.linearize import not_steady
-from atwood.linearization.mode_motion import mode_motion
-from atwood.linearization.operating_point import AT, At, OperatingPoint, find_operating_point, values_at
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
 from atwood.result.result import Result
 from atwood.showing import fitted
+from atwood.theory.linearization.linearize import not_steady
+from atwood.theory.linearization.mode_motion import mode_motion
+from atwood.theory.linearization.operating_point import AT, At, OperatingPoint, find_operating_point, values_at
 
 __all__ = ["NormalModes", "modes_of", "normal_modes", "shape_text"]
 

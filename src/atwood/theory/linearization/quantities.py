@@ -12,7 +12,7 @@ from atwood.analysis.linear.variations import Flow
 from atwood.arrays import FloatArray
 from atwood.errors import ParameterError, UnsupportedError, suggestion
 from atwood.expr import InputGroup, OutputGroup, Program, jacobian, live
-from atwood.linearization.operating_point import OperatingPoint
+from atwood.theory.linearization.operating_point import OperatingPoint
 
 __all__ = ["output_rows"]
 

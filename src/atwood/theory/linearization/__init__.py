@@ -1,17 +1,17 @@
 """Linear models of scenes, equilibria, small oscillations: what the equations say near a state."""
 
-from atwood.linearization.branches import (
+from atwood.theory.linearization.branches import (
     BranchPoint,
     EquilibriumBranch,
     EquilibriumBranches,
     equilibrium_branches,
 )
-from atwood.linearization.equilibria import Equilibria, Equilibrium, equilibria
-from atwood.linearization.linear_model import LinearModel
-from atwood.linearization.linearize import linearize
-from atwood.linearization.normal_modes import NormalModes, normal_modes
-from atwood.linearization.root_locus import RootLocus, root_locus
-from atwood.linearization.trim import Trim, trim
+from atwood.theory.linearization.equilibria import Equilibria, Equilibrium, equilibria
+from atwood.theory.linearization.linear_model import LinearModel
+from atwood.theory.linearization.linearize import linearize
+from atwood.theory.linearization.normal_modes import NormalModes, normal_modes
+from atwood.theory.linearization.root_locus import RootLocus, root_locus
+from atwood.theory.linearization.trim import Trim, trim
 
 __all__ = [
     "BranchPoint",

@@ -13,10 +13,10 @@ from atwood.arrays import ComplexArray, FloatArray
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linearization.linearize import linearize
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble
 from atwood.showing import fitted
+from atwood.theory.linearization.linearize import linearize
 
 __all__ = ["RootLocus", "root_locus"]
 

@@ -15,13 +15,13 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, ParameterError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linearization.normal_modes import NormalModes, modes_of
-from atwood.linearization.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE
 from atwood.showing import fitted
 from atwood.simulation.dynamics.balance import balance_of
+from atwood.theory.linearization.normal_modes import NormalModes, modes_of
+from atwood.theory.linearization.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 
 __all__ = ["Equilibria", "Equilibrium", "equilibria"]
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from atwood.arrays import ComplexArray
-from atwood.linearization.operating_point import OperatingPoint
 from atwood.result.result import Result
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.initialization.start import Start
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.run import run
+from atwood.theory.linearization.operating_point import OperatingPoint
 
 __all__ = ["mode_motion"]
 
