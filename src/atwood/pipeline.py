@@ -56,6 +56,7 @@ from atwood.simulation.problem.arguments import (
 from atwood.simulation.problem.conditions import Condition
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.run import run, run_out_of_time
+from atwood.tolerances import tolerances
 from atwood.topology.bodies import find_bodies
 from atwood.topology.graph import build_graph
 from atwood.topology.line_signs import find_line_signs
@@ -245,7 +246,7 @@ def simulate(
     level: str | None = None,
     orientation: str | None = None,
     t_end: float | str | None = None,
-    rtol: float = 1e-8,
+    rtol: float = tolerances.RTOL,
     atol: float | None = None,
     outputs: Any = 201,
     max_steps: int | None = None,

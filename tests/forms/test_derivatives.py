@@ -92,7 +92,9 @@ def test_levels_of_constraints_are_derivatives_of_each_other(name: str, form: st
             step=1e-3 / max(1.0, float(np.max(np.abs(u)))),
         )
         assert np.max(np.abs(now.rate[held] - rate[:, 0])) < 1e-8 * max(1.0, float(np.max(np.abs(u))))
-        assert np.max(np.abs(now.rate - now.jacobian @ u - now.drift)) < 1e-12 * max(1.0, np.max(np.abs(now.rate)))
+        assert np.max(np.abs(now.rate - now.jacobian @ u - now.explicit_rate)) < 1e-12 * max(
+            1.0, np.max(np.abs(now.rate))
+        )
         path = lambda h, q=q, u=u, a=a: balance.at(t + h, moved(prepared, q, u, a, h, t), u + h * a).rate  # noqa: E731
         # Steps so short that what turns fastest hardly turns within one.
         step = 1e-3 / max(1.0, float(np.max(np.abs(u))))

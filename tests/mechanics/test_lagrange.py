@@ -95,7 +95,7 @@ def test_power_balance_at_any_state(name: str, form: str) -> None:
         )[0, 0]
         now = balance.at(t, q, u)
         kept = slice(None) if prepared.plan.kept is None else prepared.plan.kept
-        power = -multipliers @ now.drift[kept] if balance.constraints else 0.0
+        power = -multipliers @ now.explicit_rate[kept] if balance.constraints else 0.0
         if dampers(prepared):
             assembly = prepared.assembly
             program = assembly.known_program(

@@ -129,7 +129,7 @@ def start_values(mechanism: Mechanism, body: Body) -> tuple[dict[str, float], di
 
 def _value(value: Any) -> Any:
     if isinstance(value, Signal):
-        if not value.amplitude and not value.jacobian:
+        if not value.amplitude and not value.slope:
             return value.offset
         return _function(value)
     return tuple(float(x) for x in value) if isinstance(value, np.ndarray) else value
@@ -137,8 +137,8 @@ def _value(value: Any) -> Any:
 
 def _function(signal: Signal) -> Callable[[Any], Any]:
     return lambda t: (
-        signal.offset + signal.jacobian * t + signal.amplitude * sin(signal.frequency * t + signal.phase)
-        if signal.jacobian
+        signal.offset + signal.slope * t + signal.amplitude * sin(signal.frequency * t + signal.phase)
+        if signal.slope
         else signal.offset + signal.amplitude * sin(signal.frequency * t + signal.phase)
     )
 

@@ -63,18 +63,18 @@ class Signal:
     """A function of time, ``offset + slope t + amplitude sin(frequency t + phase)``."""
 
     offset: float = 0.0
-    jacobian: float = 0.0
+    slope: float = 0.0
     amplitude: float = 0.0
     frequency: float = 1.0
     phase: float = 0.0
 
     def at(self, t: Any) -> Any:
         """Return the value; `t` may be complex."""
-        return self.offset + self.jacobian * t + self.amplitude * np.sin(self.frequency * t + self.phase)
+        return self.offset + self.slope * t + self.amplitude * np.sin(self.frequency * t + self.phase)
 
     def rate(self, t: Any) -> Any:
         """Return the derivative."""
-        return self.jacobian + self.amplitude * self.frequency * np.cos(self.frequency * t + self.phase)
+        return self.slope + self.amplitude * self.frequency * np.cos(self.frequency * t + self.phase)
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,7 @@ def _backwards(value: object) -> object:
     if not isinstance(value, Signal):
         return value
     phase = value.frequency * T_END + value.phase
-    return Signal(value.offset + value.jacobian * T_END, -value.jacobian, value.amplitude, -value.frequency, phase)
+    return Signal(value.offset + value.slope * T_END, -value.slope, value.amplitude, -value.frequency, phase)
 
 
 def _apart(one: Array, other: Array, size: float) -> float:

@@ -153,14 +153,14 @@ def scaled(mechanism: Mechanism, random: np.random.Generator) -> Related:
         factor = kilogram**m * metre**l * second**t
         if isinstance(value, Signal):
             offset, amplitude = factor * value.offset, factor * value.amplitude
-            return Signal(offset, factor * value.jacobian / second, amplitude, value.frequency / second, value.phase)
+            return Signal(offset, factor * value.slope / second, amplitude, value.frequency / second, value.phase)
         return value if isinstance(value, str) or exponents == (0, 0, 0) else factor * value
 
     def part(tie: Tie) -> Tie:
         values = {name: times(value, dimensions(tie.sort, name)) for name, value in tie.values.items()}
         for name, value in tie.values.items():
             if isinstance(value, Signal) and dimensions(tie.sort, name) == (0, 0, 0):
-                values[name] = replace(value, slope=value.jacobian / second, frequency=value.frequency / second)
+                values[name] = replace(value, slope=value.slope / second, frequency=value.frequency / second)
         mounts = tuple(replace(mount, position=metre * mount.position) for mount in tie.mounts)
         return replace(tie, mounts=mounts, values=values)
 

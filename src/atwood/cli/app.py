@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import click
 
 from atwood.cli.errors import FAILED, reporting_errors
+from atwood.tolerances import tolerances
 
 __all__ = ["main"]
 
@@ -149,7 +150,9 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 )
 @_ORIENTATION
 @click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
-@click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative tolerance of the solver.")
+@click.option(
+    "--rtol", type=float, default=tolerances.RTOL, show_default=True, help="Relative tolerance of the solver."
+)
 @click.option("--atol", type=float, help="Absolute tolerance, as a share of the scene's sizes; as --rtol if not given.")
 @click.option(
     "--solver",
@@ -257,7 +260,9 @@ def compare_command(scene: str, as_json: bool, **options: Any) -> None:
     "--level", type=_LEVEL, default="ggl", show_default=True, help="Level of the constraints of the dae form."
 )
 @click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
-@click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative tolerance of the solver.")
+@click.option(
+    "--rtol", type=float, default=tolerances.RTOL, show_default=True, help="Relative tolerance of the solver."
+)
 @click.option("--solver", type=_SOLVER, default="auto", show_default=True, help="As for `atwood run`.")
 @click.option("--outputs", type=click.IntRange(min=2), help="Number of output times; the end alone if not given.")
 @click.option("--max-steps", type=click.IntRange(min=1), help="Stop a run after so many steps.")

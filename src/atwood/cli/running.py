@@ -15,6 +15,7 @@ from atwood.cli.output import print_json, warn
 from atwood.cli.scenes import prepare
 from atwood.errors import AtwoodError, UsageError
 from atwood.late import dataclass
+from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
@@ -34,7 +35,7 @@ class RunRequest:
     level: str = "ggl"
     orientation: str = "quaternion"
     t_end: float | None = None
-    rtol: float = 1e-8
+    rtol: float = tolerances.RTOL
     atol: float | None = None
     solver: str = "auto"
     outputs: int = 201

@@ -17,6 +17,7 @@ from atwood.cli.output import console, print_json, warn
 from atwood.cli.scenes import pairs, prepare, warn_of_radians
 from atwood.errors import UsageError
 from atwood.late import dataclass
+from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -46,7 +47,7 @@ class SweepRequest:
     form: str = "reduced"
     level: str = "ggl"
     t_end: float | None = None
-    rtol: float = 1e-8
+    rtol: float = tolerances.RTOL
     solver: str = "auto"
     outputs: int | None = None
     max_steps: int | None = None

@@ -18,7 +18,7 @@ from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
 
-__all__ = ["CERTAIN", "ROUGHNESS", "WAYS", "RoughProgram", "roughly"]
+__all__ = ["ROUGHNESS", "WAYS", "RoughProgram", "roughly"]
 
 
 WAYS = 8
@@ -26,13 +26,6 @@ WAYS = 8
 
 ROUGHNESS = 2.0**-48
 """By how much each operation is off, relative to what it gives: 16 times the machine's own rounding."""
-
-CERTAIN = 30.0
-"""Times the error that is found so: what is more than that is not rounding.
-
-Errors come from some ways of rounding 16 times as rough as the machine's; so 500 roundings in a row that all go the
-same way are still told from what is there.
-"""
 
 
 def _logical(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -20,6 +20,7 @@ import numpy as np
 from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import UsageError
 from atwood.late import dataclass
+from atwood.tolerances import tolerances
 
 __all__ = [
     "Budget",
@@ -228,7 +229,7 @@ class SolverOptions:
         option, and not taken from the first output time, so that outputs never change the solution.
     """
 
-    relative_tolerance: float = 1e-6
+    relative_tolerance: float = tolerances.RTOL
     absolute_tolerances: FloatArray | float = 1e-8
     first_step: float | None = None
     max_step: float | None = None

@@ -30,13 +30,14 @@ from atwood.reporting.parts import (
     list_ties,
 )
 from atwood.showing import fitted, html_table
-from atwood.simulation.dynamics.rank import FREE, row_scales
+from atwood.simulation.dynamics.rank import row_scales
 from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
 from atwood.simulation.initialization.start import Start, find_start, own_state, settle
 from atwood.simulation.problem.arguments import NAME, ORIENTATION
 from atwood.simulation.problem.problem import Plan, make_plan
+from atwood.tolerances import tolerances
 
 __all__ = [
     "BodyEntry",
@@ -314,7 +315,7 @@ def _not_unique(assembly: Assembly, plan: Plan, start: Start) -> tuple[str, ...]
     constraint_jacobian = scaled(to_array(plan.balance.at(start.time, q, np.zeros_like(u)).jacobian), plan.sizes)
     rows = row_scales(constraint_jacobian, np.ones_like(u), plan.balance.errors.near(start.time, q, plan.sizes))
     _, _, directions = np.linalg.svd((constraint_jacobian / rows[:, None]).T)
-    involved = np.max(np.abs(directions[plan.finding.rank :]), axis=0, initial=0.0) > FREE
+    involved = np.max(np.abs(directions[plan.finding.rank :]), axis=0, initial=0.0) > tolerances.FREE
     constraints = assembly.maximal.constraints
     return tuple(
         dict.fromkeys(f"{one.key[0]}.{one.reaction}" for one, hit in zip(constraints, involved, strict=True) if hit)

@@ -12,7 +12,7 @@ from atwood.analysis.linear.variations import Flow, LinearScene
 from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.late import dataclass
-from atwood.simulation.dynamics.rank import CERTAIN
+from atwood.tolerances import tolerances
 
 __all__ = ["StateSpace", "find_state_space"]
 
@@ -70,7 +70,7 @@ def find_state_space(scene: LinearScene, flow: Flow, steady: Steady, kept: Seque
     fastest = np.sqrt(np.max(np.abs(matrix[n:, :n] * own[0] / own[1][:, None]), initial=0.0))
     fastest = max(float(fastest), float(np.max(np.abs(matrix[n:, n : minimal.states]), initial=0.0))) or 1.0
     sizes = np.concatenate([own[0], own[1] * fastest])
-    return StateSpace(minimal, matrix, CERTAIN * largest, sizes)
+    return StateSpace(minimal, matrix, tolerances.CERTAIN * largest, sizes)
 
 
 def _matrix(scene: LinearScene, flow: Flow, steady: Steady, minimal: Minimal) -> FloatArray:

@@ -9,8 +9,9 @@ from atwood.errors import TopologyError
 from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, substitute
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.inertia import Masses
-from atwood.mechanics.kinematics.mechanism import CLOSES, Mechanism, decide, extent
+from atwood.mechanics.kinematics.mechanism import Mechanism, decide, extent
 from atwood.model.local.laws import LocalConstraint
+from atwood.tolerances import tolerances
 from atwood.topology.spanning_forest import SpanningForest
 
 __all__ = ["SOLVED", "check_held", "drop_closed", "eliminate_linear"]
@@ -138,7 +139,7 @@ def drop_closed(mechanism: Mechanism, q: Sequence[Expression], values: Values) -
 def _check_closed(where: str, value: Expression, mechanism: Mechanism) -> None:
     """Refuse a constraint between what is fixed that does not hold."""
     (miss,) = evaluate([value], mechanism.table.values)
-    if not abs(miss) <= CLOSES * (extent(mechanism) or 1.0):
+    if not abs(miss) <= tolerances.CLOSED * (extent(mechanism) or 1.0):
         raise TopologyError(
             f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
             where=where,

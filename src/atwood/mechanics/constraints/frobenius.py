@@ -15,15 +15,13 @@ from atwood.expr import Expression, jacobian, jvp, substitute
 from atwood.mechanics.constraints.pfaffian import NEEDED, Places
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
+from atwood.tolerances import tolerances
 
 __all__ = ["integrable_together"]
 
 
 _LARGEST = 12
 """Up to so many speeds it is asked."""
-
-_NOTHING = 1e-9
-"""Relative to the largest term: what is less is rounding."""
 
 
 def integrable_together(mechanism: Mechanism, equations: Equations) -> bool | None:
@@ -102,7 +100,7 @@ def _vanishes(numbers: FloatArray, sizes: FloatArray, m: int, q: int) -> bool:
     units = np.maximum(np.max(np.abs(forms), axis=1), 1e-300)
     left, derivatives = (one * both / units[:, None, None] for one in (left, derivatives))
     _, strengths, directions = np.linalg.svd(forms / units[:, None])
-    free = directions[int(np.sum(strengths > 1e-9)) :]
+    free = directions[int(np.sum(strengths > tolerances.RANK)) :]
     rest = np.einsum("ai,kij,bj->kab", free, derivatives, free)
     largest = max(float(np.max(np.abs(left), initial=0.0)), 1.0)
-    return bool(np.max(np.abs(rest), initial=0.0) <= _NOTHING * largest)
+    return bool(np.max(np.abs(rest), initial=0.0) <= tolerances.RANK * largest)

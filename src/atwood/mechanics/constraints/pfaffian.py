@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.codegen.rounding import CERTAIN, RoughProgram, roughly
+from atwood.codegen.rounding import RoughProgram, roughly
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, evaluate, jacobian, live, substitute
 from atwood.expr.core.operations import PIECEWISE_CONSTANT
@@ -25,12 +25,10 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism, decide, extent
 from atwood.mechanics.kinematics.motion import Movement
 from atwood.model.local.laws import LocalConstraint
+from atwood.tolerances import tolerances
 
 __all__ = ["NEEDED", "Form", "Places", "constant_pivot", "is_idle", "linear_integrals", "pfaffian_forms"]
 
-
-_SAME = 1e-11
-"""Coefficients that differ by less, in terms of the largest of their form, are the same but for rounding."""
 
 _ASKED, NEEDED = 7, 4
 """At so many places coefficients are looked at, and at so many they must have values."""
@@ -147,7 +145,7 @@ class Places:
                 found.append(np.ptp(ways, axis=1))
         if len(found) != len(numbers):  # where a place is next to one without a value
             return np.abs(numbers) > 0.0
-        return np.abs(numbers) > CERTAIN * np.array(found).reshape(numbers.shape)
+        return np.abs(numbers) > tolerances.CERTAIN * np.array(found).reshape(numbers.shape)
 
     def some(self, mechanism: Mechanism) -> dict[Expression, float]:
         """Return one of the places."""
@@ -185,7 +183,7 @@ def is_idle(mechanism: Mechanism, places: Places, form: Form) -> bool:
         if len(values) < NEEDED or len(terms) < NEEDED:
             return False
         sizes = places.sizes(mechanism)[[number for number, _ in form.terms]]
-        return bool(np.max(np.abs(values)) <= _SAME * np.max(np.abs(terms * sizes), initial=0.0))
+        return bool(np.max(np.abs(values)) <= tolerances.SAME * np.max(np.abs(terms * sizes), initial=0.0))
 
     return all(c.is_zero for c in (*form.coefficients, form.explicit_rate)) or (
         not form.switches and decide(mechanism, how)
@@ -219,7 +217,7 @@ def constant_pivot(
         if len(values) < NEEDED:
             return None
         largest = float(np.max(np.abs(values)))
-        even = np.max(values, axis=0) - np.min(values, axis=0) <= _SAME * largest
+        even = np.max(values, axis=0) - np.min(values, axis=0) <= tolerances.SAME * largest
         sizes = np.where(even, np.min(np.abs(values), axis=0), 0.0)
         chosen = max(allowed, key=lambda i: float(sizes[i]), default=None)
         return chosen if chosen is not None and sizes[chosen] >= 0.1 * largest > 0.0 else None
@@ -306,7 +304,10 @@ def _is_constant(places: Places, form: Form, own: Sequence[int], mechanism: Mech
     ratios = values / values[:, pivot : pivot + 1]
     others = [i for i in range(len(form.coefficients)) if i not in set(own)]
     size = float(np.max(np.abs(ratios)))
-    return bool(np.max(np.ptp(ratios, axis=0)) <= _SAME * size and not np.any(np.abs(ratios[:, others]) > _SAME * size))
+    return bool(
+        np.max(np.ptp(ratios, axis=0)) <= tolerances.SAME * size
+        and not np.any(np.abs(ratios[:, others]) > tolerances.SAME * size)
+    )
 
 
 def _combinations(
@@ -322,15 +323,15 @@ def _combinations(
         return ()
     spans = np.stack(at_places, axis=1)
     spans = spans / np.max(np.abs(spans), axis=2, keepdims=True, initial=1e-300)
-    ranks = [int(np.linalg.matrix_rank(span, tol=1e-9)) for span in spans]
+    ranks = [int(np.linalg.matrix_rank(span, tol=tolerances.RANK)) for span in spans]
     kernels = [np.linalg.svd(span)[2][rank:] for span, rank in zip(spans, ranks, strict=True)]
     alone = [np.eye(len(sizes))[i] for i in range(len(sizes) - 1) if i not in set(own)]
     _, strengths, directions = np.linalg.svd(np.vstack([*kernels, *(row[None] for row in alone)]))
-    common = directions[int(np.sum(strengths > 1e-9)) :]
+    common = directions[int(np.sum(strengths > tolerances.RANK)) :]
     found: list[tuple[tuple[int, ...], tuple[tuple[int, float], ...]]] = []
     for row in _reduced(common):
         weights = np.linalg.lstsq(spans[0].T, row, rcond=None)[0]
-        members = tuple(int(i) for i in np.argsort(np.abs(weights), kind="stable") if abs(weights[i]) > 1e-9)
+        members = tuple(int(i) for i in np.argsort(np.abs(weights), kind="stable") if abs(weights[i]) > tolerances.RANK)
         if not members or any(set(members) & set(others) for others, _ in found):
             continue  # the next round finds it
         found.append((members, tuple((i, float(c / sizes[i])) for i, c in enumerate(row) if c != 0.0)))

@@ -18,11 +18,11 @@ from atwood.model.local.states import declared_starts
 from atwood.model.values.rotation import as_rotation, compose
 from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector, as_vector
+from atwood.tolerances import tolerances
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import Joint, MechanismGraph
 
 __all__ = [
-    "CLOSES",
     "Mechanism",
     "check_closures",
     "decide",
@@ -34,9 +34,6 @@ __all__ = [
 ]
 
 T = TypeVar("T")
-
-CLOSES = 1e-9
-"""Relative to the extent of the mechanism: how far rigid parts may miss each other and still count as joined."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +198,10 @@ def check_closures(mechanism: Mechanism) -> None:
         misses = [*gap, *_turns_missed(joint, turns[joint.a], turns[joint.b], space)]
         numbers = evaluate([graph.convert(m) for m in misses], mechanism.table.values)
         turned = max((abs(m) for m in numbers[3:]), default=0.0)
-        if not all(abs(m) <= CLOSES * (extent(mechanism) or 1.0) for m in numbers[:3]) or not turned <= CLOSES:
+        if (
+            not all(abs(m) <= tolerances.CLOSED * (extent(mechanism) or 1.0) for m in numbers[:3])
+            or not turned <= tolerances.CLOSED
+        ):
             kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
             raise TopologyError(
                 f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {turned:g} rad",

@@ -25,6 +25,7 @@ from atwood.simulation.dynamics.columns import mass_at
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
 from atwood.simulation.dynamics.rank import least_norm, row_scales
 from atwood.simulation.dynamics.rounding import RowErrors
+from atwood.tolerances import tolerances
 
 __all__ = [
     "Balance",
@@ -179,7 +180,7 @@ class Balance:
             jacobian, value = self.on_positions(self.constraints_at(t, q, still))
             rows = row_scales(jacobian, scales, on_positions)
             miss = float(np.max(np.abs(value / rows)))
-            if miss == 0.0 or (miss < 1e-11 and miss >= 0.5 * last):
+            if miss == 0.0 or (miss < tolerances.MET and miss >= 0.5 * last):
                 break
             last = miss
             q = self.kinematic_map.moved(t, q, -scales * least_norm(scaled(jacobian, scales, rows), value / rows))

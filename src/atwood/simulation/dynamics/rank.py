@@ -16,15 +16,11 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.clock import within_time
-from atwood.codegen.rounding import CERTAIN, ROUGHNESS
+from atwood.codegen.rounding import ROUGHNESS
 from atwood.linalg.matrices import Matrix, is_full, scaled, to_array
+from atwood.tolerances import tolerances
 
 __all__ = [
-    "CERTAIN",
-    "CLEAR",
-    "FREE",
-    "RANK",
-    "SINGULAR",
     "certain",
     "independent_rows",
     "least_norm",
@@ -36,32 +32,6 @@ __all__ = [
     "trusted_sizes",
 ]
 
-
-RANK = 1e-9
-"""Relative size below which a direction is not followed when a linear system is solved.
-
-It must lie well above what is left of rounding in rows that are scaled by `row_scales`, and below what a mechanism
-shows near a singular position.
-"""
-
-TRUSTED = 1e11
-"""Times its error: a row is measured by its own size if it is larger, and else by this.
-
-What rounding leaves in a row that is scaled so is below 1e-11, a hundredth of `RANK`.
-"""
-
-SINGULAR = 1e-5
-"""Relative to a little away from it: at a singular position the smallest singular value is less.
-
-A little away is 1e-2 of a radian, so that a start within 1e-7 of a singular position, of which Newton's method knows no
-more than that, is one.
-"""
-
-CLEAR = 1e-6
-"""Smallest singular value, rows and columns scaled, above which no position near by is asked: rank is full."""
-
-FREE = 1e-6
-"""Share in a direction of size one above which a coordinate or speed counts as moving along it."""
 
 _LEVEL = 0.03
 """Of rows that are independent of those chosen, the first is chosen of which this share of the largest is left.
@@ -103,7 +73,7 @@ def row_scales(jacobian: Matrix, scales: FloatArray, errors: FloatArray) -> Floa
 
 def trusted_sizes(sizes: FloatArray, errors: FloatArray) -> FloatArray:
     """Return the size of each row from its largest entry, of shape (..., rows); see `row_scales`."""
-    rows = np.maximum(sizes, TRUSTED * errors)
+    rows = np.maximum(sizes, tolerances.TRUSTED * errors)
     return np.where(rows > 0.0, rows, 1.0)
 
 
@@ -115,7 +85,7 @@ def certain(errors: FloatArray, sizes: FloatArray) -> FloatArray:
     errors, sizes
         How far rounding can take each row, and its largest entry.
     """
-    return CERTAIN * _at_least(errors, sizes)
+    return tolerances.CERTAIN * _at_least(errors, sizes)
 
 
 def _at_least(errors: FloatArray, sizes: FloatArray) -> FloatArray:
@@ -157,11 +127,11 @@ def _chosen(rows: FloatArray, errors: FloatArray, most: int, first: NDArray[np.b
     basis = np.empty((most, rows.shape[1]))
     is_open, is_first = np.ones(len(rows), dtype=bool), np.zeros(len(rows), dtype=bool) if first is None else first
     while len(chosen) < most:
-        bounds = CERTAIN * errors
+        bounds = tolerances.CERTAIN * errors
         largest = float(np.max(sizes, where=is_open, initial=0.0))
         if chosen and largest < _LOOK:
             weights = np.linalg.lstsq(rows[chosen].T, rows.T, rcond=None)[0]
-            bounds = CERTAIN * np.sqrt(errors**2 + errors[chosen] ** 2 @ weights**2)
+            bounds = tolerances.CERTAIN * np.sqrt(errors**2 + errors[chosen] ** 2 @ weights**2)
         is_open &= sizes > bounds
         if not np.any(is_open):
             break
@@ -263,7 +233,7 @@ def _is_clear(matrix: Matrix, errors: FloatArray) -> bool:
     from atwood.linalg.sparse import rows_are_independent
 
     sizes = row_sizes(matrix, np.ones(matrix.shape[1]))
-    return bool(np.all(sizes > errors / _LOOK)) and rows_are_independent(matrix, CLEAR)
+    return bool(np.all(sizes > errors / _LOOK)) and rows_are_independent(matrix, tolerances.CLEAR)
 
 
 def open_directions(matrix: FloatArray, least: float = 0.0) -> FloatArray:
@@ -285,7 +255,7 @@ def open_directions(matrix: FloatArray, least: float = 0.0) -> FloatArray:
 def least_norm(matrix: Matrix, right: FloatArray) -> FloatArray:
     """Return the shortest solution of a linear system, or the best where there is none."""
     if is_full(matrix):
-        return np.asarray(np.linalg.lstsq(matrix, right, rcond=RANK)[0], dtype=float)
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=tolerances.RANK)[0], dtype=float)
     from atwood.linalg.sparse import csr_least_norm
 
     return csr_least_norm(matrix, right)

@@ -16,13 +16,11 @@ from atwood.errors import KernelEvaluationError
 from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
 from atwood.simulation.dynamics.balance import Balance
-from atwood.simulation.dynamics.rank import CLEAR, SINGULAR, independent_rows, open_directions, review_rows, row_sizes
+from atwood.simulation.dynamics.rank import independent_rows, open_directions, review_rows, row_sizes
+from atwood.tolerances import tolerances
 
 __all__ = ["RankFinding", "find_rank", "kept_along", "review_kept"]
 
-
-_ADMISSIBLE = 1e-9
-"""How well a position near the start must fulfil the constraints to be asked for their rank."""
 
 _STEPS = (1e-2, 3e-2, 3e-2)
 """How far away the positions are that are asked, relative to the scene's sizes."""
@@ -98,7 +96,7 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     here = _look(balance, t, q, scales)
     sizes = row_sizes(here.jacobian, np.ones(len(scales)))
     everything = list(range(count))
-    if len(here.kept) == count and here.smallest(everything, sizes)[-1] > CLEAR:
+    if len(here.kept) == count and here.smallest(everything, sizes)[-1] > tolerances.CLEAR:
         return RankFinding(tuple(everything), (), count, count)
     nearby, is_movable = _nearby(balance, t, q, scales, here)
     if is_movable and not nearby:
@@ -182,7 +180,7 @@ def _nearby(balance: Balance, t: float, q: FloatArray, scales: FloatArray, here:
     """Return admissible places near by, and whether there seem to be any."""
     # Constraints on velocities alone keep nothing from being reached.
     holding = [i for i in here.kept if i in set(balance.holonomic.tolist())]
-    admissible = open_directions(here.jacobian[holding], CLEAR)
+    admissible = open_directions(here.jacobian[holding], tolerances.CLEAR)
     still, found = np.zeros_like(scales), []
     for attempt, step in enumerate(_STEPS, 1):
         if not len(admissible):
@@ -196,7 +194,7 @@ def _nearby(balance: Balance, t: float, q: FloatArray, scales: FloatArray, here:
             try:
                 nearby, _ = balance.project(t, balance.kinematic_map.moved(t, q, way), still, free, iterations)
                 miss = balance.misses(t, nearby, still, scales)[0]
-                if miss <= _ADMISSIBLE:
+                if miss <= tolerances.CLOSED:
                     found.append(_look(balance, t, nearby, scales, miss))
                     break
             except (KernelEvaluationError, np.linalg.LinAlgError):
@@ -211,7 +209,7 @@ def _lost(here: _Place, nearby: list[_Place], kept: list[int]) -> tuple[int, ...
     ones = np.ones(here.jacobian.shape[1])
     units = np.max([row_sizes(place.jacobian, ones) for place in (here, *nearby)], axis=0)
     away = max(float(place.smallest(kept, units)[-1]) for place in nearby)
-    missing = int(np.sum(here.smallest(kept, units) < SINGULAR * away))
+    missing = int(np.sum(here.smallest(kept, units) < tolerances.SINGULAR * away))
     if not missing:
         return ()
     left = independent_rows(here.jacobian[kept], here.errors[kept], len(kept) - missing)

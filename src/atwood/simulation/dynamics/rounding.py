@@ -17,7 +17,7 @@ from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.simulation.dynamics.kinematic_map import KinematicMap
-from atwood.simulation.dynamics.rank import RANK, TRUSTED
+from atwood.tolerances import tolerances
 
 __all__ = ["RowErrors"]
 
@@ -124,7 +124,7 @@ class RowErrors:
         sizes = np.maximum(self._of_rows(np.max(np.abs(found), axis=1), tangent, scales), errors / ROUGHNESS)
         unknown = np.divide(_spread(values), sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
         # A row that says no more of the place than that is followed by no step to it, and is no row here either.
-        is_followed = unknown < 1.0 / (TRUSTED * RANK)
+        is_followed = unknown < 1.0 / (tolerances.TRUSTED * tolerances.RANK)
         off = max(miss, float(np.max(unknown, where=is_followed, initial=0.0))) / ROUGHNESS
         if off > 1.0:
             errors = self._of_rows(_spread(self._rough(t, q, scales, off)[1]), tangent, scales)

@@ -16,16 +16,13 @@ from atwood.forms.assembly import Assembly
 from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
-from atwood.simulation.dynamics.rank import RANK
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.events.modes import EventRecord, generalized_speeds, plastic_impact
+from atwood.tolerances import tolerances
 
 __all__ = ["pass_time_event"]
 
-
-_IN_PLACE = 1e-7
-"""Relative to the scene's size: by how much a prescribed motion may jump and still counts as continuous."""
 
 _SAME_SPEED = 1e-9
 """Relative to the largest speed: by how much velocities may differ without an impact."""
@@ -110,11 +107,11 @@ def _check_places(
     moved = np.abs(now.value - was.value) / rows
     worst = int(np.argmax(moved))
     by = ""
-    if moved[worst] > _IN_PLACE:
+    if moved[worst] > tolerances.HELD:
         by = _in_words(after, constraints[worst], float(now.value[worst] - was.value[worst]))
     else:  # by half a turn, at which the sine of an angle is zero again, the constraint is turned over
         jacobians = [to_array(scaled(one.jacobian, sizes, rows)) for one in sides]
-        over = np.flatnonzero(np.sum(jacobians[0] * jacobians[1], axis=1) < -RANK)
+        over = np.flatnonzero(np.sum(jacobians[0] * jacobians[1], axis=1) < -tolerances.RANK)
         if not len(over):
             return
         worst, by = int(over[0]), " by more than a quarter turn"

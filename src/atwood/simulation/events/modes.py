@@ -35,6 +35,7 @@ from atwood.simulation.dynamics.reactions import ReactionSolver, maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.problem.conditions import Condition, condition_functions
 from atwood.simulation.problem.problem import Plan
+from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode, EventData
@@ -302,14 +303,10 @@ def enter_mode(
     return *switch_coordinates(after, q, reassemble), u
 
 
-_IN_PLACE = 1e-5
-"""Relative to the scene's sizes: how far a change of mode may move anything."""
-
-
 def _check_in_place(event: EventRecord, moved: FloatArray) -> None:
     """Refuse a change of mode that would move bodies."""
     farthest = float(np.max(np.abs(moved), initial=0.0))
-    if not farthest <= _IN_PLACE:
+    if not farthest <= tolerances.IN_PLACE:
         raise SolveError(
             f"at t = {event.time:.6g} a change of mode ({event.message}) would move something at once by "
             f"{farthest:.3g} of the scene's size",

@@ -14,12 +14,9 @@ from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.model.local.laws import LocalConnector, LocalConstraint, LocalPart
+from atwood.tolerances import tolerances
 
 __all__ = ["ClosureError", "find_closure_errors"]
-
-
-_NOTHING = 1e-9
-"""What is less, in radians or as a share of the scene's extent, is rounding."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +43,9 @@ class ClosureError:
     def describe(self, length: float) -> str:
         """Return the gap in words, as in ``0.1 m`` or ``0.1 m and 3 deg``, without what is rounding."""
         said = []
-        if self.distance > _NOTHING * length * max(1.0, self.angle):
+        if self.distance > tolerances.CLOSED * length * max(1.0, self.angle):
             said.append(f"{self.distance:.4g} m")
-        if self.angle > _NOTHING:
+        if self.angle > tolerances.CLOSED:
             said.append(f"{np.degrees(self.angle):.4g} deg")
         return " and ".join(said) or "nothing"
 
@@ -153,7 +150,7 @@ def _least(values: Sequence[Expression], local: LocalPart, known: Numbers, moved
                 break
             derivative = np.array([(at(by + h * e) - at(by - h * e)) / (2.0 * h) for e in np.eye(n)]).T
             # Of all movements that would do to first order the least one: not only the least change of this one.
-            by = np.linalg.lstsq(derivative, derivative @ by - now, rcond=1e-9)[0]
-        if float(np.linalg.norm(at(by))) <= 1e-9 * max(own, unit) and np.all(np.isfinite(by)):
+            by = np.linalg.lstsq(derivative, derivative @ by - now, rcond=tolerances.RANK)[0]
+        if float(np.linalg.norm(at(by))) <= tolerances.CLOSED * max(own, unit) and np.all(np.isfinite(by)):
             return float(np.linalg.norm(by))
     return own

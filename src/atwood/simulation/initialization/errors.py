@@ -16,14 +16,12 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.rank import independent_rows
 from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors
 from atwood.simulation.initialization.loop_closure import Nearest, closest, closest_of_all, units_of_rows
-from atwood.simulation.initialization.system import MET, System
+from atwood.simulation.initialization.system import System
 from atwood.simulation.initialization.targets import Level, Target, as_said
+from atwood.tolerances import tolerances
 
 __all__ = ["Failed", "contradiction", "explain_positions", "far_from_guess", "freedom_at", "wrong_way_round"]
 
-
-_CLOSED = 1e-9
-"""A gap below this share of the scene's extent, or in radians, is none."""
 
 _SHOWN = 6
 
@@ -82,7 +80,7 @@ def explain_positions(failed: Failed) -> StartError:
     system = System(failed.assembly, failed.equations, [], True)
     units = units_of_rows(failed.assembly, failed.equations, system, failed.length)
     best = closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
-    if best is not None and best.size > _CLOSED:
+    if best is not None and best.size > tolerances.CLOSED:
         return _open_loop(failed, system, best)
     return contradiction(fixed, own, _freedom(failed), _what_stays_open(failed), held)
 
@@ -185,7 +183,7 @@ def _in_one_joint(failed: Failed, system: System, best: Nearest) -> Nearest:
         found = closest(system, np.where(others, _HELD * units, units), failed.scales, failed.time, best.coordinates)
     except (KernelEvaluationError, np.linalg.LinAlgError):
         return best
-    is_closed = np.all(np.abs(found.residual / units)[others] <= 1e-6 * max(best.size, _CLOSED))
+    is_closed = np.all(np.abs(found.residual / units)[others] <= 1e-6 * max(best.size, tolerances.CLOSED))
     alone = float(np.linalg.norm((found.residual / units)[~others]))
     return Nearest(found.coordinates, found.residual, alone) if is_closed else best
 
@@ -238,7 +236,9 @@ def far_from_guess(failed: Failed, found: FloatArray, wrong: Sequence[str]) -> S
     if wrong:
         return wrong_way_round(failed, wrong[0], f"It closes the right way elsewhere; {elsewhere}")
     closure_errors = _closure_errors(failed, failed.nearest)
-    open_ones = [closure_error for closure_error in closure_errors if closure_error.size(failed.length) > _CLOSED]
+    open_ones = [
+        closure_error for closure_error in closure_errors if closure_error.size(failed.length) > tolerances.CLOSED
+    ]
     if not open_ones:
         text, where = "what is fixed cannot hold near the guess", (failed.level.fixed or guessed)[0].where
         return StartError(text, where=where, advice=f"It holds elsewhere; {elsewhere}")
@@ -357,7 +357,7 @@ def contradiction(
             where=held,
             advice="Drives or lengths demand what joints do not allow here; let one of them go.",
         )
-    failing = [target for target, miss in zip(fixed, residual, strict=True) if not abs(miss) <= MET]
+    failing = [target for target, miss in zip(fixed, residual, strict=True) if not abs(miss) <= tolerances.MET]
     names = as_said(failing or fixed)
     count = f"The mechanism has {freedom} free coordinate{'s' if freedom != 1 else ''}"
     return StartError(

@@ -10,12 +10,9 @@ from atwood.forms.assembly import Assembly
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.initialization.system import Conditions
+from atwood.tolerances import tolerances
 
 __all__ = ["meet_speeds", "size_rows"]
-
-
-_RANK = 1e-9
-"""Relative size below which a direction counts as lost, as for one run."""
 
 
 def size_rows(equations: Equations, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -80,10 +77,10 @@ def meet_speeds(
         rows = np.max(np.abs(matrix[moving] * sizes[moving, None, :]), axis=2)
         rows[rows == 0.0] = 1.0
         scaled = matrix[moving] * sizes[moving, None, :] / rows[:, :, None]
-        step = np.linalg.pinv(scaled, rcond=_RANK) @ (residual[moving] / rows)[:, :, None]
+        step = np.linalg.pinv(scaled, rcond=tolerances.RANK) @ (residual[moving] / rows)[:, :, None]
         u[moving] -= sizes[moving] * step[:, :, 0]
         residual = look()
     own = np.einsum("rij,rj->ri", np.abs(matrix), np.abs(u)) + np.abs(wanted).T
     share = np.abs(residual) / np.where(own > 0.0, own, 1.0)
-    met: NDArray[np.bool_] = np.all(share <= 1e-8, axis=1)
+    met: NDArray[np.bool_] = np.all(share <= tolerances.MET_SPEEDS, axis=1)
     return met

@@ -21,9 +21,10 @@ from atwood.simulation.dynamics.rank import row_sizes
 from atwood.simulation.initialization.assembly_branch import wrongly_turned
 from atwood.simulation.initialization.errors import Failed, explain_positions, far_from_guess, wrong_way_round
 from atwood.simulation.initialization.loop_closure import closest, places_around, units_of_rows
-from atwood.simulation.initialization.system import MET, System, counted, newton
+from atwood.simulation.initialization.system import System, counted, newton
 from atwood.simulation.initialization.targets import Level, said
 from atwood.simulation.initialization.whole_turns import unwound
+from atwood.tolerances import tolerances
 
 __all__ = ["Positions", "solve_positions"]
 
@@ -122,7 +123,7 @@ def _without_states(assembly: Assembly, equations: Equations, level: Level, t: f
 
 
 def _is_met(residual: FloatArray) -> bool:
-    return float(np.max(np.abs(residual), initial=0.0)) <= MET
+    return float(np.max(np.abs(residual), initial=0.0)) <= tolerances.MET
 
 
 def _elsewhere(failed: Failed, system: System) -> tuple[FloatArray, Matrix]:

@@ -22,18 +22,16 @@ from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
-from atwood.simulation.dynamics.rank import FREE, independent_rows, least_norm, open_directions, row_scales
+from atwood.simulation.dynamics.rank import independent_rows, least_norm, open_directions, row_scales
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors
 from atwood.simulation.initialization.start import Start
 from atwood.simulation.initialization.system import System
 from atwood.simulation.initialization.targets import Level, sort_targets
+from atwood.tolerances import tolerances
 
 __all__ = ["GuessMet", "InitializationReport", "MovedBody", "report_initialization"]
 
-
-_STILL = 1e-9
-"""What moves less than this share of the scene's extent, or turns less than this in radians, stays."""
 
 _SHARE = 0.2
 """What moves a body by less than this share of what the first one does is not named."""
@@ -156,7 +154,7 @@ def report_initialization(assembly: Assembly, start: Start) -> InitializationRep
         return InitializationReport((), guesses, (), start.length)
     level, _ = sort_targets(assembly, equations)
     closure_errors = find_closure_errors(assembly, equations, t, start.rough, start.length)
-    opened = [one for one in closure_errors if one.size(start.length) > _STILL]
+    opened = [one for one in closure_errors if one.size(start.length) > tolerances.CLOSED]
     opened.sort(key=lambda one: -one.size(start.length))
     bodies = _Bodies(assembly, equations)
     distances, angles = bodies.apart(t, start.rough, start.coordinates)
@@ -164,7 +162,7 @@ def report_initialization(assembly: Assembly, start: Start) -> InitializationRep
     moving = [
         i
         for i in range(len(bodies.indices))
-        if distances[i] > _STILL * start.length or (angles[i] > _STILL and bodies.turns[i])
+        if distances[i] > tolerances.CLOSED * start.length or (angles[i] > tolerances.CLOSED and bodies.turns[i])
     ]
     by = bodies.movers(level, start, moving)
     found = [MovedBody(bodies.names[i], float(distances[i]), float(angles[i]), *said[i], by[i]) for i in moving]
@@ -281,7 +279,7 @@ class _Bodies:
             )
 
         def is_told(rows: FloatArray) -> bool:
-            return float(np.linalg.norm(rows @ free.T)) <= FREE * float(np.linalg.norm(rows))
+            return float(np.linalg.norm(rows @ free.T)) <= tolerances.FREE * float(np.linalg.norm(rows))
 
         moves = self._movements(t, start.rough, start.length)
         return [(is_told(shift), is_told(turn)) for shift, turn in moves]

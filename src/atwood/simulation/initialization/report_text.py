@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from atwood.tolerances import tolerances
+
 if TYPE_CHECKING:
     from atwood.simulation.initialization.report import GuessMet, InitializationReport
 
@@ -18,9 +20,9 @@ _SHOWN = 3
 def _how_far(distance: float, angle: float, length: float) -> str:
     """Return a movement in words; rounding is left out."""
     said = []
-    if distance > 1e-9 * length:
+    if distance > tolerances.CLOSED * length:
         said.append(f"{distance:.3g} m")
-    if angle > 1e-9:
+    if angle > tolerances.CLOSED:
         said.append(f"{np.degrees(angle):.3g} deg")
     return " and ".join(said)
 
@@ -88,7 +90,7 @@ def _tables(placement: InitializationReport) -> Iterator[str]:
 def _found(guess: GuessMet, length: float) -> tuple[str, str]:
     """Return what became of a guess and the difference, without rounding."""
     size = length if guess.unit == "m" else max(1.0, abs(guess.asked))
-    if abs(guess.off) <= 1e-9 * size:
+    if abs(guess.off) <= tolerances.CLOSED * size:
         return f"{guess.asked:.6g}", "0"
     return f"{guess.found:.6g}", f"{guess.off:.3g}"
 

@@ -13,12 +13,9 @@ from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.errors import contradicted, contradiction, freedom_at
 from atwood.simulation.initialization.system import System, counted
 from atwood.simulation.initialization.targets import Level, said
+from atwood.tolerances import tolerances
 
 __all__ = ["solve_speeds"]
-
-
-_MET = 1e-8
-"""Relative to its terms: how well each condition must be met."""
 
 
 def solve_speeds(
@@ -63,9 +60,9 @@ def solve_speeds(
         own[system.constraints :] += [abs(x.value) for x in level.fixed]
         # What is summed up within an equation rounds, even if all that comes out of it is zero.
         fastest = float(np.max(np.abs(u / scales), initial=0.0))
-        own += certain(errors, rows) * fastest / _MET
+        own += certain(errors, rows) * fastest / tolerances.MET_SPEEDS
         share = np.abs(residual) / np.where(own > 0.0, own, 1.0)
-        if not float(np.max(share)) <= _MET:
+        if not float(np.max(share)) <= tolerances.MET_SPEEDS:
             freedom = freedom_at(assembly, equations, scales, t, q)
             held = contradicted(equations, share[: system.constraints])
             raise contradiction(level.fixed, share[system.constraints :], freedom, held=held)

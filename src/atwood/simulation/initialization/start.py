@@ -26,6 +26,7 @@ from atwood.simulation.dynamics.undefined_values import undefined_value_at
 from atwood.simulation.initialization.positions import solve_positions
 from atwood.simulation.initialization.speeds import solve_speeds
 from atwood.simulation.initialization.targets import sort_targets
+from atwood.tolerances import tolerances
 
 __all__ = ["Start", "find_start", "maximal_state", "own_state", "settle"]
 
@@ -167,12 +168,12 @@ def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
     place = {**assembly.mechanism.table.values, **assembly.known_relations, before.time: start.time, **q}
     sizes = np.maximum(coordinate_scales(before, start.length), np.abs(start.coordinates))
     integral_gradients = assembly.shared.get(
-        "slopes of integrals", lambda: [jacobian([one.value], before.coordinates) for one in after.integrals]
+        "gradients of integrals", lambda: [jacobian([one.value], before.coordinates) for one in after.integrals]
     )
     for one, slopes in zip(after.integrals, integral_gradients, strict=True):
         (missed,) = evaluate([one.value], place)
         terms = np.abs(evaluate(slopes.entries, place)) * sizes[list(slopes.columns)]
-        if not abs(missed) <= 1e-9 * float(np.max(terms, initial=0.0)):
+        if not abs(missed) <= tolerances.CLOSED * float(np.max(terms, initial=0.0)):
             raise StartError(
                 f"the equations were made for another start, and a constant of integration differs by {missed:g}",
                 where=one.keys[-1][0],

@@ -20,15 +20,12 @@ from atwood.linalg.matrices import (
 )
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
-from atwood.simulation.dynamics.rank import FREE, independent_rows, least_norm, open_directions, row_scales
+from atwood.simulation.dynamics.rank import independent_rows, least_norm, open_directions, row_scales
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.simulation.initialization.targets import Target
+from atwood.tolerances import tolerances
 
-__all__ = ["MET", "Conditions", "System", "counted", "newton", "start_conditions"]
-
-
-MET = 1e-11
-"""Relative to the scene's sizes: how well a start condition must be met."""
+__all__ = ["Conditions", "System", "counted", "newton", "start_conditions"]
 
 
 @dataclass(frozen=True)
@@ -151,7 +148,7 @@ def newton(
             if float(np.max(np.abs(new_residual / rows))) < size or longest < 1e-9:
                 break
             step *= 0.5
-        if float(np.max(np.abs(new_residual / rows))) >= size and size < MET:
+        if float(np.max(np.abs(new_residual / rows))) >= size and size < tolerances.MET:
             break
         q, residual, matrix = trial, new_residual, new_matrix
         rows = row_scales(matrix, scales, errors)
@@ -197,4 +194,4 @@ def counted(
         return tuple(n for n, is_free in zip(names, found, strict=True) if is_free), repeated
     directions = open_directions(matrix[kept])
     moved = np.abs(directions if tangent is None else directions @ tangent.T)
-    return tuple(n for i, n in enumerate(names) if np.max(moved[:, i], initial=0.0) > FREE), repeated
+    return tuple(n for i, n in enumerate(names) if np.max(moved[:, i], initial=0.0) > tolerances.FREE), repeated

@@ -13,12 +13,9 @@ from atwood.forms.source import no_start_quantity
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable
+from atwood.tolerances import tolerances
 
 __all__ = ["Level", "Target", "as_said", "find_level", "said", "sort_targets"]
-
-
-_SAME = 1e-9
-"""Values that differ by less, as rounding makes them, say the same."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +87,7 @@ def _restated(assembly: Assembly, given: Mapping[str, float]) -> tuple[dict[str,
         if restated != own:
             for name, value in restated.items():
                 said_too = given.get(f"{path}.{name}", value)
-                if not abs(said_too - value) <= _SAME:
+                if not abs(said_too - value) <= tolerances.CLOSED:
                     others = ", ".join(f"{one} = {own[one]:g}" for one in own if one not in restated)
                     raise StartError(
                         f"it is given as {said_too:g}, and {others} makes it {value:g}",

@@ -13,12 +13,10 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.rank import row_sizes
 from atwood.simulation.initialization.system import System
 from atwood.simulation.initialization.targets import Target
+from atwood.tolerances import tolerances
 
 __all__ = ["unwound"]
 
-
-_SAME = 1e-9
-"""Relative to the scene's sizes: what a whole turn changes by less, it leaves as it is."""
 
 _TURN = 2.0 * np.pi
 
@@ -65,13 +63,13 @@ def unwound(
     system = System(assembly, equations, targets, True)
     still = np.zeros_like(scales)
     before, matrix = system.at(t, q, still)
-    allowed = _SAME * row_sizes(matrix, scales)
+    allowed = tolerances.CLOSED * row_sizes(matrix, scales)
     places = _places(assembly, t, q, length)
     for i in wound:
         trial = q.copy()
         trial[i] -= whole[i] * _TURN
         is_met = np.all(np.abs(system.at(t, trial, still)[0] - before) <= allowed)
-        if is_met and np.max(np.abs(_places(assembly, t, trial, length) - places)) <= _SAME:
+        if is_met and np.max(np.abs(_places(assembly, t, trial, length) - places)) <= tolerances.CLOSED:
             q = trial
     return q
 

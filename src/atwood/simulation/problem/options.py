@@ -11,6 +11,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.late import dataclass
 from atwood.simulation.problem.conditions import Condition
+from atwood.tolerances import tolerances
 
 __all__ = ["SOLVERS", "RunOptions", "Samples", "sample_times"]
 
@@ -57,7 +58,7 @@ class RunOptions:
     """
 
     t_end: float
-    relative_tolerance: float = 1e-8
+    relative_tolerance: float = tolerances.RTOL
     absolute_tolerance: float | None = None
     outputs: int | FloatArray = 201
     max_steps: int | None = None

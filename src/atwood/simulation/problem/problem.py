@@ -28,6 +28,7 @@ from atwood.simulation.dynamics.redundancy import RankFinding, find_rank, review
 from atwood.simulation.dynamics.scales import Scales, coordinate_scales, find_scales, motion_scales
 from atwood.simulation.initialization.massless import check_massless_directions
 from atwood.simulation.problem.not_compilable import announce, find_not_compilable
+from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.expr import Program
@@ -39,9 +40,6 @@ __all__ = ["Plan", "make_plan", "pack_state"]
 
 _LARGEST_COLUMNS = 20_000
 """Programs for many states that are larger are not compiled: that would take longer than it saves."""
-
-_HELD = 1e-7
-"""Relative to the scene's sizes: a projected state that misses a constraint by more has not met it."""
 
 
 @dataclass
@@ -180,7 +178,7 @@ class Plan:
         now = self.balance.at(t, q, u)
         rows = self.balance.row_scales(now, t, q, self.sizes)
         misses = np.maximum(np.abs(now.value / rows), np.abs(now.rate / rows) * self.scales.time)
-        if not np.all(misses <= _HELD):
+        if not np.all(misses <= tolerances.HELD):
             worst = int(np.argmax(np.where(np.isfinite(misses), misses, np.inf)))
             raise SolveError(
                 f"at t = {t:.6g} the constraints cannot all hold: this is missed by {misses[worst]:.3g} of the scene's "

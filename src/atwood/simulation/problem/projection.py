@@ -18,6 +18,7 @@ from atwood.late import dataclass
 from atwood.linalg.matrices import is_best_full
 from atwood.simulation.dynamics.rank import trusted_sizes
 from atwood.simulation.problem.problem import Plan
+from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.linalg.sparse_batch import Normal
@@ -32,8 +33,6 @@ __all__ = [
     "project_states",
 ]
 
-_MET = 1e-11
-"""Relative to the scene's sizes: a constraint that is missed by less is met."""
 
 _LEAST = 1e-17
 """What is less is less than rounding, although it may go on to shrink."""
@@ -261,7 +260,7 @@ def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Project
     active = np.ones(len(t), dtype=bool)
     for _ in range(_STEPS):
         miss = np.max(np.abs(now.value), axis=1)
-        active &= (miss > _LEAST) & ((miss >= _MET) | (miss < 0.5 * last))
+        active &= (miss > _LEAST) & ((miss >= tolerances.MET) | (miss < 0.5 * last))
         if not active.any():
             break
         last = miss
@@ -272,7 +271,7 @@ def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Project
     for _ in range(2):  # the second pass takes out the rounding of the first
         speeds = speeds - solve(now.rate(speeds))
     left = _largest(now, speeds) * np.array([[1.0], [plan.scales.time]])
-    doubtful = active | ~np.all(left <= 10.0 * _MET, axis=0)
+    doubtful = active | ~np.all(left <= 10.0 * tolerances.MET, axis=0)
     return Projected(q, sizes * speeds.T, held, doubtful)
 
 

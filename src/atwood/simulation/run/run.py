@@ -40,6 +40,7 @@ from atwood.simulation.run.record import Recorder, SegmentRecord
 from atwood.simulation.run.segment import Outcome, Segment, run_segment
 from atwood.simulation.run.tolerances import allowed
 from atwood.simulation.singular.crossing import SingularCrossing
+from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import Orientation
 
 __all__ = ["Run", "run", "run_out_of_time"]
@@ -476,7 +477,7 @@ def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
     n, m = len(assembly.equations.coordinates), len(assembly.equations.speeds)
     idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
     misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])
-    if float(np.max(misses)) > 1e-9 * scene_length(assembly):
+    if float(np.max(misses)) > tolerances.CLOSED * scene_length(assembly):
         worst, moment = np.unravel_index(int(np.argmax(misses)), misses.shape)
         part, law, _ = prescribed[int(worst)][0]
         raise TopologyError(

@@ -14,13 +14,13 @@ import numpy as np
 
 from atwood.errors import AtwoodError, SolveError
 from atwood.integrators.protocol import FloatArray, Lookout, Status, StepResult
-from atwood.simulation.dynamics.rank import TRUSTED
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely, project_states
 from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow
 from atwood.simulation.singular.crossing import SingularCrossing, stuck_at
 from atwood.simulation.singular.looks import Look, as_lookout, compiled_looks, cubic, stride_from
 from atwood.simulation.singular.rank_measure import RankMeasure, find_crossing, find_loss, nearly_lost
+from atwood.tolerances import tolerances
 
 __all__ = ["SingularityMonitor", "singularity_monitor_of"]
 
@@ -122,7 +122,7 @@ class SingularityMonitor:
         self._compiled = compiled_looks(plan, self._whole)
         if self._compiled is not None:
             errors = plan.balance.errors.near(step_result.t, step_result.y[: self._n], plan.sizes)
-            self._compiled.rows[:] = TRUSTED * errors
+            self._compiled.rows[:] = tolerances.TRUSTED * errors
             self._measures.rows = self._compiled.rows
         self._start, self._is_behind = step_result, False
         self._begin_looks()

@@ -17,23 +17,15 @@ from atwood.linalg.matrices import scaled, to_array
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import ConstraintsAt, constraints_at
 from atwood.simulation.singular.collocation import Arc
+from atwood.tolerances import tolerances
 
 __all__ = ["Loss", "RankMeasure", "find_crossing", "find_loss", "nearly_lost"]
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
-_LOST = 1e-5
-"""The measure at a singular position, relative to that a little away from it: what is left is that of rounding."""
 
 _SMALL = 40
 """Up to so many constraints singular values cost little."""
-
-_HOLDS = 5e-10
-"""Relative to the scene's sizes: what a place that constraints admit may miss them by.
-
-Where links nearly fit, two ways of moving come close to each other and do not meet; a motion turns from one into the
-other within the root of what is missing, and must not be carried across.
-"""
 
 
 @dataclass(frozen=True)
@@ -209,13 +201,13 @@ def find_loss(measure: RankMeasure, arc: Arc, t: float, away: float) -> Loss | N
     away
         The measure a little away from it.
     """
-    finding, least = measure.plan.finding, _LOST * away
+    finding, least = measure.plan.finding, tolerances.SINGULAR * away
     q = measure.plan.balance.kinematic_map.normalized(arc.at(np.array([t]))[0][:, 0])
     constraint_jacobian, misses = measure.jacobian_at(t, q)
     kept = list(finding.kept)
     if not np.linalg.svd(constraint_jacobian[kept], compute_uv=False)[-1] < least:
         return None
-    if not np.max(misses, initial=0.0) < _HOLDS:
+    if not np.max(misses, initial=0.0) < tolerances.NEARLY_FITS:
         return None
     lost = finding.rank - int(np.sum(np.linalg.svd(constraint_jacobian, compute_uv=False) > least))
     if lost <= 0:

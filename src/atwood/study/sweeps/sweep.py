@@ -36,6 +36,7 @@ from atwood.study.sweeps.batch import run_batches, why_not_batched
 from atwood.study.sweeps.cases import COMBINATIONS, Cases, make_cases
 from atwood.study.sweeps.result import Sweep, SweepStatistics
 from atwood.study.sweeps.runs import Records, SweepRequest, expand_paths, run_in_processes, run_one_by_one
+from atwood.tolerances import tolerances
 
 __all__ = ["Sweep", "SweepStatistics", "sweep"]
 
@@ -73,7 +74,7 @@ def sweep(
     outputs: Any = None,
     form: str = "reduced",
     level: str = "ggl",
-    rtol: float = 1e-8,
+    rtol: float = tolerances.RTOL,
     solver: str = "auto",
     max_steps: int | None = None,
     max_seconds: float | None = None,
