@@ -24,12 +24,13 @@ from atwood.result.energy import EnergyLedger
 from atwood.result.trajectories import Trajectories
 from atwood.result.work import find_ledger
 from atwood.showing import count_of, listed
+from atwood.simulation.dynamics.numerical_failure import named
 from atwood.simulation.dynamics.orientation_coordinates import CoordinateSwitch
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.events.modes import EventRecord
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
-from atwood.simulation.initialization.start import Start
+from atwood.simulation.initialization.start import Start, own_state
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
 from atwood.simulation.run.record import SegmentRecord
@@ -147,7 +148,8 @@ class Result(Trajectories):
     @cached_property
     def initialization(self) -> InitializationReport:
         """What the start moved: bodies and guesses, and the joints that were open before."""
-        return report_initialization(self.assembly, self.start)
+        with named(self.assembly, self.start.time, *own_state(self.assembly, self.start)):
+            return report_initialization(self.assembly, self.start)
 
     @property
     def statistics(self) -> Statistics:

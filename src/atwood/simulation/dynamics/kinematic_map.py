@@ -106,7 +106,10 @@ class KinematicMap:
                 kind == "quaternion" and q[orientation] @ other[orientation] < 0.0
             ):  # either sign is the same orientation
                 target[orientation] *= -1.0
-        return np.asarray(np.linalg.lstsq(self.matrix(t, q), target - q, rcond=None)[0], dtype=float)
+        matrix = self.matrix(t, q)
+        if not (np.isfinite(matrix).all() and np.isfinite(target - q).all()):
+            raise np.linalg.LinAlgError("two places cannot be compared: their coordinates are not finite")
+        return np.asarray(np.linalg.lstsq(matrix, target - q, rcond=None)[0], dtype=float)
 
     def normalized(self, q: FloatArray) -> FloatArray:
         """Return coordinates with orientations of size one: one state, or many of shape (coordinates, samples).

@@ -253,8 +253,16 @@ def open_directions(matrix: FloatArray, least: float = 0.0) -> FloatArray:
 
 
 def least_norm(matrix: Matrix, right: FloatArray) -> FloatArray:
-    """Return the shortest solution of a linear system, or the best where there is none."""
+    """Return the shortest solution of a linear system, or the best where there is none.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If there is none since a number is not finite; some machines' libraries would look for it for ever.
+    """
     if is_full(matrix):
+        if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+            raise np.linalg.LinAlgError("a linear system has entries that are not finite")
         return np.asarray(np.linalg.lstsq(matrix, right, rcond=tolerances.RANK)[0], dtype=float)
     from atwood.linalg.sparse import csr_least_norm
 

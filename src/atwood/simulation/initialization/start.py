@@ -20,6 +20,7 @@ from atwood.forms.places import to_maximal
 from atwood.forms.starting import starting
 from atwood.late import dataclass
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
+from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble, from_regular, own_names, switch_coordinates
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, scene_length
 from atwood.simulation.dynamics.undefined_values import undefined_value_at
@@ -136,6 +137,10 @@ def _solved(assembly: Assembly) -> Start:
         u, free_u, repeated_u = solve_speeds(assembly, equations, speeds, scales, t, at.coordinates)
     except KernelEvaluationError as error:
         raise _without_value(assembly, t, error) from error
+    except (ValueError, ArithmeticError) as error:
+        if not is_numerical(error):
+            raise
+        raise _unworkable(assembly, t, error) from error
     free = own_names(assembly, at.free)
     return Start(t, at.coordinates, u, length, free, free_u, (*at.repeated, *repeated_u), at.rough)
 
@@ -152,6 +157,13 @@ def _without_value(assembly: Assembly, t: float, error: KernelEvaluationError) -
         where=found.part,
         advice="Give start values or guesses, of places and orientations, with which it has one.",
     )
+
+
+def _unworkable(assembly: Assembly, t: float, error: Exception) -> StartError:
+    """Return the error of a start whose numbers could not be worked with."""
+    at_rest, still = reference_coordinates(assembly.equations), np.zeros(len(assembly.equations.speeds))
+    found = numerical_failure(assembly, t, at_rest, still, error)
+    return StartError(found.message, where=found.where, advice=found.advice)
 
 
 def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:

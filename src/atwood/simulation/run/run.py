@@ -17,6 +17,7 @@ from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
 from atwood.late import dataclass
 from atwood.mechanics.outputs.event_functions import UPDATE
+from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
     CoordinateSwitch,
@@ -173,7 +174,8 @@ def _prepared(
     log: list[Updated] = []
     again = partial(_again, assembly, start, reassemble, log)
     walk = _Walk(assembly, start, options, reassemble, samples.with_more(between), again, log, known)
-    walk.prepare()
+    with named(walk.assembly, walk.t, walk.q, walk.u):
+        walk.prepare()
     return walk
 
 
@@ -242,9 +244,17 @@ class _Walk:
         except TimeIsUp:  # while the scene was prepared in another mode
             return self._run_so_far("time_limit", self.options.out_of_time(self.t))
         except AtwoodError as error:
-            if self.segments and not hasattr(error, "run"):
-                error.run = self._run_so_far("failed", error.message)  # type: ignore[attr-defined]
-            raise
+            raise self._with_run(error) from error.__cause__
+        except (ValueError, ArithmeticError) as error:  # between two segments
+            if not is_numerical(error):
+                raise
+            raise self._with_run(numerical_failure(self.assembly, self.t, self.q, self.u, error)) from error
+
+    def _with_run(self, error: AtwoodError) -> AtwoodError:
+        """Return an error with what came before it."""
+        if self.segments and not hasattr(error, "run"):
+            error.run = self._run_so_far("failed", error.message)  # type: ignore[attr-defined]
+        return error
 
     def _go(self) -> Run:
         chatter = 0

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
-from atwood.errors import SolveError
+from atwood.errors import AtwoodError, SolveError
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.protocol import Budget, FloatArray, Session, Statistics, Status, StepResult
 from atwood.late import dataclass
+from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
     CoordinateSwitch,
@@ -202,7 +204,25 @@ class _Runner:
         except TimeIsUp:
             return self._out_of_time()
         except SolveError as error:  # from a state that cannot be projected
-            return replace(self._ended(self.recorder.end, "failed", error.message), error=error)
+            return self._failed(error)
+        except (ValueError, ArithmeticError) as error:
+            if not is_numerical(error):
+                raise
+            return self._failed(self._numerical_failure(error, (t, y)))
+
+    def _failed(self, error: SolveError) -> Outcome:
+        return replace(self._ended(self.recorder.end, "failed", error.message), error=error)
+
+    def _numerical_failure(self, error: Exception, start: tuple[float, FloatArray]) -> SolveError:
+        """Return the error of numbers that could not be worked with, at the last state that was recorded."""
+        plan = self.segment.plan
+        t, (q, u) = start[0], plan.program.split(start[1])
+        if not self.recorder.is_empty:
+            with suppress(AtwoodError, ValueError, ArithmeticError):  # samples that cannot be projected either
+                t, q, u, _ = self.recorder.last()
+        failure = numerical_failure(plan.assembly, t, q, u, error)
+        failure.__cause__ = error
+        return failure
 
     def _out_of_time(self) -> Outcome:
         t = max(self.recorder.close(), self.began)
