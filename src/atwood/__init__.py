@@ -91,6 +91,7 @@ if TYPE_CHECKING:
     from atwood.study.comparison.compare import Comparison, ComparisonRow, compare
     from atwood.study.sweeps.files import load_sweep
     from atwood.study.sweeps.sweep import Sweep, sweep
+    from atwood.theory.dynamics import Dynamics, dynamics
     from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
     from atwood.theory.linearization import (
         BranchPoint,
@@ -125,6 +126,7 @@ __all__ = [
     "ConnectError",
     "Connector",
     "DeclarationError",
+    "Dynamics",
     "EquationsOfMotion",
     "Equilibria",
     "Equilibrium",
@@ -185,6 +187,7 @@ __all__ = [
     "discrete_state",
     "dissipation",
     "dot",
+    "dynamics",
     "equations",
     "equilibria",
     "equilibrium_branches",
@@ -250,6 +253,9 @@ _LATER = {
     "CheckReport": "atwood.checking",
     "Comparison": "atwood.study",
     "ComparisonRow": "atwood.study",
+    "Equilibria": "atwood.linearization",
+    "Equilibrium": "atwood.linearization",
+    "Dynamics": "atwood.theory.dynamics",
     "EquationsOfMotion": "atwood.theory.equations",
     "Equilibria": "atwood.theory.linearization",
     "Equilibrium": "atwood.theory.linearization",
@@ -269,6 +275,8 @@ _LATER = {
     "assemble": "atwood.pipeline",
     "check": "atwood.checking",
     "compare": "atwood.study",
+    "equilibria": "atwood.linearization",
+    "dynamics": "atwood.theory.dynamics",
     "equations": "atwood.theory.equations",
     "equilibria": "atwood.theory.linearization",
     "equilibrium_branches": "atwood.theory.linearization",

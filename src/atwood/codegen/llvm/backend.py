@@ -190,6 +190,50 @@ class NativeKernel:
             _raise_serious(self.compiled.built.failures.take())
         return bool(code == 0)
 
+    def each(self, outputs: Sequence[FloatArray], *inputs: FloatArray) -> int:
+        """Evaluate the program on each row of arrays as they are.
+
+        Parameters
+        ----------
+        outputs
+            The arrays to fill, one for each output group, of shape (states, size).
+        *inputs
+            The arrays to read, one for each input group, of shape (states, size).
+
+        Returns
+        -------
+        int
+            The first row of which a result is not finite; the number of rows if there is none.
+
+        Raises
+        ------
+        UsageError
+            If an array has the wrong size, does not hold floats of 64 bits one after the other, or cannot be written.
+        """
+        count = len(outputs[0])
+        if not count:
+            return 0
+        space = self._take_space()
+        self._point_to(space, [one[0] for one in outputs], [one[0] for one in inputs])
+        given, derived, scratch, filled = space.elsewhere
+        steps = [
+            (pointers, i, one.strides[0])
+            for pointers, several in ((given, inputs), (filled, outputs))
+            for i, one in enumerate(several)
+        ]
+        call, first = self.compiled.call, count
+        for row in range(count):
+            if call(given, derived, scratch, filled):
+                first = min(first, row)
+            if row + 1 < count:
+                for pointers, i, step in steps:
+                    pointers[i] = (pointers[i] or 0) + step
+        space.known = ()
+        self._spaces.append(space)
+        if self.compiled.built.failures is not None:
+            _raise_serious(self.compiled.built.failures.take())
+        return first
+
     def _point_to(self, space: _Space, outputs: Sequence[FloatArray], inputs: Sequence[FloatArray]) -> None:
         """Take arrays of the caller's, if they are as they must be; the next call can then do with a glance."""
         program = self.compiled.program

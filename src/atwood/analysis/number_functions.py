@@ -1,0 +1,134 @@
+"""Programs as functions of numbers: compiled when they are first called, for one state and for many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.codegen import compile_native, compile_program
+from atwood.errors import KernelEvaluationError, UsageError
+from atwood.expr import Program
+from atwood.expr.core.relations import values_just_after
+from atwood.forms.assembly import Assembly
+from atwood.simulation.problem.not_compilable import find_not_compilable
+
+__all__ = ["Function", "Numbers", "at_time"]
+
+Numbers = Any
+"""An array of floats, or what NumPy makes one of."""
+
+
+def at_time(assembly: Assembly, t: float) -> Assembly:
+    """Return an assembly with what switches by the clock as it is just after a time."""
+    if not assembly.relations or t == assembly.flat.t_start:
+        return assembly
+    with assembly.shared.lock:
+        return assembly.with_relations(values_just_after(assembly.relations, assembly.mechanism.table.values, t))
+
+
+class Function:
+    """A program of (t, q, ...) with one group of outputs, ready for one state and for many.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    program
+        The program.
+    shape
+        Of its result at one state.
+    """
+
+    def __init__(self, assembly: Assembly, program: Program, shape: tuple[int, ...]) -> None:
+        self.assembly, self.program, self.shape = assembly, program, shape
+        self.sizes = [len(group.symbols) for group in program.inputs[1:]]
+        self._now = np.array([assembly.flat.t_start])
+        self._compiled: Any = None
+        self._kernel: Any = None
+        self._known: tuple[Any, ...] = ()
+        self._flat: Any = None
+
+    def __call__(self, t: float | None, given: tuple[Numbers, ...], out: FloatArray | None) -> FloatArray:
+        """Return the values, in `out` if it is given."""
+        if out is not None and t is None and self._kernel is not None and self._is_known(given, out):
+            if self._kernel.into((self._flat,), self._now, *given):
+                return out
+            self._explain(self._kernel, [self._now, *given])
+        return self._general(t, given, out)
+
+    def _is_known(self, given: tuple[Numbers, ...], out: FloatArray) -> bool:
+        """Return whether these are the arrays of the last call, for one state: then nothing is looked at again."""
+        known = self._known
+        if len(known) != len(given) + 1 or known[0] is not out:
+            return False
+        return all(a is b for a, b in zip(given, known[1:], strict=True))
+
+    def _general(self, t: float | None, given: tuple[Numbers, ...], out: FloatArray | None) -> FloatArray:
+        arrays = [self._checked(one, size, i) for i, (one, size) in enumerate(zip(given, self.sizes, strict=True))]
+        batch = np.broadcast_shapes(*(one.shape[:-1] for one in arrays))
+        whole = (*batch, *self.shape)
+        if out is not None and (out.shape != whole or out.dtype != np.float64 or not out.flags.c_contiguous):
+            raise UsageError(
+                f"out must be float64, contiguous and of shape {whole}, not {out.dtype} of shape {out.shape}",
+                where=self.program.name,
+            )
+        result = np.empty(whole) if out is None else out
+        count, size = int(np.prod(batch, dtype=int)), int(np.prod(self.shape, dtype=int))
+        if not count or not size:
+            return result
+        if self._kernel is None and self._compiled is None:
+            self._compile()
+        kernel = self._kernel if t is None and self._kernel is not None else self._bound(t)
+        if t is None and not batch and out is not None and all(a is b for a, b in zip(arrays, given, strict=True)):
+            self._known, self._flat = (out, *given), out.reshape(-1)
+        rows = [
+            np.ascontiguousarray(np.broadcast_to(one, (*batch, one.shape[-1]))).reshape(count, -1) for one in arrays
+        ]
+        times = np.full((count, 1), self._now[0] if t is None else float(t))
+        flat = result.reshape(count, size)
+        bad = _each(kernel, flat, [times, *rows])
+        if bad < count:
+            self._explain(kernel, [times[bad], *(one[bad] for one in rows)])
+        return result
+
+    def _checked(self, given: Numbers, size: int, position: int) -> FloatArray:
+        array = np.asarray(given, dtype=float)
+        if array.ndim == 0 or array.shape[-1] != size:
+            name = self.program.inputs[position + 1].name
+            raise UsageError(
+                f"{name} has the shape {array.shape}, and the scene has {size} of them",
+                where=self.program.name,
+                advice=f"Give an array of {size} numbers, or one with a row of so many for each state.",
+            )
+        return array
+
+    def _compile(self) -> None:
+        if find_not_compilable(self.assembly, self.program):
+            self._compiled = compile_program(self.program)
+        else:
+            self._compiled = self.assembly.shared.get(
+                ("native", id(self.program)), lambda: (self.program, compile_native(self.program))
+            )[1]
+        self._kernel = self._compiled.bind(self.assembly.parameter_values)
+
+    def _bound(self, t: float | None) -> Any:
+        here = self.assembly if t is None else at_time(self.assembly, float(t))
+        return self._kernel if here is self.assembly else self._compiled.bind(here.parameter_values)
+
+    def _explain(self, kernel: Any, state: Sequence[FloatArray]) -> None:
+        """Raise the error that says what has no value at a state."""
+        kernel(*state)
+        raise KernelEvaluationError("it has no finite value at this state", where=self.program.name)
+
+
+def _each(kernel: Any, out: FloatArray, rows: Sequence[FloatArray]) -> int:
+    """Fill rows of results; return the first that is not finite, or their number."""
+    if hasattr(kernel, "each"):
+        found: int = kernel.each((out,), *rows)
+        return found
+    for i in range(len(out)):  # functions in Python raise what went wrong
+        out[i] = kernel(*(one[i] for one in rows))[0]
+    return len(out)
