@@ -24,6 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
         "taylor",
         "orientation_coordinates",
         "space",
+        "dynamics",
     ],
 )
 def test_smallest_case(name: str, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ A call lets other threads run, except while it is inside a function in Python (a
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from ctypes import c_void_p
 from operator import is_
 from typing import Any
@@ -189,6 +189,31 @@ class NativeKernel:
         if self.compiled.built.failures is not None:
             _raise_serious(self.compiled.built.failures.take())
         return bool(code == 0)
+
+    def again(self, outputs: Sequence[FloatArray], *inputs: FloatArray) -> Callable[[], bool]:
+        """Return a function that evaluates the program on these very arrays, as they are then, and fills these.
+
+        Parameters
+        ----------
+        outputs, inputs
+            See `into`.
+
+        Returns
+        -------
+        callable
+            As `into`: whether every result is finite. It is for one thread at a time.
+        """
+        space = _Space(self)
+        self._point_to(space, outputs, inputs)
+        call, arguments, failures = self.compiled.call, space.elsewhere, self.compiled.built.failures
+
+        def evaluate(held: _Space = space) -> bool:  # the space holds the arrays
+            code = call(*arguments)
+            if failures is not None:
+                _raise_serious(failures.take())
+            return bool(code == 0)
+
+        return evaluate
 
     def each(self, outputs: Sequence[FloatArray], *inputs: FloatArray) -> int:
         """Evaluate the program on each row of arrays as they are.
