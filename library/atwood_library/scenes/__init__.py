@@ -13,15 +13,18 @@ from typing import TYPE_CHECKING
 from atwood import Scene
 
 if TYPE_CHECKING:
+    from atwood_library.scenes.andrews_squeezer import AndrewsSqueezer as AndrewsSqueezer
     from atwood_library.scenes.atwood import Atwood as Atwood
     from atwood_library.scenes.ball_in_shell import BallInShell as BallInShell
     from atwood_library.scenes.bead_on_surface import BeadOnSurface as BeadOnSurface
     from atwood_library.scenes.bead_on_wire import BeadOnWire as BeadOnWire
     from atwood_library.scenes.bricard import Bricard as Bricard
+    from atwood_library.scenes.car_axis import CarAxis as CarAxis
     from atwood_library.scenes.chain import Chain as Chain
     from atwood_library.scenes.chaplygin_sleigh import ChaplyginSleigh as ChaplyginSleigh
     from atwood_library.scenes.charged_particle import ChargedParticle as ChargedParticle
     from atwood_library.scenes.double_atwood import DoubleAtwood as DoubleAtwood
+    from atwood_library.scenes.double_cardan_twice import DoubleCardanTwice as DoubleCardanTwice
     from atwood_library.scenes.double_pendulum import DoublePendulum as DoublePendulum
     from atwood_library.scenes.double_pendulum_3d import DoublePendulum3D as DoublePendulum3D
     from atwood_library.scenes.driven_pendulum import DrivenPendulum as DrivenPendulum
@@ -51,11 +54,13 @@ if TYPE_CHECKING:
     from atwood_library.scenes.rotating_frame import RotatingFrame as RotatingFrame
     from atwood_library.scenes.rotating_hoop_driven import RotatingHoopDriven as RotatingHoopDriven
     from atwood_library.scenes.rotating_hoop_free import RotatingHoopFree as RotatingHoopFree
+    from atwood_library.scenes.scott_russell_lift import ScottRussellLift as ScottRussellLift
     from atwood_library.scenes.simple_pendulum import SimplePendulum as SimplePendulum
     from atwood_library.scenes.slider_crank import SliderCrank as SliderCrank
     from atwood_library.scenes.spatial_slider_crank import SpatialSliderCrank as SpatialSliderCrank
     from atwood_library.scenes.spherical_pendulum import SphericalPendulum as SphericalPendulum
     from atwood_library.scenes.stewart_platform import StewartPlatform as StewartPlatform
+    from atwood_library.scenes.strandbeest import Strandbeest as Strandbeest
     from atwood_library.scenes.swinging_atwood import SwingingAtwood as SwingingAtwood
     from atwood_library.scenes.trebuchet import Trebuchet as Trebuchet
     from atwood_library.scenes.triple_atwood import TripleAtwood as TripleAtwood
@@ -113,6 +118,11 @@ _CLASSES = {
     "chaplygin-sleigh": "ChaplyginSleigh",
     "rattleback": "Rattleback",
     "ball-in-shell": "BallInShell",
+    "andrews-squeezer": "AndrewsSqueezer",
+    "car-axis": "CarAxis",
+    "double-cardan-twice": "DoubleCardanTwice",
+    "scott-russell-lift": "ScottRussellLift",
+    "strandbeest": "Strandbeest",
 }
 """The class of each scene by the name that the command line knows it by."""
 
