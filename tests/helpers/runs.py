@@ -16,20 +16,14 @@ from atwood.forms.places import to_maximal
 from atwood.pipeline import assemble, simulate
 from atwood.simulation.initialization.start import Start, find_start
 from atwood.simulation.problem.problem import Plan, make_plan, pack_state
-from atwood_library.scenes import SCENES
 
 FORMS = ("reduced", "dae")
 
-_CLASSICAL = {
-    *("charged-particle", "kepler", "falling-with-drag", "elastic-pendulum", "oscillators", "triple-atwood"),
-    *("pulley-with-inertia", "swinging-atwood", "overhead-crane", "trebuchet"),
-}
-EVERYDAY = [
-    name
-    for name, make in SCENES.items()
-    if name not in _CLASSICAL and name != "four-bar-row" and make().space != "space"
-]
-"""Scenes on a line and in a plane that come to no singular place; the others have tests of their own."""
+EVERYDAY = (
+    *("simple-pendulum", "double-pendulum", "pendulum-on-cart", "mass-spring-chain", "atwood", "double-atwood"),
+    *("four-bar", "slider-crank", "chain", "driven-pendulum"),
+)
+"""Scenes on a line and in a plane to which every general test is put; the others have tests of their own."""
 
 EVERY_FORM = (("reduced", "ggl"), ("dae", "ggl"), ("dae", "index1"), ("dae", "index1-projected"))
 
