@@ -4,8 +4,9 @@ import pickle
 
 import pytest
 
-from atwood import errors
-from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion, suggestion_in_parts
+from atwood import Component, Point, Scalar, Scene, assemble, connector, errors, potential
+from atwood.errors import AtwoodError, ParameterError, is_about, near_matches, suggestion, suggestion_in_parts
+from atwood_library import PointMass
 
 
 @pytest.mark.parametrize(
@@ -75,3 +76,26 @@ def test_a_suggestion_lists_a_short_choice_and_says_nothing_of_a_long_one() -> N
 def test_what_a_part_has_is_said_where_nothing_looks_alike(path, expected):
     known = ["hinge.angle", "hinge.force.x", "hinge.force.y", "hinge.force.z", "car.wheel.turns", "car.speed"]
     assert suggestion_in_parts(path, known) == expected
+
+
+@pytest.mark.parametrize(
+    ("where", "inside"), [("rod1", True), ("rod1.length", True), ("rod10", False), ("rod10.a", False)]
+)
+def test_a_part_is_not_one_whose_name_begins_alike(where: str, inside: bool) -> None:
+    assert is_about(AtwoodError("it is wrong", where=where), "rod1") is inside
+
+
+def test_a_law_that_asks_another_part_says_its_own() -> None:
+    class Asks(Component):
+        point: Point = connector(Point, "Where.")
+
+        @potential
+        def energy(self) -> Scalar:
+            raise ParameterError("a wrong value", where="rod10.length")
+
+    with pytest.raises(ParameterError, match="a wrong value") as caught:
+        scene = Scene()
+        bob, rod1 = scene.add("bob", PointMass()), scene.add("rod1", Asks())
+        scene.connect(rod1.point, bob.point)
+        assemble(scene)
+    assert caught.value.where == "rod1.energy"

@@ -22,6 +22,7 @@ __all__ = [
     "TopologyError",
     "UnsupportedError",
     "UsageError",
+    "is_about",
     "near_matches",
     "suggestion",
     "suggestion_in_parts",
@@ -106,6 +107,19 @@ class UsageError(AtwoodError):
 
 class UnsupportedError(AtwoodError):
     """The request makes sense, but Atwood cannot do it."""
+
+
+def is_about(error: AtwoodError, path: str) -> bool:
+    """Return whether an error is about a component or something inside it: ``rod1`` is not ``rod10``.
+
+    Parameters
+    ----------
+    error
+        The error.
+    path
+        The component.
+    """
+    return error.where == path or error.where.startswith(f"{path}.")
 
 
 def near_matches(word: str, choices: Iterable[str], n: int = 3) -> list[str]:

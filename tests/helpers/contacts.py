@@ -19,21 +19,23 @@ from atwood import (
     potential,
 )
 
+from .stick_slip import StickSlip
 
-class DryContact(Component):
+
+class DryContact(StickSlip):
     """Dry friction of a given size between two points, along x."""
 
-    modes = ("sticks", "slips_ahead", "slips_back")
-    mode_parameter = "starts"
-
     limit: float = parameter(1.0, unit="N", minimum=0.0, doc="Size of the friction.")
-    starts: str = parameter("sticks", choices=("sticks", "slips_ahead", "slips_back"), doc="How it starts.")
     a: Point = connector(Point, "One side.")
     b: Point = connector(Point, "The other side.")
 
     def slip(self) -> Scalar:
         """Return how fast b slides over a."""
         return self.b.velocity.x - self.a.velocity.x
+
+    def most(self) -> Scalar:
+        """Return the size of the friction."""
+        return self.limit
 
     def rub(self, push: Scalar) -> Iterable[Load]:
         """Return a force on b along x, and its reaction."""
@@ -53,26 +55,6 @@ class DryContact(Component):
     def rub_back(self) -> Iterable[Load]:
         """Return the friction on what slides back."""
         return self.rub(self.limit)
-
-    @event(modes=("sticks",), direction=1, unit="N", target="slips_ahead", message="it slips ahead")
-    def lets_go_ahead(self) -> Scalar:
-        """Return by how much it is pulled ahead too hard."""
-        return -self.reaction("grip") - self.limit
-
-    @event(modes=("sticks",), direction=1, unit="N", target="slips_back", message="it slips back")
-    def lets_go_back(self) -> Scalar:
-        """Return by how much it is pulled back too hard."""
-        return self.reaction("grip") - self.limit
-
-    @event(modes=("slips_ahead",), direction=-1, unit="m/s", target="sticks", message="it comes to rest")
-    def stops_ahead(self) -> Scalar:
-        """Return the slip."""
-        return self.slip()
-
-    @event(modes=("slips_back",), direction=1, unit="m/s", target="sticks", message="it comes to rest")
-    def stops_back(self) -> Scalar:
-        """Return the slip."""
-        return self.slip()
 
 
 class Cushion(Component):

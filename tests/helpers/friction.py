@@ -21,7 +21,6 @@ from atwood import (
     cos,
     cross,
     dot,
-    event,
     exp,
     force,
     joint,
@@ -34,12 +33,11 @@ from atwood import (
     sqrt,
 )
 
+from .stick_slip import StickSlip
 
-class RoughSlope(Component):
+
+class RoughSlope(StickSlip):
     """A point on a straight slope through the origin of a frame, with Coulomb friction."""
-
-    modes = ("slips_ahead", "slips_back", "sticks")
-    mode_parameter = "starts"
 
     angle: float = parameter(0.0, unit="rad", doc="Inclination, counter-clockwise.")
     friction: float = parameter(0.0, minimum=0.0, doc="Friction for each newton of normal force.")
@@ -100,26 +98,6 @@ class RoughSlope(Component):
     def rub_back(self) -> Iterable[Load]:
         """Return the friction while it slides back."""
         return self.rub(1.0)
-
-    @event(modes=("sticks",), direction=1, unit="N", target="slips_ahead", message="it slips ahead")
-    def lets_go_ahead(self) -> Scalar:
-        """Return by how much it is pulled ahead too hard."""
-        return -self.reaction("grip") - self.most()
-
-    @event(modes=("sticks",), direction=1, unit="N", target="slips_back", message="it slips back")
-    def lets_go_back(self) -> Scalar:
-        """Return by how much it is pulled back too hard."""
-        return self.reaction("grip") - self.most()
-
-    @event(modes=("slips_ahead",), direction=-1, unit="m/s", target="sticks", message="it comes to rest")
-    def stops_ahead(self) -> Scalar:
-        """Return the slip."""
-        return self.slip()
-
-    @event(modes=("slips_back",), direction=1, unit="m/s", target="sticks", message="it comes to rest")
-    def stops_back(self) -> Scalar:
-        """Return the slip."""
-        return self.slip()
 
 
 class RoughHoop(Component):

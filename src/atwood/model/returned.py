@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from atwood.errors import AtwoodError, DeclarationError
+from atwood.errors import AtwoodError, DeclarationError, is_about
 from atwood.expr import Expression, Graph
 from atwood.model.declare.contributions import Load, Placement, PointInertia
 from atwood.model.declare.laws import Law
@@ -35,7 +35,7 @@ def call_law(path: str, law: Law, function: Callable[[], Any]) -> Any:
     try:
         return function()
     except AtwoodError as error:
-        if error.where.startswith(path):
+        if is_about(error, path):
             raise
         raise type(error)(error.message, where=f"{path}.{law.name}", advice=error.advice) from error
     except Exception as error:  # whatever a law of somebody's own can raise

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from atwood.errors import AtwoodError, DeclarationError
+from atwood.errors import DeclarationError
 from atwood.expr import Expression, Graph, live, tan
 from atwood.late import dataclass
 from atwood.model.declare.component import bind
@@ -13,6 +13,7 @@ from atwood.model.declare.laws import ConstraintOptions, Law
 from atwood.model.local.flatten import Part
 from atwood.model.local.joint_references import JointCoordinateUse
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
+from atwood.model.returned import call_law
 
 __all__ = ["JointReference", "counting_constraints", "find_joint_references", "formulas_of", "turns_read"]
 
@@ -91,16 +92,8 @@ def formulas_of(part: Part, bound: Any, symbols: Sequence[Expression], graph: Gr
     laws = {law.name: law for law in part.component.laws("observable")}
 
     def formula(name: str) -> Expression:
-        try:
-            return graph.convert(getattr(bound, name)())
-        except AtwoodError as error:
-            if error.where.startswith(part.path):
-                raise
-            raise type(error)(error.message, where=f"{part.path}.{name}", advice=error.advice) from error
-        except Exception as error:  # whatever a law of somebody's own can raise
-            raise DeclarationError(
-                f"the law cannot be evaluated ({type(error).__name__}: {error})", where=f"{part.path}.{name}"
-            ) from error
+        value: Expression = call_law(part.path, laws[name], lambda: graph.convert(getattr(bound, name)()))
+        return value
 
     found = {}
     for symbol in symbols:
