@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,15 @@ def test_every_module_of_the_framework_has_a_place_in_the_layers() -> None:
     }
     unplaced = sorted(name for name in modules - {"__init__", "__main__"} if f"atwood.{name}" not in settings)
     assert not unplaced, f"name these in the layers of pyproject.toml: {unplaced}"
+
+
+def test_the_library_may_use_the_facades_and_no_other_room() -> None:
+    """A new room that the contract does not name would be open to the library."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = settings["tool"]["importlinter"]["contracts"]
+    (contract,) = (one for one in contracts if one.get("source_modules") == ["atwood_library"])
+    inside = {path.stem for path in (ROOT / "src" / "atwood").iterdir() if not path.name.startswith(("_", "py."))}
+    assert inside - {name.removeprefix("atwood.") for name in contract["forbidden_modules"]} == {"functions", "solids"}
 
 
 def test_the_solver_library_is_loaded_only_when_a_run_starts() -> None:

@@ -85,7 +85,9 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "comparison": atwood.compare(FourBar(), rtols=[1e-4, 1e-6], t_end=0.2),
         "sweep": atwood.sweep(scene, start=angles, t_end=0.1, outputs=30),
         "check": atwood.check(Rod),
+        "equations": (atwood.equations(DoublePendulum()), atwood.equations(DoublePendulum()).terms("bob1")),
         "linear": atwood.linearize(scene, at=hanging, inputs=[], outputs=["bob[0].position.x"]),
+        "dynamics": atwood.dynamics(scene),
         "modes": atwood.normal_modes(scene, at=hanging),
         "equilibria": list(atwood.equilibria(DoublePendulum())),
         "equilibria of a loop": atwood.equilibria(FourBar()),
@@ -103,7 +105,7 @@ def _reachable(roots: Mapping[str, object]) -> Iterator[tuple[str, object]]:
     waiting, seen = list(roots.items()), {}
     while waiting:
         where, one = waiting.pop(0)
-        own = type(one).__module__.startswith(("atwood", __name__))
+        own = str(type(one).__module__).startswith(("atwood", __name__))
         if isinstance(one, Mapping) and not own:
             waiting += [(f"{where}[{key!r}]", value) for key, value in islice(one.items(), 4)]
         elif isinstance(one, (tuple, list)):

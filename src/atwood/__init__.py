@@ -1,7 +1,9 @@
 """Atwood: mechanics from parts.
 
 Everything that is needed to write components, models and scenes is here, and so are the functions that assemble and
-run them; those are loaded when they are first used.
+run them; those are loaded when they are first used. Beside it, these rooms are public: `atwood.functions` (sines and
+the like, for laws), `atwood.solids` (mass properties), `atwood.plotting`, `atwood.reporting`, `atwood.study`
+and `atwood.checking`.
 """
 
 from __future__ import annotations
@@ -22,34 +24,67 @@ from atwood.errors import (
     UnsupportedError,
     UsageError,
 )
-from atwood.expr.core.functions import (
-    Scalar,
-    absolute,
-    acos,
-    asin,
-    atan,
-    atan2,
-    cos,
-    cosh,
-    exp,
-    external,
-    floor,
-    hypot,
-    is_zero,
-    log,
-    maximum,
-    minimum,
-    select,
-    sign,
-    sin,
-    sinh,
-    sqrt,
-    tan,
-    tanh,
-)
-from atwood.expr.core.functions import solve as solve_linear  # a law would read `solve` as anything
+from atwood.expr.core.functions import Scalar
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
+from atwood.functions import (  # these stay out of __all__: who imports all names has cos of another library mostly
+    absolute as absolute,
+)
+from atwood.functions import (
+    acos as acos,
+)
+from atwood.functions import (
+    asin as asin,
+)
+from atwood.functions import (
+    atan as atan,
+)
+from atwood.functions import (
+    atan2 as atan2,
+)
+from atwood.functions import (
+    cos as cos,
+)
+from atwood.functions import (
+    cosh as cosh,
+)
+from atwood.functions import (
+    exp as exp,
+)
+from atwood.functions import external, is_zero, select, solve_linear
+from atwood.functions import (
+    floor as floor,
+)
+from atwood.functions import (
+    hypot as hypot,
+)
+from atwood.functions import (
+    log as log,
+)
+from atwood.functions import (
+    maximum as maximum,
+)
+from atwood.functions import (
+    minimum as minimum,
+)
+from atwood.functions import (
+    sign as sign,
+)
+from atwood.functions import (
+    sin as sin,
+)
+from atwood.functions import (
+    sinh as sinh,
+)
+from atwood.functions import (
+    sqrt as sqrt,
+)
+from atwood.functions import (
+    tan as tan,
+)
+from atwood.functions import (
+    tanh as tanh,
+)
 from atwood.model.compose.composite import Model, connect
 from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
@@ -113,108 +148,65 @@ if TYPE_CHECKING:
 
     __version__: str
 
-__all__ = [
-    "FREE",
+__all__ = ["__version__"]
+
+# Scenes and models
+__all__ += [
+    "Model",
+    "Scene",
+    "connect",
+    "from_data",
+    "load_scene",
+    "save_scene",
+    "to_data",
+]
+
+# Runs and studies
+__all__ += [
     "Assembly",
-    "AtwoodError",
-    "BodyInertia",
-    "BranchPoint",
-    "CheckReport",
     "Comparison",
     "ComparisonRow",
-    "Component",
-    "ConnectError",
-    "Connector",
-    "DeclarationError",
+    "MechanismReport",
+    "Result",
+    "SavedResult",
+    "Sweep",
+    "assemble",
+    "compare",
+    "load_result",
+    "load_sweep",
+    "report",
+    "save_result",
+    "simulate",
+    "sweep",
+]
+
+# Equations and what follows from them
+__all__ += [
+    "BranchPoint",
     "Dynamics",
     "EquationsOfMotion",
     "Equilibria",
     "Equilibrium",
     "EquilibriumBranch",
     "EquilibriumBranches",
-    "Expression",
-    "ExternalFunction",
-    "Formula",
-    "Frame",
-    "Groove",
-    "KernelEvaluationError",
     "LinearModel",
-    "Load",
-    "MechanismReport",
-    "Model",
     "NormalModes",
-    "Outline",
-    "ParameterError",
     "PartOfEquations",
-    "Placement",
-    "Point",
-    "PointInertia",
-    "Result",
-    "ResultError",
     "RootLocus",
-    "Rotation",
-    "SavedResult",
-    "Scalar",
-    "Scene",
-    "Shaft",
-    "Slide",
-    "SolveError",
-    "StartError",
-    "Sweep",
-    "TopologyError",
     "Trim",
-    "UnsupportedError",
-    "UsageError",
-    "Vector",
-    "__version__",
-    "absolute",
-    "acos",
-    "animate",
-    "as_vector",
-    "asin",
-    "assemble",
-    "atan",
-    "atan2",
-    "check",
-    "compare",
-    "connect",
-    "connector",
-    "constraint",
-    "cos",
-    "cosh",
-    "cross",
-    "derivative",
-    "discrete_state",
-    "dissipation",
-    "dot",
     "dynamics",
     "equations",
     "equilibria",
     "equilibrium_branches",
-    "event",
-    "exp",
-    "external",
-    "floor",
-    "force",
-    "formula",
-    "from_data",
-    "hypot",
-    "inertia",
-    "is_zero",
-    "joint",
-    "lagrangian",
     "linearize",
-    "load_result",
-    "load_scene",
-    "load_sweep",
-    "log",
-    "maximum",
-    "minimum",
-    "norm",
     "normal_modes",
-    "normals",
-    "observable",
-    "parameter",
+    "root_locus",
+    "trim",
+]
+
+# Pictures
+__all__ += [
+    "animate",
     "plot",
     "plot_bode",
     "plot_branches",
@@ -224,27 +216,73 @@ __all__ = [
     "plot_nyquist",
     "plot_root_locus",
     "plot_sweep",
+]
+
+# Components of one's own
+__all__ += [
+    "FREE",
+    "BodyInertia",
+    "CheckReport",
+    "Component",
+    "Connector",
+    "Expression",
+    "ExternalFunction",
+    "Formula",
+    "Frame",
+    "Groove",
+    "Load",
+    "Outline",
+    "Placement",
+    "Point",
+    "PointInertia",
+    "Rotation",
+    "Scalar",
+    "Shaft",
+    "Slide",
+    "Vector",
+    "as_vector",
+    "check",
+    "connector",
+    "constraint",
+    "cross",
+    "derivative",
+    "discrete_state",
+    "dissipation",
+    "dot",
+    "event",
+    "external",
+    "force",
+    "formula",
+    "inertia",
+    "is_zero",
+    "joint",
+    "lagrangian",
+    "norm",
+    "normals",
+    "observable",
+    "parameter",
     "potential",
-    "report",
-    "root_locus",
-    "save_result",
-    "save_scene",
     "select",
-    "sign",
     "signal",
-    "simulate",
-    "sin",
-    "sinh",
     "solve_linear",
-    "sqrt",
     "state",
-    "sweep",
-    "tan",
-    "tanh",
-    "to_data",
-    "trim",
     "turn",
     "update",
+]
+
+# Errors
+__all__ += [
+    "AtwoodError",
+    "ConnectError",
+    "DeclarationError",
+    "KernelEvaluationError",
+    "ParameterError",
+    "ResultError",
+    "SolveError",
+    "StartError",
+    "TopologyError",
+    "UnsupportedError",
+    "UsageError",
 ]
 
 _LATER = {
