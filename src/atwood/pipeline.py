@@ -1,9 +1,11 @@
-"""The compiler: from a declared scene to a result, one step after another.
+"""From a declared scene to a result, one stage after another.
 
-    declare -> flatten -> graph -> forest -> kinematics -> form -> program -> kernel -> start -> solve -> result
+    scene --flatten--> FlatScene --read_mechanism--> Mechanism --assemble_flat--> Assembly      `assemble`
+          Assembly --find_start--> Start --run--> Run --> Result                                `simulate`
 
-Each step takes frozen values and gives frozen values. `assemble` goes as far as the form and makes programs when they
-are asked for; `simulate` goes all the way.
+Each stage takes frozen values and gives frozen values. What an assembly is asked for (equations, programs, their code)
+is worked out once and kept with it, or with all assemblies of its structure. `Result.timings` says how long each
+stage of `atwood.stages` took.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
@@ -30,9 +32,10 @@ from atwood.mechanics.dynamics.carried_inertia import inertia_asked_for
 from atwood.mechanics.dynamics.inertia import check_tensors
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.compose.composite import Model
+from atwood.model.declare.carried_inertia import Carried
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.model.local.laws import LocalPart, ParameterTable, localize
-from atwood.model.values.space import make_space
+from atwood.model.values.space import Space, make_space
 from atwood.progress import told
 from atwood.result.result import Result
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
@@ -55,14 +58,18 @@ from atwood.simulation.problem.arguments import (
 )
 from atwood.simulation.problem.conditions import Condition
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.run.run import run, run_out_of_time
+from atwood.simulation.run.run import Run, run, run_out_of_time
+from atwood.stages import stage, watching
 from atwood.tolerances import tolerances
-from atwood.topology.bodies import find_bodies
-from atwood.topology.graph import build_graph
+from atwood.topology.bodies import Bodies, find_bodies
+from atwood.topology.graph import MechanismGraph, build_graph
 from atwood.topology.line_signs import find_line_signs
 from atwood.topology.orientation_coordinates import Orientation, check_orientation
 
 __all__ = ["Assembly", "assemble", "assemble_flat", "simulate"]
+
+LineSigns = Mapping[tuple[str, str, str], float]
+"""On a line, the sign of each length: of (part, one connector, the other)."""
 
 SCENE = instance("a scene, or an assembly of one", Model, Assembly)
 
@@ -105,8 +112,10 @@ def assemble(
     AtwoodError
         If the scene is not sound; the error names the part.
     """
-    made = assemble_flat(flatten(scene, name), form=form, level=level, orientation=orientation)
-    return replace(made, source=Source(_assemble_like, _find_places, scene.copy()))
+    with stage("flatten"):
+        flat, own = flatten(scene, name), scene.copy()
+    made = assemble_flat(flat, form=form, level=level, orientation=orientation)
+    return replace(made, source=Source(_assemble_like, _find_places, own))
 
 
 def assemble_flat(
@@ -116,7 +125,7 @@ def assemble_flat(
     level: str = "ggl",
     orientation: str = "quaternion",
     modes: Mapping[str, str] | None = None,
-    line_signs: Mapping[tuple[str, str, str], float] | None = None,
+    line_signs: LineSigns | None = None,
 ) -> Assembly:
     """Assemble a scene that has been taken apart into leaves.
 
@@ -138,7 +147,8 @@ def assemble_flat(
         if part.component.modes
     }
     all_modes.update(modes or {})
-    mechanism = read_mechanism(flat, all_modes, line_signs)
+    with stage("mechanism"):
+        mechanism = read_mechanism(flat, all_modes, line_signs)
     chosen: Any = form
     level = level if form == "dae" else ""
     source, orientation_coordinates = Source(_assemble_like, _find_places), Orientation(orientation)
@@ -163,15 +173,13 @@ def _assemble_like(
     flat: FlatScene,
     like: Kind,
     modes: Mapping[str, str] | None = None,
-    line_signs: Mapping[tuple[str, str, str], float] | None = None,
+    line_signs: LineSigns | None = None,
 ) -> Assembly:
     kind, level = like.orientation.kind, like.level or "ggl"
     return assemble_flat(flat, form=like.form, level=level, orientation=kind, modes=modes, line_signs=line_signs)
 
 
-def read_mechanism(
-    flat: FlatScene, modes: Mapping[str, str], known_line_signs: Mapping[tuple[str, str, str], float] | None = None
-) -> Mechanism:
+def read_mechanism(flat: FlatScene, modes: Mapping[str, str], known_line_signs: LineSigns | None = None) -> Mechanism:
     """Read the laws of all parts and find nodes, joints and bodies.
 
     Parameters
@@ -188,37 +196,71 @@ def read_mechanism(
     TopologyError
         If rigid parts contradict each other.
     """
+    ground = _lay_ground(flat)
+    space = ground.space
+    check_names(flat.parts)
+    found = _read_laws(flat, modes, ground, known_line_signs)
+    check_laws(flat.parts, space)
+    line_signs = known_line_signs
+    if space.name == "line" and not known_line_signs:  # lengths are signed by where their ends are, which bodies say
+        line_signs = _find_line_signs(flat, ground, found)
+        found = _read_laws(flat, modes, ground, line_signs)
+    if any(local.asks for local in found.locals_.values()):  # laws that read the inertia of the body they are on
+        carried = inertia_asked_for(found.network, found.bodies, found.locals_, space)
+        found = _read_laws(flat, modes, ground, line_signs, carried)
+    gravity = make_gravity(ground.table, flat.gravity, flat.gravity_direction)
+    told = None if known_line_signs else line_signs
+    parts = ground.table, ground.time, space, gravity, *found, flat.links, told
+    mechanism = Mechanism(*parts, t_start=flat.t_start)
+    check_closures(mechanism)
+    check_tensors(mechanism.locals_, ground.table.values, space)
+    return hold_idle_spins(mechanism)
+
+
+class _Ground(NamedTuple):
+    """What laws are written with."""
+
+    time: Expression
+    space: Space
+    table: ParameterTable
+    relations: TimeRelations
+
+
+class _Reading(NamedTuple):
+    """The laws of all parts on symbols of their own, and the nodes and bodies that they make."""
+
+    locals_: Mapping[str, LocalPart]
+    network: MechanismGraph
+    bodies: Bodies
+
+
+def _lay_ground(flat: FlatScene) -> _Ground:
     graph = Graph()
     time = graph.symbol("t")
-    graph.relations = TimeRelations(time)
+    graph.relations = relations = TimeRelations(time)
     space = make_space(flat.space, flat.line_axis)
-    check_names(flat.parts)
-    table = ParameterTable(graph, space=space.name)
-    with graph.relations.reading():
-        locals_: Mapping[str, LocalPart] = localize(flat, space, time, table, modes, None)
-    check_laws(flat.parts, space)
+    return _Ground(time, space, ParameterTable(graph, space=space.name), relations)
+
+
+def _read_laws(
+    flat: FlatScene,
+    modes: Mapping[str, str],
+    ground: _Ground,
+    line_signs: LineSigns | None = None,
+    carried: Mapping[tuple[str, str], Carried] | None = None,
+) -> _Reading:
+    """Read all laws, with the signs of lengths and the inertia that they may ask for."""
+    with ground.relations.reading():
+        locals_ = localize(flat, ground.space, ground.time, ground.table, modes, line_signs, carried)
     network = build_graph(flat, locals_)
-    bodies = find_bodies(network, locals_)
-    line_signs: Mapping[tuple[str, str, str], float] | None = None
-    if space.name == "line":
-        offsets = {body.index: body_offsets(body, space)[0] for body in bodies.bodies}
-        line_signs = known_line_signs or find_line_signs(flat, network, bodies, locals_, offsets, table.values, space)
-        with graph.relations.reading():
-            locals_ = localize(flat, space, time, table, modes, line_signs)
-        network = build_graph(flat, locals_)
-        bodies = find_bodies(network, locals_)
-    gravity = make_gravity(table, flat.gravity, flat.gravity_direction)
-    told = None if known_line_signs else line_signs
-    if any(local.asks for local in locals_.values()):
-        carried = inertia_asked_for(network, bodies, locals_, space)
-        with graph.relations.reading():
-            locals_ = localize(flat, space, time, table, modes, line_signs, carried)
-        network = build_graph(flat, locals_)
-        bodies = find_bodies(network, locals_)
-    mechanism = Mechanism(table, time, space, gravity, locals_, network, bodies, flat.links, told, t_start=flat.t_start)
-    check_closures(mechanism)
-    check_tensors(mechanism.locals_, table.values, mechanism.space)
-    return hold_idle_spins(mechanism)
+    return _Reading(locals_, network, find_bodies(network, locals_))
+
+
+def _find_line_signs(flat: FlatScene, ground: _Ground, found: _Reading) -> LineSigns:
+    """Return the signs of lengths on a line, as far as start values tell."""
+    locals_, network, bodies = found
+    offsets = {body.index: body_offsets(body, ground.space)[0] for body in bodies.bodies}
+    return find_line_signs(flat, network, bodies, locals_, offsets, ground.table.values, ground.space)
 
 
 @takes(
@@ -322,35 +364,43 @@ def simulate(
     clock = Clock(max_seconds)
     asked = {"form": form, "level": level, "orientation": orientation}
     given = {name: value for name, value in asked.items() if value is not None}
-    if isinstance(scene, Assembly):
-        _refuse_contradictions(scene, given)
-    assembly = scene if isinstance(scene, Assembly) else assemble(scene, **given)
-    flat = assembly.flat
-    end = flat.t_end if t_end is None else float(t_end)
-    with told(progress, flat.name, partial(_share, flat.t_start, end)) as watch:
-        options = RunOptions(
-            t_end=end,
-            relative_tolerance=rtol,
-            absolute_tolerance=atol,
-            outputs=outputs,
-            max_steps=max_steps,
-            max_seconds=max_seconds,
-            progress=watch,
-            max_step=max_step,
-            solver=solver,
-            samples=samples,
-            structure=structure,
-            conditions=(
-                *(Condition(one, "stop") for one in _listed(until)),
-                *(Condition(one, "") for one in _listed(record)),
-            ),
-        )
-        try:
-            with clock.kept(GRACE):
-                assembly, start = _with_line_signs(assembly)
-        except TimeIsUp:
-            return Result(run_out_of_time(assembly, None, options))
-        return Result(run(assembly, start, options, assembly.other_mode, clock))
+    with watching() as stopwatch:
+        if isinstance(scene, Assembly):
+            _refuse_contradictions(scene, given)
+        assembly = scene if isinstance(scene, Assembly) else assemble(scene, **given)
+        flat = assembly.flat
+        end = flat.t_end if t_end is None else float(t_end)
+        with told(progress, flat.name, partial(_share, flat.t_start, end)) as watch:
+            options = RunOptions(
+                t_end=end,
+                relative_tolerance=rtol,
+                absolute_tolerance=atol,
+                outputs=outputs,
+                max_steps=max_steps,
+                max_seconds=max_seconds,
+                progress=watch,
+                max_step=max_step,
+                solver=solver,
+                samples=samples,
+                structure=structure,
+                conditions=(
+                    *(Condition(one, "stop") for one in _listed(until)),
+                    *(Condition(one, "") for one in _listed(record)),
+                ),
+            )
+            made = _solve(assembly, options, clock)
+    return Result(replace(made, timings=stopwatch.in_order()))
+
+
+def _solve(assembly: Assembly, options: RunOptions, clock: Clock) -> Run:
+    """Find the start of an assembly, and run it from there."""
+    try:
+        with clock.kept(GRACE), stage("start"):
+            assembly, start = _with_line_signs(assembly)
+    except TimeIsUp:
+        return run_out_of_time(assembly, None, options)
+    with stage("integration"):
+        return run(assembly, start, options, assembly.other_mode, clock)
 
 
 def _share(begin: float, end: float, t: float) -> tuple[float, str]:

@@ -15,6 +15,7 @@ from atwood.cli.output import print_json, warn
 from atwood.cli.scenes import prepare
 from atwood.errors import AtwoodError, UsageError
 from atwood.late import dataclass
+from atwood.stages import watching
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class RunRequest:
     draw: Path | None = None
     view: str | None = None
     save: Path | None = None
+    timings: bool = False
     progress: bool = True
     as_json: bool = False
 
@@ -62,6 +64,22 @@ def run_scene(request: RunRequest) -> None:
         What was asked for.
     """
     _check_files(request)
+    with watching():  # from the scene on
+        result = _run(request)
+    _keep(result, request)
+    if request.as_json:
+        print_json(run_data(result, request))
+    else:
+        from atwood.cli.summary import print_summary
+
+        print_summary(result, request)
+    if result.status == "interrupted":
+        warn(f"Interrupted at t = {result.time[-1]:.6g} s.")
+        click.get_current_context().exit(INTERRUPTED)
+
+
+def _run(request: RunRequest) -> Result:
+    """Return the run of a scene; what came before an error is kept where that was asked for."""
     scene, name = prepare(request.scene, request.settings, request.starts)
     from atwood.pipeline import assemble, simulate
 
@@ -73,7 +91,7 @@ def run_scene(request: RunRequest) -> None:
     t_start, t_end = assembly.flat.t_start, assembly.flat.t_end if request.t_end is None else request.t_end
     try:
         with progress_bar(request.progress, name, t_start, t_end) as progress:
-            result = simulate(
+            return simulate(
                 assembly,
                 t_end=request.t_end,
                 rtol=request.rtol,
@@ -91,16 +109,6 @@ def run_scene(request: RunRequest) -> None:
     except AtwoodError as error:
         _keep_what_came_before(error, request)
         raise
-    _keep(result, request)
-    if request.as_json:
-        print_json(run_data(result, request))
-    else:
-        from atwood.cli.summary import print_summary
-
-        print_summary(result, request)
-    if result.status == "interrupted":
-        warn(f"Interrupted at t = {result.time[-1]:.6g} s.")
-        click.get_current_context().exit(INTERRUPTED)
 
 
 def _keep(result: Result, request: RunRequest) -> None:
@@ -193,6 +201,7 @@ def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
         "constraint_max": data.pop("constraint_max"),
         **data,
         "asked": asked,
+        **({"timings": dict(result.timings)} if request.timings else {}),
     }
 
 

@@ -12,6 +12,7 @@ from atwood.cli.output import writer
 from atwood.cli.running import RunRequest, degrees_of_freedom, multiplier_labels
 from atwood.result.about import solver_name
 from atwood.showing import count_of
+from atwood.stages import STAGES
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
@@ -45,6 +46,10 @@ def print_summary(result: Result, request: RunRequest) -> None:
     if hidden:
         more = count_of(hidden, "more quantity", "more quantities")
         out.line((f"{more}: --json or --save FILE shows all", "dim"))
+    if request.timings:
+        out.line()
+        rows = [[name, f"{1e3 * spent:.3g}", STAGES[name]] for name, spent in result.timings.items()]
+        out.table(["stage", "ms>", "what it makes"], rows)
     for option, file in (("saved", request.save), ("plotted", request.plot), ("drawn", request.draw)):
         if file is not None:
             out.line((f"{option}: {file}", "dim"))

@@ -18,6 +18,7 @@ from atwood.mechanics.build import Mechanism, check_closures
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.laws import LocalPart, variation_names
+from atwood.stages import stage
 from atwood.topology.line_signs import find_line_signs
 
 __all__ = ["DECIDED", "Shared", "Slot", "decided_alike", "find_slots", "with_values_of"]
@@ -60,7 +61,7 @@ class Shared:
         try:
             found: T = self._made[key]
         except KeyError:
-            with self.lock:
+            with self.lock, stage("equations"):
                 if key not in self._made:
                     self._made[key] = make()
                 found = self._made[key]

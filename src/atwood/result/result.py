@@ -152,6 +152,14 @@ class Result(Trajectories):
             return report_initialization(self.assembly, self.start)
 
     @property
+    def timings(self) -> Mapping[str, float]:
+        """What each stage from the scene to the motion took, s; `atwood.stages.STAGES` says what each makes.
+
+        Stages whose work was done before, such as those of an assembly that is given, are not there or take no time.
+        """
+        return self.run.timings
+
+    @property
     def statistics(self) -> Statistics:
         """What the solver did."""
         return self.run.statistics

@@ -25,6 +25,7 @@ from atwood.codegen.llvm.module import CodeOptions, ModuleText, Part, write_modu
 from atwood.errors import UnsupportedError
 from atwood.expr.core.operations import ExternalFunction
 from atwood.late import dataclass
+from atwood.stages import stage
 
 __all__ = ["GENERATORS", "Built", "Failures", "build_code", "default_options", "hash_of_generators"]
 
@@ -122,7 +123,8 @@ def build_code(
         Whether to use the cache.  Programs that call functions in Python are never kept: their names do not say
         what they do.
     """
-    return within_time(lambda: _build(parts, options, more, exports, library, cached))
+    with stage("code"):
+        return within_time(lambda: _build(parts, options, more, exports, library, cached))
 
 
 def _build(

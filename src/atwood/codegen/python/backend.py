@@ -18,6 +18,7 @@ from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import BINARY, UNARY, ExternalFunction, solve_floats, solve_or_nan
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
+from atwood.stages import stage
 
 _LARGEST_PLAIN_SOLVE = 3
 
@@ -102,7 +103,8 @@ class CompiledProgram:
         return write_function("kernel", flavour, given, nodes, [group.expressions for group in program.outputs])
 
     def _function(self, flavour: Flavour) -> Callable[..., tuple[list[Any], ...]]:
-        return _execute("kernel", *self._written(flavour), flavour, self.program.name)
+        with stage("code"):
+            return _execute("kernel", *self._written(flavour), flavour, self.program.name)
 
     @cached_property
     def _prologue(self) -> Callable[..., tuple[list[Any], ...]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
@@ -41,6 +41,7 @@ from atwood.simulation.run.record import Recorder, SegmentRecord
 from atwood.simulation.run.segment import Outcome, Segment, run_segment
 from atwood.simulation.run.tolerances import allowed
 from atwood.simulation.singular.crossing import SingularCrossing
+from atwood.stages import stage
 from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import Orientation
 
@@ -80,6 +81,8 @@ class Run:
         When which orientation went on in other coordinates, since these came near to where they are singular.
     again
         Makes the same run with other options, and with samples in between that change nothing.
+    timings
+        What each stage took, s; see `atwood.stages`.
     """
 
     assembly: Assembly
@@ -93,6 +96,7 @@ class Run:
     choices: tuple[Choice, ...]
     coordinate_switches: tuple[CoordinateSwitch, ...] = ()
     again: Callable[[RunOptions, FloatArray], Run] | None = None
+    timings: Mapping[str, float] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         # Whoever watched the run is not there where it is read, nor are functions that it was watched for.
@@ -320,6 +324,10 @@ class _Walk:
 
     def prepare(self) -> None:
         """Make all that is needed in the present mode, and between two time events, if it is not there."""
+        with stage("preparation"):
+            self._prepare()
+
+    def _prepare(self) -> None:
         t, q, u, options = self.t, self.q, self.u, self.options
         plan = self.plan
         if plan is None:
