@@ -71,7 +71,7 @@ _SMALL = 300
 """Expressions of up to so many nodes are rewritten."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AccelerationProgram:
     """The accelerations of the reduced form without loops.
 

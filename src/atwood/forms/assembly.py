@@ -397,7 +397,7 @@ class Assembly:
 
     def kernel(self, program: Program, vectorized: bool = False) -> BoundKernel:
         """Return a program with the parameters of this scene, ready to run."""
-        key = (id(program), vectorized)
+        key = (program, vectorized)
         if key not in self._kernels:
             self._kernels[key] = self.compiled(program, vectorized).bind(self.parameter_values)
         found: BoundKernel = self._kernels[key]
@@ -407,16 +407,16 @@ class Assembly:
         """Return a program for many states as machine code with the parameters of this scene, ready to run."""
         from atwood.codegen.llvm.columns import compile_columns
 
-        key = (id(program), "columns")
+        key = (program, "columns")
         if key not in self._kernels:
-            made = self.shared.get(("columns", id(program)), lambda: (program, compile_columns(program)))
-            self._kernels[key] = made[1].bind(self.parameter_values)
+            made = self.shared.get(("columns", program), lambda: compile_columns(program))
+            self._kernels[key] = made.bind(self.parameter_values)
         found: ColumnKernel = self._kernels[key]
         return found
 
     def known_kernel(self, program: Program, values: FloatArray) -> BoundKernel:
         """Return a program whose parameters are others than those of this scene, with their values, ready to run."""
-        key = (id(program), values.tobytes())
+        key = (program, values.tobytes())
         known: dict[Any, BoundKernel] = self.shared.get("bound kernels", dict)
         if key not in known:
             if len(known) >= _BOUND:
@@ -426,11 +426,7 @@ class Assembly:
 
     def compiled(self, program: Program, vectorized: bool = False) -> CompiledProgram:
         """Return a program as Python code, for any parameter values of this structure."""
-        # The program is kept with its code, so that its identity stays its own.
-        made = self.shared.get(
-            ("code", id(program), vectorized), lambda: (program, compile_program(program, vectorized=vectorized))
-        )
-        return made[1]
+        return self.shared.get(("code", program, vectorized), lambda: compile_program(program, vectorized=vectorized))
 
     # -- what can be read -----------------------------------------------------------------------------------------
 

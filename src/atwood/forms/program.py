@@ -47,7 +47,7 @@ __all__ = [
 Level = Literal["", "ggl", "index1", "index1-projected"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FormProgram:
     """The equations ``F(t, y, y') = 0`` of one form, with ``y = (q, u, multipliers, extra)``.
 

@@ -51,9 +51,11 @@ class OutputGroup(NamedTuple):
         return brief(self, self._fields)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Program:
     """Outputs as expressions of inputs and parameters; what kernels are made from.
+
+    A program is equal to itself alone, so that what is made of it can be kept under it.
 
     Attributes
     ----------

@@ -39,7 +39,7 @@ _FEW = 2
 """So many times the lanes are few convolutions."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TaylorPrograms:
     """The recurrences of a system ``x' = f(t, x)``.
 

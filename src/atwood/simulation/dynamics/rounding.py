@@ -139,7 +139,7 @@ class RowErrors:
 
     def _rough(self, t: float, q: FloatArray, scales: FloatArray, off: float) -> tuple[FloatArray, FloatArray]:
         """Return values and entries, each in as many ways, with coordinates off by so many roundings."""
-        rough, count = self._assembly.shared.get(("rough", id(self._program)), self._made)[1], len(self._laws)
+        rough, count = self._assembly.shared.get(("rough", self._program), self._made), len(self._laws)
         speeds = np.zeros(len(self._program.inputs[2].symbols))
         places = q[:, None] * roughly(len(q))
         steps = off * scales[:, None] * (roughly(len(scales), len(q)) - 1.0)
@@ -148,11 +148,11 @@ class RowErrors:
         found = np.where(np.all(np.isfinite(found), axis=1, keepdims=True), found, 0.0)  # others say that it has none
         return found[:count], found[count:]
 
-    def _made(self) -> tuple[Program, RoughProgram]:
-        """Return the rough program, with its program, so that the identity of that stays its own."""
+    def _made(self) -> RoughProgram:
+        """Return the rough program."""
         by_name = {one.name: one.expressions for one in self._program.outputs}
         values, entries = (by_name[name] for name in self._groups)
-        return self._program, RoughProgram(self._program, (*values, *entries))
+        return RoughProgram(self._program, (*values, *entries))
 
     def _kinematic_matrix(self, t: float, q: FloatArray) -> FloatArray:
         return np.abs(self._kinematic_map.matrix(t, q)) if self._of_coordinates else np.zeros(0)

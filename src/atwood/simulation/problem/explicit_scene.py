@@ -63,8 +63,7 @@ def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAc
     """Return the accelerations of a scene as machine code, for any parameter values."""
     from atwood.integrators.dop853.native import CompiledAccelerations
 
-    _, code = assembly.shared.get(("rates", id(found)), lambda: (found, CompiledAccelerations(found.program)))
-    return code
+    return assembly.shared.get(("rates", found), lambda: CompiledAccelerations(found.program))
 
 
 def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], CompiledRates] | None:

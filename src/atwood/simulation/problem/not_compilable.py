@@ -33,11 +33,7 @@ def find_not_compilable(assembly: Assembly, program: Program) -> str:
     program
         One of its programs.
     """
-    _, found = assembly.shared.get(
-        ("not compilable", id(program)),
-        lambda: (program, _describe(assembly, program)),  # kept, so that its identity stays its own
-    )
-    return found
+    return assembly.shared.get(("not compilable", program), lambda: _describe(assembly, program))
 
 
 def announce(assembly: Assembly, not_compilable: str) -> None:

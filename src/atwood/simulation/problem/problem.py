@@ -267,19 +267,16 @@ class Plan:
         from atwood.codegen import compile_ida_callbacks
 
         program = self.program
-        _, code = self.assembly.shared.get(
-            ("ida", id(program), linear_solver),
-            lambda: (
-                program,  # kept, so that its identity stays its own
-                compile_ida_callbacks(
-                    program.residual,
-                    program.jacobian,
-                    program.rows,
-                    program.columns,
-                    program.size,
-                    sparse=linear_solver == "sparse",
-                    by_columns=program.derivative.by_columns,
-                ),
+        code = self.assembly.shared.get(
+            ("ida", program, linear_solver),
+            lambda: compile_ida_callbacks(
+                program.residual,
+                program.jacobian,
+                program.rows,
+                program.columns,
+                program.size,
+                sparse=linear_solver == "sparse",
+                by_columns=program.derivative.by_columns,
             ),
         )
         data = code.bind(self.assembly.parameter_values)

@@ -44,10 +44,10 @@ def recurrences(assembly: Assembly) -> TaylorPrograms:
             where=assembly.flat.name,
             advice="Use the solver 'ida'.",
         )
-    is_partial = assembly.shared.get(("partial", id(found)), lambda: _has_partial_branch(assembly, found))
+    is_partial = assembly.shared.get(("partial", found), lambda: _has_partial_branch(assembly, found))
     chosen = assembly.known_relations if is_partial else {}
-    key = ("recurrences", id(found), tuple(chosen.values()))
-    return assembly.shared.get(key, lambda: (found, _make(found, chosen)))[1]
+    key = ("recurrences", found, tuple(chosen.values()))
+    return assembly.shared.get(key, lambda: _make(found, chosen))
 
 
 _PARTIAL = frozenset({"sqrt", "log", "pow", "asin", "acos", "tan", "atan2", "div"})
@@ -112,8 +112,7 @@ def _compiled(
 
     @cache
     def bound() -> tuple[CompiledRecurrences, FloatArray]:
-        key = ("compiled recurrences", id(programs))
-        _, code = assembly.shared.get(key, lambda: (programs, CompiledRecurrences(programs)))
+        code = assembly.shared.get(("compiled recurrences", programs), lambda: CompiledRecurrences(programs))
         return code, code.bind(assembly.parameter_values)
 
     return bound
