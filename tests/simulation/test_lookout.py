@@ -9,6 +9,7 @@ import pytest
 
 from atwood import simulate
 from atwood.codegen.python.backend import BoundKernel
+from atwood.codegen.sundials.lookout_text import Shape
 from atwood.integrators.ida import library as sundials_library
 from atwood.linalg.matrices import to_array
 from atwood.simulation.singular.looks import Look
@@ -109,3 +110,9 @@ def test_outputs_between_looks_change_no_look(guards: list[SingularityMonitor]) 
     few, *others = ([one[0] for one in monitor._compiled.take()] for monitor in guards)
     assert all(many == few for many in others)
     assert len(few) > 3
+
+
+def test_conditions_that_depend_on_no_coordinate_have_lists() -> None:
+    """As of a rope along a rod on a line, which the rod holds already."""
+    lists = Shape(coordinates=1, speeds=1, size=2, conditions=1, places=()).lists
+    assert all(len(numbers) == 0 for numbers in lists.values())

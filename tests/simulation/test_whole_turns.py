@@ -130,5 +130,5 @@ def test_a_turn_that_moves_another_body_stays(ratio: float, turns: float) -> Non
     equations = assembly.regular
     assert [one.name for one in equations.names] == ["hinge_a.angle"]
     scales = motion_scales(equations, 1.0)
-    found = unwound(assembly, equations, [], scales, 1.0, 0.0, np.zeros(1), np.array([9.0]))
+    found = unwound(assembly, equations, [], True, scales, 1.0, 0.0, np.zeros(1), np.array([9.0]))
     assert found == pytest.approx([turns])

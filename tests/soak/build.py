@@ -75,13 +75,17 @@ def plane_angles(mechanism: Mechanism) -> dict[str, float]:
     found = {"": 0.0}
     for body in mechanism.bodies:
         angle = _counter_clockwise(body.rotation)
-        hung = next((tie for tie in mechanism.ties if tie.mounts and tie.mounts[-1].body == body.name), None)
-        if hung is not None and hung.sort in ("pivot", "slider", "weld", "drive", "rotary_drive"):
-            a, b = hung.mounts
-            if a.body in found:
+        hung = [tie for tie in mechanism.ties if tie.mounts and tie.mounts[-1].body == body.name][:1]
+        locks = [tie for tie in mechanism.ties if tie.sort in ("slider", "weld")]
+        for tie in (*locks, *hung):  # a lock says for certain
+            if tie.sort not in ("pivot", "slider", "weld", "drive", "rotary_drive"):
+                continue
+            a, b = tie.mounts if tie.mounts[-1].body == body.name else tie.mounts[::-1]
+            if b.body == body.name and a.body in found:
                 joint = _counter_clockwise((mechanism.turned(a)).T @ mechanism.turned(b))
                 hangs = found[a.body] + _counter_clockwise(a.rotation) + joint - _counter_clockwise(b.rotation)
                 angle += 2.0 * np.pi * round((hangs - angle) / (2.0 * np.pi))
+                break
         found[body.name] = angle
     return found
 

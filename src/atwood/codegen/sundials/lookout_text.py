@@ -71,7 +71,9 @@ class Shape:
             for j, f in column
             if i >= j
         ]
-        entries, pairs = np.array(self.places, dtype=np.int64).T, np.array(products, dtype=np.int64).T
+        # There may be none, where no constraint depends on a coordinate.
+        entries = np.array(self.places, dtype=np.int64).reshape(-1, 2).T
+        pairs = np.array(products, dtype=np.int64).reshape(-1, 3).T
         return dict(zip(LISTS[1:], map(np.ascontiguousarray, (*entries, *pairs)), strict=True))
 
 

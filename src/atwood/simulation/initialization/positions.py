@@ -89,13 +89,13 @@ def solve_positions(
             other = _brought_near(system, equations, scales, t, q)
             near = other if _far_off(system, t, other) < 1e-3 else near
         q = near
-    q = rough = unwound(assembly, equations, every, scales, length, t, near_to, q)
+    q = rough = unwound(assembly, equations, every, False, scales, length, t, near_to, q)
     system = System(assembly, equations, level.fixed, True)
     q, residual, matrix = newton(system, scales, t, q)
     if not _is_met(residual) or wrongly_turned(assembly, equations, t, q):
         failed = Failed(assembly, equations, level, scales, length, t, rough, q, residual)
         q, matrix = _elsewhere(failed, system)
-    q = unwound(assembly, equations, every, scales, length, t, near_to, q)
+    q = unwound(assembly, equations, every, True, scales, length, t, near_to, q)
     errors = system.errors.of_jacobian(t, q, scales)
     tangent = None if kinematic_map.is_plain else kinematic_map.matrix(t, q)
     for (

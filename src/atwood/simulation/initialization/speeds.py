@@ -18,8 +18,30 @@ from atwood.tolerances import tolerances
 __all__ = ["solve_speeds"]
 
 
+def _least_rates(assembly: Assembly, level: Level, rows: FloatArray, length: float, fastest: float) -> FloatArray:
+    """Return for each condition what counts as nothing: rounding beside what is fastest, or not seen in all the time.
+
+    Parameters
+    ----------
+    assembly, level
+        The scene, and what is said of speeds.
+    rows
+        By how much each condition changes when something moves by its size.
+    length
+        Extent of the scene, m.
+    fastest
+        The largest speed, in sizes a second.
+    """
+    said = np.array([abs(one.value) for one in level.fixed])
+    units = np.array([length if one.observable.unit == "m/s" else 1.0 for one in level.fixed])
+    span = assembly.flat.t_end - assembly.flat.t_start
+    rate = max(fastest, float(np.max(said / units, initial=0.0)), 1.0 / span if span > 0.0 else 0.0)
+    sizes = np.concatenate([rows[: len(rows) - len(units)], units])
+    return rate * certain(np.zeros_like(sizes), sizes)
+
+
 def solve_speeds(
-    assembly: Assembly, equations: Equations, level: Level, scales: FloatArray, t: float, q: FloatArray
+    assembly: Assembly, equations: Equations, level: Level, scales: FloatArray, length: float, t: float, q: FloatArray
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
     """Return speeds that fulfil constraints and what is fixed; which nothing determines, and what repeats others.
 
@@ -31,6 +53,8 @@ def solve_speeds(
         What is said of speeds.
     scales
         Size of a displacement along each speed.
+    length
+        Extent of the scene, m.
     t, q
         Time and coordinates of the start.
 
@@ -61,6 +85,7 @@ def solve_speeds(
         # What is summed up within an equation rounds, even if all that comes out of it is zero.
         fastest = float(np.max(np.abs(u / scales), initial=0.0))
         own += certain(errors, rows) * fastest / tolerances.MET_SPEEDS
+        own += _least_rates(assembly, level, rows, length, fastest) / tolerances.MET_SPEEDS
         share = np.abs(residual) / np.where(own > 0.0, own, 1.0)
         if not float(np.max(share)) <= tolerances.MET_SPEEDS:
             freedom = freedom_at(assembly, equations, scales, t, q)

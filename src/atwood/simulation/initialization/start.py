@@ -134,7 +134,7 @@ def _solved(assembly: Assembly) -> Start:
     t = assembly.flat.t_start
     try:
         at = solve_positions(assembly, equations, positions, scales, length, t)
-        u, free_u, repeated_u = solve_speeds(assembly, equations, speeds, scales, t, at.coordinates)
+        u, free_u, repeated_u = solve_speeds(assembly, equations, speeds, scales, length, t, at.coordinates)
     except KernelEvaluationError as error:
         raise _without_value(assembly, t, error) from error
     except (ValueError, ArithmeticError) as error:

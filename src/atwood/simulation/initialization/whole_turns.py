@@ -25,6 +25,7 @@ def unwound(
     assembly: Assembly,
     equations: Equations,
     targets: Sequence[Target],
+    constrained: bool,
     scales: FloatArray,
     length: float,
     t: float,
@@ -34,7 +35,7 @@ def unwound(
     """Return the same place with the angles of joints, which count turns, within half a turn of what is said of them.
 
     Newton's method may go round on its way, and a spring on the joint would begin wound up. A turn is taken back if no
-    body stands otherwise without it, and constraints and what is said hold as before.
+    body stands otherwise without it, and what is said holds as before.
 
     Parameters
     ----------
@@ -42,6 +43,8 @@ def unwound(
         The scene.
     targets
         What is said of positions.
+    constrained
+        Whether the constraints are to hold as before; else bodies are only where they are said to be by now.
     scales
         Size of a displacement along each speed.
     length
@@ -60,7 +63,7 @@ def unwound(
     wound = [i for i, one in enumerate(equations.names) if one.unit == "rad" and i not in of_charts and whole[i] != 0.0]
     if not wound:
         return q
-    system = System(assembly, equations, targets, True)
+    system = System(assembly, equations, targets, constrained)
     still = np.zeros_like(scales)
     before, matrix = system.at(t, q, still)
     allowed = tolerances.CLOSED * row_sizes(matrix, scales)

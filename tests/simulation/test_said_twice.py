@@ -1,0 +1,52 @@
+"""Starts in which everything is said fit together, however much of it follows from the rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from atwood import Scene, StartError, assemble, simulate
+from atwood.simulation.initialization.start import find_start
+from atwood_library import Ground, Link, Pivot, Weld
+
+FORMS = ("reduced", "dae")
+
+
+def four_bar(speed: float) -> Scene:
+    """Return a four-bar in space, in the plane x-z, with the speeds of its crank said."""
+    scene = Scene(space="space", gravity=0.0)
+    ground, far = scene.add("ground", Ground()), scene.add("far", Weld(displacement=(2.5, 0.0, 0.0)))
+    scene.connect(ground.frame, far.a)
+    lengths = {"crank": 1.0, "coupler": 2.5, "rocker": 2.0}
+    bars = [scene.add(name, Link(length=size, mass=size, axial_moment=1e-3)) for name, size in lengths.items()]
+    joins = [(ground.frame, bars[0].a), (bars[0].b, bars[1].a), (bars[1].b, bars[2].b), (far.b, bars[2].a)]
+    for i, (one, other) in enumerate(joins):
+        pivot = scene.add(f"pivot{i}", Pivot())
+        scene.connect(one, pivot.a)
+        scene.connect(pivot.b, other)
+    scene.start["pivot0.angle"] = 1.0
+    scene.guess.update({"pivot1.angle": -0.7, "pivot3.angle": 1.9})
+    scene.start["pivot0.angular_velocity"] = speed
+    return scene
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("speed", [2.0, 0.0])
+def test_speeds_of_rounding_are_none(form: str, speed: float) -> None:
+    """All velocities are said, with what rounding leaves across the plane, or of a mechanism at rest."""
+    random, scene = np.random.default_rng(1), four_bar(speed)
+    moving = simulate(scene, t_end=1e-3, outputs=2)
+    for name in ("crank", "coupler", "rocker"):
+        for axis in "xyz":
+            exact = moving.at(0)[f"{name}.velocity.{axis}"]
+            scene.start[f"{name}.velocity.{axis}"] = exact + 1e-15 * random.standard_normal()
+    found = simulate(scene, form=form, t_end=0.1, outputs=2, rtol=1e-9)
+    assert found.at(0)["pivot0.angular_velocity"] == pytest.approx(speed, abs=1e-12)
+
+
+def test_speeds_that_are_more_than_rounding_still_contradict() -> None:
+    for speed in (2.0, 0.0):
+        scene = four_bar(speed)
+        scene.start["rocker.velocity.y"] = 1e-9
+        with pytest.raises(StartError, match=r"rocker\.velocity\.y"):
+            find_start(assemble(scene))
