@@ -489,16 +489,21 @@ def test_long_formulas_break_into_lines_and_name_their_brackets() -> None:
     assert max(map(len, page.splitlines())) < 700
 
 
+def test_parts_with_words_for_names_are_numbered_alike_in_all_letters() -> None:
+    eq = equations(SCENES["four-bar"]())
+    found = {one.path: one.name for one in eq.legend}
+    assert [found[f"{link}.angle"] for link in ("crank", "rocker", "coupler")] == ["theta_1", "theta_2", "theta_3"]
+    assert [found[f"{link}.mass"] for link in ("crank", "rocker", "coupler")] == ["m_1", "m_2", "m_3"]
+    assert found["coupler.length"] == "l_3"
+
+
 def test_names_do_not_clash() -> None:
-    scene = Scene(gravity=0.0)
-    for name in ("t", "g", "theta_1"):
-        bob, ground = scene.add(name, PointMass()), None
-        assert ground is None
-        scene.start[f"{name}.position.x"] = 0.0
-        assert bob is not None
-    eq = equations(scene)
-    names = [one.name for one in eq.legend]
+    scene = Scene()
+    for name in ("t", "g", "x", "m", "lambda_", "theta_1"):
+        scene.add(name, PointMass())
+    names = [one.name for one in equations(scene).legend]
     assert len(set(names)) == len(names)
+    assert "t" not in names
 
 
 def test_sympy_is_not_imported_before_somebody_asks_for_it() -> None:

@@ -219,7 +219,7 @@ class Book:
             number, factors = self._number(value)
             who = owners.of(ONE, {monomial: value})
             apart.append(in_order(product(number, [*factors, *self._constants(expansion, monomial)], who)))
-        return [together] if cost(Sum((together,))) < cost(Sum(tuple(apart))) else apart
+        return [together] if cost(Sum((together,))) <= cost(Sum(tuple(apart))) else apart
 
     def _coefficient(self, expansion: Expansion, coefficient: Coefficient) -> tuple[Number, list[Factor]]:
         """Return a coefficient as a number and factors: what all its terms share comes first."""

@@ -91,8 +91,6 @@ def _power(node: Node, power: Fraction, alone: bool = False) -> str:
         text = rf"\left({_call(node)}\right)"
     else:
         text = formula(node)
-        if power != 1 and isinstance(node, Name) and node.dots:
-            text = f"{{{text}}}"
     return text if power == 1 else f"{text}^{{{exponent}}}"
 
 

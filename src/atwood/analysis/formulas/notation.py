@@ -286,6 +286,7 @@ def _subscripts(wanted: Sequence[_Wanted]) -> list[tuple[str, ...]]:
     groups: dict[tuple[tuple[str, ...], bool], list[int]] = {}
     for i, one in enumerate(wanted):
         groups.setdefault((one.stem, one.kind == "parameter"), []).append(i)
+    numbered = _numbered(wanted, list(groups.values()))
     found: list[tuple[str, ...]] = [()] * len(wanted)
     taken: set[tuple[str, ...]] = set()
     stems: set[tuple[str, ...]] = set()
@@ -293,14 +294,39 @@ def _subscripts(wanted: Sequence[_Wanted]) -> list[tuple[str, ...]]:
         parts = [wanted[i].part for i in members]
         plain = [""] if len(members) == 1 and stem not in stems else None
         stems.add(stem)
+        counted = [numbered[part] for part in parts] if all(part in numbered for part in parts) else None
         paths = [one.replace(".", "") for one in _full(wanted[i].path for i in members)]
-        for labels in (plain, _numbers(parts), _last_names(parts, stem[0]), _full(parts), paths):
+        for labels in (plain, _numbers(parts), counted, _last_names(parts, stem[0]), _full(parts), paths):
             names = [] if labels is None else [(*stem, one) if one else stem for one in labels]
             if labels is not None and len(set(names)) == len(names) and taken.isdisjoint(names):
                 taken.update(names)
                 for i, label in zip(members, labels, strict=True):
                     found[i] = (label,) if label else ()
                 break
+    return found
+
+
+def _numbered(wanted: Sequence[_Wanted], groups: Sequence[Sequence[int]]) -> dict[str, str]:
+    """Return numbers for parts that have words for names, where words would fill the lines.
+
+    That is where three parts or more have the same letters, as crank, coupler and rocker: each has one number in all
+    of them. Two words, as cart and bob, and what has a figure already, as principal moments, keep the words.
+    """
+    families: list[tuple[list[str], bool]] = []
+    for members in groups:
+        parts = list(dict.fromkeys(wanted[i].part for i in members))
+        if len(members) < 2 or len(parts) < len(members) or _numbers(parts) is not None:
+            continue
+        has_figure = len(wanted[members[0]].stem) > 1
+        met = [one for one in families if not set(one[0]).isdisjoint(parts)]
+        joined = list(dict.fromkeys([*(part for one in met for part in one[0]), *parts]))
+        families = [one for one in families if one not in met]
+        families.append((joined, has_figure or any(one[1] for one in met)))
+    order = {part: i for i, part in enumerate(dict.fromkeys(one.part for one in wanted))}
+    found: dict[str, str] = {}
+    for parts, has_figure in families:
+        if len(parts) > 2 and not has_figure:
+            found |= {part: str(i + 1) for i, part in enumerate(sorted(parts, key=order.__getitem__))}
     return found
 
 
