@@ -22,6 +22,21 @@ if TYPE_CHECKING:
     from atwood_library.blocks.second_order import SecondOrder as SecondOrder
     from atwood_library.blocks.state_space import StateSpace as StateSpace
     from atwood_library.blocks.transfer_function import TransferFunction as TransferFunction
+    from atwood_library.drives.inertia import Inertia as Inertia
+    from atwood_library.drives.rotational_coupling import RotationalCoupling as RotationalCoupling
+    from atwood_library.drives.rotational_gap import RotationalGap as RotationalGap
+    from atwood_library.drives.rotational_maxwell import RotationalMaxwell as RotationalMaxwell
+    from atwood_library.drives.rotational_motion import RotationalMotion as RotationalMotion
+    from atwood_library.drives.rotational_resistance import RotationalResistance as RotationalResistance
+    from atwood_library.drives.rotational_source import RotationalSource as RotationalSource
+    from atwood_library.drives.rotational_spring_damper import RotationalSpringDamper as RotationalSpringDamper
+    from atwood_library.drives.translational_coupling import TranslationalCoupling as TranslationalCoupling
+    from atwood_library.drives.translational_gap import TranslationalGap as TranslationalGap
+    from atwood_library.drives.translational_maxwell import TranslationalMaxwell as TranslationalMaxwell
+    from atwood_library.drives.translational_motion import TranslationalMotion as TranslationalMotion
+    from atwood_library.drives.translational_resistance import TranslationalResistance as TranslationalResistance
+    from atwood_library.drives.translational_source import TranslationalSource as TranslationalSource
+    from atwood_library.drives.translational_spring_damper import TranslationalSpringDamper as TranslationalSpringDamper
     from atwood_library.fields.charge import Charge as Charge
     from atwood_library.fields.coordinate_lagrangian import CoordinateLagrangian as CoordinateLagrangian
     from atwood_library.fields.lorentz_force import LorentzForce as LorentzForce
@@ -131,6 +146,7 @@ _MODULES = {
     "Gain": "blocks.gain",
     "Gear": "joints.gear",
     "Ground": "parts.ground",
+    "Inertia": "drives.inertia",
     "Integrator": "blocks.integrator",
     "Limiter": "blocks.limiter",
     "Link": "parts.link",
@@ -172,6 +188,13 @@ _MODULES = {
     "RollingSphere": "joints.rolling_sphere",
     "Rope": "ropes.rope",
     "RotaryDrive": "joints.rotary_drive",
+    "RotationalCoupling": "drives.rotational_coupling",
+    "RotationalGap": "drives.rotational_gap",
+    "RotationalMaxwell": "drives.rotational_maxwell",
+    "RotationalMotion": "drives.rotational_motion",
+    "RotationalResistance": "drives.rotational_resistance",
+    "RotationalSource": "drives.rotational_source",
+    "RotationalSpringDamper": "drives.rotational_spring_damper",
     "SampleAndHold": "blocks.sample_and_hold",
     "SampleDelay": "blocks.sample_delay",
     "Screw": "joints.screw",
@@ -190,6 +213,13 @@ _MODULES = {
     "TorsionSpring": "forces.torsion_spring",
     "TotalsSensor": "sensors.totals_sensor",
     "TransferFunction": "blocks.transfer_function",
+    "TranslationalCoupling": "drives.translational_coupling",
+    "TranslationalGap": "drives.translational_gap",
+    "TranslationalMaxwell": "drives.translational_maxwell",
+    "TranslationalMotion": "drives.translational_motion",
+    "TranslationalResistance": "drives.translational_resistance",
+    "TranslationalSource": "drives.translational_source",
+    "TranslationalSpringDamper": "drives.translational_spring_damper",
     "Tube": "parts.tube",
     "Universal": "joints.universal",
     "Weld": "joints.weld",

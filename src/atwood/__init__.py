@@ -89,7 +89,7 @@ from atwood.model.compose.composite import Model, connect
 from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
-from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.fields import parameter, signal
 from atwood.model.declare.laws import (
     constraint,
@@ -225,6 +225,7 @@ __all__ += [
     "CheckReport",
     "Component",
     "Connector",
+    "CoordinateLoad",
     "Expression",
     "ExternalFunction",
     "Formula",

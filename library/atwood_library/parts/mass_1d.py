@@ -10,6 +10,7 @@ from atwood import (
     Point,
     PointInertia,
     Scalar,
+    Slide,
     Vector,
     as_vector,
     connector,
@@ -29,7 +30,7 @@ class Mass1D(Component):
     one-dimensional and planar parts can meet.
     """
 
-    synonyms = ("Mass on a line",)
+    synonyms = ("Translational.Mass", "Mass on a line")
 
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     origin: tuple[float, float, float] = parameter(
@@ -37,6 +38,7 @@ class Mass1D(Component):
     )
     axis: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction of the line.")
     flange: Point = connector(Point, "The mass.")
+    slide: Slide = connector(Slide, "The displacement, where drives take hold of it.", of="displacement")
 
     def direction(self) -> Vector:
         """Return the direction of the line."""
@@ -60,13 +62,13 @@ class Mass1D(Component):
         )
 
     @joint("world", "flange", coordinates=("displacement",), solves=("guide",), spaces=("line", "plane"))
-    def slide(self, displacement: Scalar) -> Placement:
+    def move(self, displacement: Scalar) -> Placement:
         """Place the mass on the line."""
         axis, origin = self.direction(), as_vector(self.origin)
         start = axis * dot(axis, origin) if self.on_a_line else origin
         return Placement(start + axis * displacement)
 
-    @observable(unit="m", doc="Distance from the origin along the line.", spaces=("line", "plane"))
+    @observable(unit="m", doc="Distance from the origin along the line.", rate="speed", spaces=("line", "plane"))
     def displacement(self) -> Scalar:
         """Return the displacement."""
         return dot(self.flange.position - as_vector(self.origin), self.direction())

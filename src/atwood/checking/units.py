@@ -16,7 +16,7 @@ from atwood.consistency.trials import Body, Trial
 from atwood.late import dataclass
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
-from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.function_values import Function
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.values.rotation import Rotation
@@ -224,11 +224,16 @@ def _of_constraint(trial: Trial, law: Law, made: Any) -> Iterator[tuple[float, E
 
 def _bound_at_rest(trial: Trial) -> Any:
     still = {name: Vector(0.0, 0.0, 0.0) for name in trial.velocities}
-    return _bound(replace(trial, velocities=still, angular_velocities=still), Units((1.0,) * 4))
+    held = {name: (value, 0.0) for name, (value, _) in trial.joint_references.items()}
+    at_rest = replace(trial, velocities=still, angular_velocities=still, joint_references=held)
+    return _bound(at_rest, Units((1.0,) * 4))
 
 
 def _of_loads(trial: Trial, law: Law, made: Any) -> Iterator[tuple[float, Exponents]]:
     for load in made:
+        if isinstance(load, CoordinateLoad):
+            yield float(load.value), parse_unit("N" if isinstance(load.at, Slide) else "N*m").exponents
+            continue
         assert isinstance(load, Load)
         for one in load.force:
             yield float(one), parse_unit("N").exponents

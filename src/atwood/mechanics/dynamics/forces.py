@@ -165,6 +165,9 @@ def part_forces(
     site: Site, local: LocalPart, kinematics: Kinematics, mapping: Mapping[Expression, Expression], forces: Forces
 ) -> None:
     """Add the forces of a part's potentials, Rayleigh functions, Lagrangians and loads."""
+    if local.stand_ins:
+        values, _ = in_joint_coordinates(local, kinematics, list(local.stand_ins.values()))
+        mapping = {**mapping, **dict(zip(local.stand_ins, substitute(values, mapping), strict=True))}
     _add_gradient(site, local, kinematics, local.potentials, mapping, forces, of_velocities=False)
     _add_gradient(site, local, kinematics, local.dissipations, mapping, forces, of_velocities=True)
     if local.lagrangians:

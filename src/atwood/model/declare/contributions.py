@@ -14,11 +14,12 @@ from atwood.model.declare.connectors import Frame, JointCoordinate, Point
 from atwood.model.values.rotation import FreeRotation, Rotation
 from atwood.model.values.vector import ZERO, Vector, as_vector
 
-__all__ = ["BodyInertia", "Load", "Placement", "PointInertia"]
+__all__ = ["BodyInertia", "CoordinateLoad", "Load", "Placement", "PointInertia"]
 
 
 _POINT = instance("a connector that is a point or a frame, such as self.a", Point)
 _FRAME = instance("a connector that is a frame, such as self.frame", Frame)
+_COORDINATE = instance("a connector that takes hold of a joint, such as self.shaft", JointCoordinate)
 _MATRIX = each(each(SCALAR, "numbers or expressions"), "rows of numbers or expressions")
 _ROTATION = optional(either(instance("a Rotation or FREE", Rotation, FreeRotation), SCALAR))
 
@@ -120,7 +121,7 @@ class Load:
         if isinstance(self.at, JointCoordinate):
             raise DeclarationError(
                 "a load acts on a point or a frame, and not on a joint's coordinate",
-                advice="Write it as a @potential of the coordinate and of time, or as a @dissipation of its rate.",
+                advice="Write it as a CoordinateLoad.",
             )
         check_fields(self, DeclarationError, at=_POINT)
         object.__setattr__(self, "force", _vector(self, "force"))
@@ -130,6 +131,36 @@ class Load:
     def components(self) -> tuple[Scalar, ...]:
         """The components of force and torque."""
         return (*self.force, *self.torque)
+
+
+@takes_names
+@dataclass(frozen=True)
+class CoordinateLoad:
+    """A force along the coordinate of a joint, or a torque about its axis, on whatever the joint is between.
+
+    Attributes
+    ----------
+    at
+        The connector that takes hold of the joint.
+    value
+        N along a displacement, N m about an angle; positive makes the coordinate grow.
+    """
+
+    at: JointCoordinate
+    value: Scalar
+
+    def __post_init__(self) -> None:
+        check_fields(self, DeclarationError, at=_COORDINATE, value=SCALAR)
+
+    @property
+    def force(self) -> Vector:
+        """The force on a point: none."""
+        return ZERO
+
+    @property
+    def torque(self) -> Vector:
+        """The torque on a frame: none."""
+        return ZERO
 
 
 @takes_names

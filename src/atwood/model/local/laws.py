@@ -18,7 +18,7 @@ from atwood.late import dataclass
 from atwood.model.declare.carried_inertia import Asked, Carried
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
-from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import FlatScene, Part
@@ -236,9 +236,13 @@ def _localize_part(
     # Only forces may read reactions: they are solved for together with the accelerations.
     binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
     acting = bind(component, binding)
-    dissipations, loads = laws.scalars(acting, "dissipation"), laws.listed(acting, "force")
+    dissipations, given = laws.scalars(acting, "dissipation"), laws.listed(acting, "force")
+    loads = [one for one in given if isinstance(one, Load)]
+    stand_ins, along = _coordinate_loads(part, [one for one in given if isinstance(one, CoordinateLoad)], graph)
+    dissipations = (*dissipations, *along)
     states = local_states(part, laws.of("derivative"), acting, graph)
     forces: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components), *(x.rate for x in states)]
+    forces += stand_ins.values()
     acted = [*potentials, *lagrangians, *(graph.convert(one) for one in forces)]
     acted += _linked_outputs(part, flat, acting, graph) if formulas else []
     turns = turns_read(part, formulas, acted)
@@ -263,9 +267,25 @@ def _localize_part(
         lagrangians=lagrangians,
         varying=find_varying(part.path, inertias, own, linked, graph),
         reads=_multipliers_read(part, constraints, forces, graph),
+        stand_ins=stand_ins,
         states=states,
         discrete_states=discrete_states(part, graph),
     )
+
+
+def _coordinate_loads(
+    part: Part, loads: Sequence[CoordinateLoad], graph: Graph
+) -> tuple[dict[Expression, Expression], list[Expression]]:
+    """Return loads on joint coordinates as Rayleigh functions, linear in the rates, with symbols for their values."""
+    stand_ins: dict[Expression, Expression] = {}
+    along: list[Expression] = []
+    for number, load in enumerate(loads):
+        value = graph.convert(load.value)
+        if not value.is_zero:
+            symbol = graph.symbol(f"load:{part.path}[{number}]")
+            stand_ins[symbol] = value
+            along.append(-(symbol * load.at.rate))
+    return stand_ins, along
 
 
 def _linked_outputs(part: Part, flat: FlatScene, acting: Any, graph: Graph) -> list[Expression]:
@@ -332,7 +352,9 @@ def _check_reads(
 
 
 def _listed(bound: Any, law: Law) -> list[Any]:
-    return listed(getattr(bound, law.name)(), (Load,) if law.kind == "force" else (PointInertia, BodyInertia))
+    return listed(
+        getattr(bound, law.name)(), (Load, CoordinateLoad) if law.kind == "force" else (PointInertia, BodyInertia)
+    )
 
 
 def _parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:

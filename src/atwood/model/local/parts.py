@@ -136,6 +136,8 @@ class LocalPart:
         Those of a joint's own coordinates whose turns count for its laws of force, its events and links to it.
     reads
         The multipliers that its laws of force read.
+    stand_ins
+        Loads on joint coordinates: the symbol that stands for each among the Rayleigh functions, and what it is.
     states, discrete_states
         Its states, one for each number.
     lagrangians
@@ -164,6 +166,7 @@ class LocalPart:
     reads: tuple[Expression, ...] = ()
     lagrangians: tuple[Expression, ...] = ()
     varying: tuple[PointInertia | BodyInertia, ...] = ()
+    stand_ins: Mapping[Expression, Expression] = field(default_factory=dict)
     states: tuple[LocalState, ...] = ()
     discrete_states: tuple[DiscreteState, ...] = ()
 

@@ -19,7 +19,7 @@ from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.model.declare.component import bind
-from atwood.model.declare.contributions import Load
+from atwood.model.declare.contributions import CoordinateLoad, Load
 from atwood.model.declare.laws import scalars
 from atwood.model.local.laws import LocalPart
 
@@ -163,8 +163,11 @@ def _quantities(local: LocalPart, mode: str) -> Iterator[tuple[str, list[Express
                 yield f"the force of the law {law.name!r}", _slopes(local, found, kind == "dissipation")
 
 
-def _loads(made: Sequence[Load]) -> list[object]:
-    return [value for load in made for vector in (load.force, load.torque) for value in (vector.x, vector.y, vector.z)]
+def _loads(made: Sequence[Load | CoordinateLoad]) -> list[object]:
+    own: list[object] = [load.value for load in made if isinstance(load, CoordinateLoad)]
+    return own + [
+        value for load in made for vector in (load.force, load.torque) for value in (vector.x, vector.y, vector.z)
+    ]
 
 
 def _slopes(local: LocalPart, values: list[Expression], of_velocities: bool) -> list[Expression]:

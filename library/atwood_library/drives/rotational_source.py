@@ -1,0 +1,35 @@
+"""RotationalSource: a given torque on an angle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from atwood import Component, CoordinateLoad, Scalar, Shaft, connector, force, observable, parameter, signal
+from atwood_library.interfaces.along_coordinates import between, push
+
+
+class RotationalSource(Component):
+    """A given torque on an angle, with its reaction on another one or on the ground: a motor without inertia."""
+
+    synonyms = ("Rotational.Sources.Torque", "Torque source", "Torque2", "ConstantTorque", "Ideal motor")
+    spaces = ("plane", "space")
+
+    value: float = signal(0.0, unit="N*m", doc="The torque, positive where it makes b grow.")
+    against: str = parameter("ground", choices=("flange", "ground"), doc="What it acts against.")
+    a: Shaft = connector(Shaft, "The angle that it acts against.", when={"against": ("flange",)})
+    b: Shaft = connector(Shaft, "The angle that it acts on.")
+
+    @force
+    def act(self) -> Iterable[CoordinateLoad]:
+        """Return the torque."""
+        yield from push(self, self.value)
+
+    @observable(unit="N*m", doc="The torque.")
+    def torque(self) -> Scalar:
+        """Return the torque."""
+        return self.value
+
+    @observable(unit="W", doc="Power of the torque.")
+    def power(self) -> Scalar:
+        """Return the power."""
+        return self.value * between(self)[1]
