@@ -248,6 +248,34 @@ def test_free_hoop() -> None:
     check(eq, L - m * g * r * height, [phi, theta])
 
 
+def test_hoops_of_the_library() -> None:
+    m, r, g, W = sympy.symbols("m r g Omega")
+    (theta,) = of_time("theta")
+    L = m * r**2 * (theta.diff(t) ** 2 + W**2 * sin(theta) ** 2) / 2 - m * g * r * cos(theta)
+    check(equations(SCENES["rotating-hoop-driven"]()), L, [theta])
+    free = equations(SCENES["rotating-hoop-free"]())
+    phi, theta = free.symbol("axle.angle"), free.symbol("hoop.angle")
+    L = m * r**2 * (theta.diff(t) ** 2 + phi.diff(t) ** 2 * sin(theta) ** 2) / 2 - m * g * r * cos(theta)
+    check(free, L, [phi, theta])
+
+
+def test_kepler_and_two_bodies_of_the_library() -> None:
+    eq = equations(SCENES["two-body"]())
+    m1, m2, G = sympy.symbols("m_1 m_2 G")
+    bodies = [of_time(*(f"{axis}_{i}" for axis in "xyz")) for i in (1, 2)]
+    r = sympy.sqrt(sum((b - a) ** 2 for a, b in zip(*bodies, strict=True)))
+    T = sum(m * sum(q.diff(t) ** 2 for q in body) / 2 for m, body in zip((m1, m2), bodies, strict=True))
+    assert same(eq.lagrangian, T + G * m1 * m2 / r)
+    for mine, by_hand in zip(eq.rows, lagrange(T + G * m1 * m2 / r, [*bodies[0], *bodies[1]]), strict=True):
+        assert same(mine, by_hand)
+    (x, z), (m, k, a, b) = of_time("x", "z"), sympy.symbols("m k_e e_a e_b")
+    charges = equations(SCENES["kepler"]())
+    distance = sympy.sqrt(x**2 + z**2)
+    assert same(charges.lagrangian, m * (x.diff(t) ** 2 + z.diff(t) ** 2) / 2 - k * a * b / distance)
+    assert "k_{e}" in charges.markdown()
+    assert "gravitational_constant" not in charges.markdown()  # nothing depends on it
+
+
 def test_spherical_pendulum() -> None:
     eq = equations(SCENES["spherical-pendulum"]())
     (x, y, z, lam), (m, l, g) = of_time("x", "y", "z", "lambda"), sympy.symbols("m l g")

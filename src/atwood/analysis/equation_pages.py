@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from atwood.analysis.formulas import code, latex, page, text
 from atwood.analysis.formulas.page import Line, Matrix, Section
-from atwood.analysis.formulas.tree import Sum
+from atwood.analysis.formulas.tree import Sum, Symbol, names_in
 from atwood.analysis.lagrangian import rows_by_part
 
 if TYPE_CHECKING:
@@ -79,10 +79,19 @@ def _multipliers(eq: EquationsOfMotion) -> str:
     return f"The multipliers $\\lambda$ have the generalized forces $G^T \\lambda$: {', '.join(said)}."
 
 
+def _shown(eq: EquationsOfMotion) -> list[Symbol]:
+    """Return the symbols that occur; parameters that nothing depends on do not."""
+    written = eq.written
+    formulas = [written.kinetic, written.potential, written.linear, written.rayleigh, *written.rows, *written.forces]
+    formulas += [*written.constraints, *(value for _, value in eq.book.shared)]
+    used = {name.symbol for name in names_in(formulas)}
+    return [one for one in eq.legend if one.kind != "parameter" or one in used]
+
+
 def symbol_table(eq: EquationsOfMotion) -> str:
     """Return the symbols as a table in Markdown."""
     rows = ["| symbol | stands for | unit | value |", "|---|---|---|---|"]
-    for one in eq.legend:
+    for one in _shown(eq):
         value = "" if one.value is None else f"{one.value:.6g}"
         unit = "" if one.unit == "1" else one.unit
         rows.append(f"| ${latex.letter(one)}$ | `{one.path}` | {unit} | {value} |")
@@ -92,7 +101,7 @@ def symbol_table(eq: EquationsOfMotion) -> str:
 def symbol_lines(eq: EquationsOfMotion) -> list[str]:
     """Return the symbols in plain text, a line each."""
     rows = []
-    for one in eq.legend:
+    for one in _shown(eq):
         unit = "" if one.unit == "1" else one.unit
         rows.append((text.letter(one), one.path, f"{one.value:.6g} {unit}" if one.value is not None else unit))
     widths = [max(page.width(row[i]) for row in rows) for i in range(2)]
