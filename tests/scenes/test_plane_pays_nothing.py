@@ -99,6 +99,21 @@ RECORDED: dict[str, tuple[int, int, int, int]] = {
     "chain": (20, 207, 60, 302),
     "driven-pendulum": (2, 11, 14, 42),
     "four-bar-row": (10, 104, 58, 278),
+    "charged-particle": (4, 9, 4, 9),
+    "kepler": (4, 15, 4, 15),
+    "falling-with-drag": (4, 10, 4, 10),
+    "elastic-pendulum": (4, 17, 4, 17),
+    "oscillators": (2, 4, 14, 17),
+    "triple-atwood": (6, 16, 18, 49),
+    "pulley-with-inertia": (2, 3, 6, 13),
+    "swinging-atwood": (4, 27, 24, 91),
+    "overhead-crane": (2, 16, 26, 59),
+    "trebuchet": (6, 37, 16, 79),
+    "chaplygin-sleigh": (6, 25, 7, 19),
+    "andrews-squeezer": (14, 160, 82, 488),
+    "car-axis": (4, 110, 24, 138),
+    "scott-russell-lift": (6, 83, 28, 150),
+    "strandbeest": (22, 422, 86, 557),
 }
 
 LARGER: dict[str, tuple[Callable[[], Scene], tuple[int, int, int, int]]] = {

@@ -51,6 +51,19 @@ SIZES = {
     "spherical-pendulum": (3, 3, 1, 2),
     "stewart-platform": (22, 21, 15, 6),
     "universal-shaft": (2, 2, 2, 1),
+    "rotating-hoop-driven": (1, 1, 0, 1),
+    "rotating-hoop-free": (2, 2, 0, 2),
+    "two-body": (6, 6, 0, 6),
+    "n-body": (9, 9, 0, 9),
+    "bead-on-wire": (1, 1, 0, 1),
+    "bead-on-surface": (2, 2, 0, 2),
+    "rotating-frame": (2, 2, 0, 2),
+    "free-symmetric-body": (7, 6, 0, 6),
+    "rigid-bodies": (29, 27, 10, 18),
+    "wilberforce-pendulum": (2, 2, 0, 2),
+    "rattleback": (6, 3, 0, 3),
+    "ball-in-shell": (7, 6, 3, 3),
+    "double-cardan-twice": (7, 7, 8, 1),
 }
 
 
