@@ -25,6 +25,22 @@ EVERYDAY = (
 )
 """Scenes on a line and in a plane to which every general test is put; the others have tests of their own."""
 
+GENERAL = (
+    *EVERYDAY,
+    *(
+        "bricard",
+        "double-pendulum-3d",
+        "flyball-governor",
+        "foucault-pendulum",
+        "four-bar-row",
+        "free-body",
+        "gyroscope",
+    ),
+    *("heavy-top", "intermediate-axis", "lagrange-top", "rolling-ball", "rolling-disc", "spatial-slider-crank"),
+    *("spherical-pendulum", "stewart-platform", "universal-shaft"),
+)
+"""Scenes with every kind of motion, to which tests of the engine are put; the others have tests of their own."""
+
 EVERY_FORM = (("reduced", "ggl"), ("dae", "ggl"), ("dae", "index1"), ("dae", "index1-projected"))
 
 

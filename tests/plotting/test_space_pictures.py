@@ -34,14 +34,18 @@ from atwood_library import (
 )
 from atwood_library.scenes import SCENES, LagrangeTop
 
+from ..helpers.runs import EVERYDAY, GENERAL
+
 pytest.importorskip("matplotlib")
 
 from atwood.plotting import animate, plot_mechanism, plot_on_sphere
 
 from .planar import fingerprint
 
-IN_SPACE = [name for name, kind in SCENES.items() if kind().space == "space"]
-FLAT = [name for name, kind in SCENES.items() if kind().space != "space"]
+IN_SPACE = [
+    name for name in (*GENERAL, "bead-on-wire", "bead-on-surface", "rattleback") if SCENES[name]().space == "space"
+]
+FLAT = [*EVERYDAY, "four-bar-row"]
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.forms.assembly import Assembly
@@ -10,6 +11,7 @@ from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene
+from atwood.model.declare.function_values import Function
 from atwood.model.local.laws import LocalPart
 from atwood.topology.graph import Joint
 from atwood.topology.spanning_forest import SpanningForest
@@ -293,8 +295,13 @@ def list_parameters(assembly: Assembly, scene: Model | None = None) -> tuple[Par
         for name, spec in part.component.parameter_specs().items():
             value = part.values[name]
             if value is not None:
-                found.append(ParameterEntry(f"{path}.{name}", value, spec.unit.text, spec.doc))
+                found.append(ParameterEntry(f"{path}.{name}", _shown(value), spec.unit.text, spec.doc))
     return tuple(found)
+
+
+def _shown(value: Any) -> Any:
+    """Return a value as data: a function as the text that it was given as."""
+    return value.text if isinstance(value, Function) else value
 
 
 def _of_model(model: Model) -> Iterator[ParameterEntry]:
@@ -303,7 +310,7 @@ def _of_model(model: Model) -> Iterator[ParameterEntry]:
     values = model.parameters()
     for name, spec in model.parameter_specs().items():
         if values[name] is not None and not (prefix and name in Scene.parameter_specs()):
-            yield ParameterEntry(f"{prefix}{name}", values[name], spec.unit.text, spec.doc)
+            yield ParameterEntry(f"{prefix}{name}", _shown(values[name]), spec.unit.text, spec.doc)
     for part in model.parts.values():
         if isinstance(part, Model):
             yield from _of_model(part)
