@@ -76,7 +76,7 @@ def test_no_name_and_no_value_is_cut_where_the_terminal_is_narrow(width: int, mo
 def test_what_a_start_leaves_free_is_said_in_its_own_words() -> None:
     text = " ".join(" ".join(lines("info", "free-body")).split())
     assert "the orientation of body" in text
-    assert "fixes body.position.x/y/z, the orientation of body, body.position.x'/y'/z':" in text
+    assert "no start value for body.position.x/y/z, the orientation of body, body.position.x'/y'/z':" in text
     assert "coordinates body.position.x/y/z, body.quaternion.w/x/y/z" in text
 
 

@@ -308,7 +308,7 @@ def test_a_drive_of_what_a_ball_joint_holds(form: str) -> None:
     for joint in (drive, ball):
         scene.connect(ground.frame, joint.a)
         scene.connect(joint.b, body.frame)
-    with pytest.raises((SolveError, TopologyError), match=r"hold.*missed|contradicts what is held"):
+    with pytest.raises((SolveError, TopologyError), match=r"cannot (all )?be satisfied"):
         simulate(scene, t_end=0.25, form=form)
 
 

@@ -47,7 +47,7 @@ def test_two_drives_that_part_ways_are_refused(form: str) -> None:
         scene.connect(ground.frame, drive.a)
     scene.connect(still.b, mass.point)
     scene.connect(still.b, late.b)
-    with pytest.raises((SolveError, StartError, TopologyError), match="hold"):
+    with pytest.raises((SolveError, StartError, TopologyError), match="cannot (all )?be satisfied|hold"):
         simulate(scene, form=form, t_end=5.0)
 
 
@@ -147,7 +147,7 @@ def test_a_rope_that_starts_beyond_its_length_is_refused(form: str) -> None:
     scene.connect(ground.frame, rope.a)
     scene.connect(rope.b, mass.point)
     scene.start.update({"m.position.x": 0.0, "m.position.z": -2.0})
-    with pytest.raises(SolveError, match="move something"):
+    with pytest.raises(SolveError, match="change a position discontinuously"):
         simulate(scene, form=form, t_end=1.0)
 
 

@@ -93,7 +93,7 @@ def test_bricard_says_which_reactions_are_not_unique() -> None:
     assert joints == {f"hinge{i}" for i in range(1, 7)}
     said = " ".join(str(found).split())
     assert f"{found.redundant[0]}: it follows from the other constraints and is left out" in said
-    assert "not unique, the smallest ones are reported" in said
+    assert "not unique; those of least norm are reported" in said
 
 
 @pytest.mark.parametrize("make", [Bricard, lambda: FourBarRow(space="space")])

@@ -47,7 +47,7 @@ def open_four_bar(gap: float, scale: float = 1.0) -> FourBar:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_the_gap_of_a_four_bar_is_what_its_links_lack(form: str) -> None:
-    with pytest.raises(StartError, match=r"the loop cannot close.* misses by 0\.1 m") as caught:
+    with pytest.raises(StartError, match=r"the loop cannot be closed.* is 0\.1 m") as caught:
         simulate(open_four_bar(0.1), form=form)
     assert caught.value.where == "pivot3"
     assert "coupler.length = 2.6 m (it is 2.5 m)" in caught.value.advice
@@ -56,12 +56,12 @@ def test_the_gap_of_a_four_bar_is_what_its_links_lack(form: str) -> None:
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
 def test_gaps_are_of_the_size_of_the_scene(scale: float) -> None:
-    with pytest.raises(StartError, match=f"misses by {0.1 * scale:.4g} m"):
+    with pytest.raises(StartError, match=f"found is {0.1 * scale:.4g} m"):
         find_start(assemble(open_four_bar(0.1, scale)))
 
 
 def test_a_loop_that_closes_just_so_or_just_not() -> None:
-    with pytest.raises(StartError, match="misses by 1e-06 m"):
+    with pytest.raises(StartError, match="found is 1e-06 m"):
         find_start(assemble(open_four_bar(1e-6)))
     start = find_start(assemble(open_four_bar(-1e-6)))
     assert np.all(np.isfinite(start.coordinates))
@@ -72,7 +72,7 @@ def test_the_least_gap_of_a_crank_and_slider_in_space() -> None:
     scene = SpatialSliderCrank(rod_length=0.05)
     scene.start.clear()
     least = math.hypot(0.1, 0.12) - 0.08 - 0.05
-    with pytest.raises(StartError, match=f"misses by {least:.4g} m") as caught:
+    with pytest.raises(StartError, match=f"found is {least:.4g} m") as caught:
         find_start(assemble(scene))
     assert caught.value.where == "ball"
 
@@ -95,7 +95,7 @@ def test_rods_that_do_not_meet(space: str, apart: float, miss: float) -> None:
         scene.connect(ground.frame, rod.a)
         scene.connect(rod.b, bob.point)
     scene.guess.update({"bob.position.x": 0.4, "bob.position.z": -0.3})
-    with pytest.raises(StartError, match=f"misses by {miss:.4g} m") as caught:
+    with pytest.raises(StartError, match=f"found is {miss:.4g} m") as caught:
         find_start(assemble(scene))
     assert caught.value.where in ("left", "right")
 
@@ -116,7 +116,7 @@ def hinged_askew(askew: float) -> Scene:
 
 
 def test_a_gap_of_an_axis_is_an_angle() -> None:
-    with pytest.raises(StartError, match="misses by 3 deg") as caught:
+    with pytest.raises(StartError, match="found is 3 deg") as caught:
         find_start(assemble(hinged_askew(math.radians(3.0))))
     assert caught.value.where in ("low", "high")
     find_start(assemble(hinged_askew(0.0)))
@@ -183,7 +183,7 @@ def test_gaps_are_seen_in_scenes_of_any_size(size: float) -> None:
     last = scene.add("last", Pivot())
     scene.connect(place, last.a)
     scene.connect(last.b, ends[1].frame)
-    with pytest.raises(StartError, match=re.escape(f"misses by {0.1 * size:.4g} m (the loop")):
+    with pytest.raises(StartError, match=re.escape(f"found is {0.1 * size:.4g} m (the loop")):
         find_start(assemble(scene))
 
 
@@ -218,7 +218,7 @@ def test_what_was_guessed_is_moved_and_what_was_not_is_placed() -> None:
     assert found.opened[0].part == "pivot3"
     tip = [math.cos(1.0) + 2.5 * math.cos(0.3) - 2.5 - 2.0 * math.cos(1.9), math.sin(1.0) + 2.5 * math.sin(0.3)]
     assert found.opened[0].distance == pytest.approx(math.hypot(tip[0], tip[1] - 2.0 * math.sin(1.9)), rel=1e-12)
-    assert "moved to fit: rocker by 0.458 m and 26.5 deg" in found.summary
+    assert "moved by the initialization: rocker by 0.458 m and 26.5 deg" in found.summary
     scene.guess.clear()
     assembly = assemble(scene)
     found = report_initialization(assembly, find_start(assembly))

@@ -68,7 +68,7 @@ def looped(kind: type[Plain]) -> Scene:
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("make", [hanging, looped])
 def test_a_function_in_python_is_announced_and_runs(make: Any, form: str, solver: str) -> None:
-    with pytest.warns(UserWarning, match=r"runs through kernels in Python.*odd\.energy calls the function 'cube'"):
+    with pytest.warns(UserWarning, match=r"is evaluated in Python.*odd\.energy calls the function 'cube'"):
         found = aw.simulate(make(Odd), form=form, solver=solver, rtol=1e-8, t_end=0.4, outputs=5)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -437,7 +437,7 @@ def test_each_part_whose_speed_jumps_is_told() -> None:
 
 
 def test_switching_without_end_is_refused_by_name() -> None:
-    with pytest.raises(SolveError, match="by the clock it switches more than") as caught:
+    with pytest.raises(SolveError, match="a relation of time switches more than") as caught:
         simulate(pushed(lambda t: select(sin(1e7 * t) > 0.0, 1.0, 0.0)))
     assert caught.value.where == "push.value"
 

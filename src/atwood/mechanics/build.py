@@ -219,7 +219,7 @@ def _circle(mechanism: Mechanism, reads: Mapping[Expression, list[Expression]]) 
     }
     steps = ", ".join(" -> ".join(ends[one]) for one in circle)
     return DeclarationError(
-        f"inputs and outputs feed each other in a circle: {steps}",
+        f"inputs and outputs form an algebraic loop: {steps}",
         where=ends[circle[0]][1],
-        advice="Put something with a state into it, as a filter or a delay, or solve the loop within one part.",
+        advice="Break the loop with a part that has a state, such as a filter or a delay, or solve it within one part.",
     )

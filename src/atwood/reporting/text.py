@@ -120,7 +120,7 @@ _ELEMENT = re.compile(r"(.*?)\[(\d+)\](.*)$")
 def facts(report: MechanismReport) -> Iterator[tuple[str, str]]:
     """Yield a mechanism report as labels and sentences."""
     yield "freedom", count_of(report.degrees_of_freedom, "degree") + " of freedom"
-    yield "coordinates", shorten(report.coordinates) or "none: everything is fixed or driven"
+    yield "coordinates", shorten(report.coordinates) or "none: everything is fixed or prescribed"
     yield "bodies", shorten(f"{one.path} ({one.mass:g} kg)" for one in report.bodies) or "nothing that moves has mass"
     if report.massless:
         yield "without mass", f"{shorten(report.massless)}; no state of its own"
@@ -168,7 +168,11 @@ def _loops(report: MechanismReport) -> Iterator[tuple[str, str]]:
     closing = f", closed by {shorten(report.loop_joints)}" if report.loop_joints else ""
     yield "loops", count_of(report.loops, "loop") + closing
     if report.dependent:
-        yield "dependent", f"{shorten(report.dependent)}: from the others through the loops, chosen anew where needed"
+        yield (
+            "dependent",
+            f"{shorten(report.dependent)}: dependent coordinates, determined by the loop constraints; the "
+            "partitioning changes during a run where needed",
+        )
 
 
 def _warnings(report: MechanismReport) -> Iterator[tuple[str, str]]:
@@ -177,21 +181,27 @@ def _warnings(report: MechanismReport) -> Iterator[tuple[str, str]]:
         left = "is" if len(report.redundant) == 1 else "are"
         text = f"{shorten(report.redundant)}: {follow} from the other constraints and {left} left out"
         if report.not_unique:
-            text += f"; the reactions {shorten(report.not_unique)} are then not unique, the smallest ones are reported"
+            text += (
+                f"; the reactions {shorten(report.not_unique)} are then not unique; those of least norm are reported"
+            )
         yield "redundant", text
     if report.immobile is not None:
         yield "immobile", report.immobile.describe()
     if report.initialization.summary:
         yield "assembled", report.initialization.summary
     if report.starts_singular:
-        yield "singular start", "here constraints lose rank; the motion from this position is not unique"
+        yield "singular start", "the constraints are rank deficient there; the motion from this position is not unique"
     if report.repeated:
         follow = "follows" if len(report.repeated) == 1 else "follow"
         yield "start", f"{shorten(report.repeated)} {follow} from the other start values"
     own = set(report.coordinates)
     free = [*report.free_coordinates, *(f"{name}'" if name in own else name for name in report.free_speeds)]
     if free:
-        yield "start", f"nothing fixes {shorten(_by_their_names(free))}: guesses and zeros decide"
+        yield (
+            "start",
+            f"no start value for {shorten(_by_their_names(free))}: the guess, or zero, is taken as far as "
+            "constraints allow",
+        )
 
 
 def _by_their_names(free: Sequence[str]) -> list[str]:

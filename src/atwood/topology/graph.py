@@ -198,7 +198,8 @@ def _check_frames(
         if len(found) > 1:
             first, second = list(found.values())[:2]
             raise ConnectError(
-                f"the frames {first} and {second} meet through a point only, which leaves open how they turn",
+                f"the frames {first} and {second} are connected through a point only, which does not determine "
+                "their relative orientation",
                 where=first,
                 advice="Connect them to each other to weld them, or put a Pivot between them to hinge them.",
             )

@@ -33,7 +33,7 @@ def check_held(
         own = [q[number] for number in one.coordinates]
         if not on_velocities and not any(depends_on(value, own) for _, _, value in values):
             raise TopologyError(
-                "it hangs free and has no mass: a force would accelerate it without bound",
+                "the body is free to move and has no mass: any force would accelerate it without bound",
                 where=mechanism.bodies.bodies[one.body].name,
                 advice="Connect it to something that has a mass or holds it, give it a mass, or remove it.",
             )
@@ -141,7 +141,8 @@ def _check_closed(where: str, value: Expression, mechanism: Mechanism) -> None:
     (miss,) = evaluate([value], mechanism.table.values)
     if not abs(miss) <= tolerances.CLOSED * (extent(mechanism) or 1.0):
         raise TopologyError(
-            f"it cannot hold: everything it joins is fixed, and it misses by {miss:g}",
+            f"the constraint cannot be satisfied: everything it joins is fixed, and its error is {miss:g}",
             where=where,
-            advice="Two grounds fight, or a length does not fit between them: change a length or a position.",
+            advice="Two fixed parts contradict each other, or a length does not fit between them: change a length "
+            "or a position.",
         )

@@ -55,7 +55,7 @@ def _check_reads(mechanism: Mechanism, read: Sequence[Expression], constraints: 
     for symbol in read:
         if symbol not in known:
             raise UnsupportedError(
-                "a force reads this reaction, which nothing determines: all that the constraint joins is fixed or "
+                "a force depends on this reaction, which is not determined: all that the constraint joins is fixed or "
                 "prescribed",
                 where=symbol.name.removeprefix("lambda:").partition("[")[0],
                 advice="Give the part that reads it a force of its own, such as an input.",
@@ -105,7 +105,7 @@ def known_multipliers(
         found = _fixed_point(wanted, rest, shares, values)
     except AtwoodError as error:
         raise UnsupportedError(
-            f"a force reads a reaction that is always the same here, at which it has no slope ({error.message})",
+            f"a force depends on a reaction that is constant here, where the force has no derivative ({error.message})",
             where=wanted[0].name.removeprefix("lambda:").partition("[")[0],
             advice="Round off the law there, as sqrt(n*n + a*a) instead of sqrt(n*n) with a small force a.",
         ) from error

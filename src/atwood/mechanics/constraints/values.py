@@ -163,7 +163,7 @@ def _check_affine(path: str, local: LocalPart, one: LocalConstraint) -> None:
     gradients = [gradient for velocity in velocities for gradient in jvp([one.value], {velocity: 1.0})]
     if any(depends_on(gradient, velocities) for gradient in gradients):
         raise UnsupportedError(
-            "a constraint on velocities must be linear in them",
+            "a velocity constraint must be linear in the velocities",
             where=f"{path}.{one.law.name}",
             advice="Write it as a sum of velocities times functions of positions, angles and time.",
         )

@@ -180,7 +180,7 @@ def part_forces(
         if any(not is_zero(c) for c in load.torque):
             body = site.body(path, load.at.name)
             if site.space.has_rotation and body not in site.bodies.oriented and body != 0:
-                raise TopologyError("it puts a torque on something that cannot turn", where=path)
+                raise TopologyError("a torque acts on a part that cannot rotate", where=path)
             torque = torque_components(Vector(x, y, z), kinematics.placements.axes.get(body), site.space)
             forces.twist(body, torque, site.node(path, load.at.name))
 

@@ -204,9 +204,9 @@ def check_masses(masses: Masses, values: Mapping[Expression, float]) -> None:
         number = evaluate([mass], values)[0] if isinstance(mass, Expression) else float(mass)
         if number < 0.0:
             raise ParameterError(
-                f"the mass of the body is {number:.6g} kg in all, and no body has less than none",
+                f"the mass of the body is {number:.6g} kg in all, and the mass of a body cannot be negative",
                 where=where,
-                advice="A part may take mass away, as a hole does, but not more than there is.",
+                advice="A part may remove mass, as a hole does, but not more than the body has.",
             )
 
 

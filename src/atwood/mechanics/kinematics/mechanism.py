@@ -183,7 +183,7 @@ def check_closures(mechanism: Mechanism) -> None:
     Raises
     ------
     TopologyError
-        If they do not: two grounds fight, or rigid parts do not fit together.
+        If they do not: fixed parts contradict each other, or rigid parts do not fit together.
     """
     bodies, space = mechanism.bodies, mechanism.space
     for joint in bodies.closures:
@@ -202,11 +202,11 @@ def check_closures(mechanism: Mechanism) -> None:
             not all(abs(m) <= tolerances.CLOSED * (extent(mechanism) or 1.0) for m in numbers[:3])
             or not turned <= tolerances.CLOSED
         ):
-            kind = "two grounds fight" if body.is_fixed else "rigid parts do not fit together"
+            kind = "fixed parts contradict each other" if body.is_fixed else "rigid parts do not fit together"
             raise TopologyError(
-                f"{kind}: it misses by {', '.join(f'{m:g}' for m in numbers[:3])} m and {turned:g} rad",
+                f"{kind}: the error is {', '.join(f'{m:g}' for m in numbers[:3])} m and {turned:g} rad",
                 where=joint.label,
-                advice="Two rigid connections say different things about the same place; remove or change one.",
+                advice="Two rigid connections prescribe different positions for the same point; remove or change one.",
             )
 
 

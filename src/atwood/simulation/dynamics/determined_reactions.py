@@ -44,5 +44,5 @@ def check_read_reactions(assembly: Assembly, t: float, q: FloatArray, u: FloatAr
             f"a force reads the reaction of {read}, and constraints of the scene are redundant ({follow} follow from "
             "the others), so that reactions are not determined",
             where=read.partition("[")[0].rpartition(".")[0],
-            advice="Take out what holds twice: let a joint leave free what the others hold already.",
+            advice="Remove the redundancy: use a joint that leaves free what the other joints already constrain.",
         )

@@ -77,7 +77,7 @@ def pass_time_event(
     left = np.abs(now.jacobian @ big_u + now.explicit_rate) / rows
     if np.max(left) > _HOLDS * fastest:
         raise SolveError(
-            f"at t = {t:.9g} prescribed motions jump in speed, and no velocities meet them all",
+            f"at t = {t:.9g} the velocities of prescribed motions jump, and no velocities satisfy all constraints",
             where=constraints[int(np.argmax(left))].label,
             advice="Two drives, or a drive and a fixed part, contradict each other from there on.",
         )
@@ -94,7 +94,8 @@ def _values_after(after: Assembly, balance: Balance, t: float, q: FloatArray, u:
         raise SolveError(
             f"at t = {t:.9g} its prescribed motion switches to one without a finite value, speed or acceleration",
             where=_switching(after)[0],
-            advice="Look at the function just after that time: a root of the time since then starts infinitely fast.",
+            advice="Look at the function just after that time: the square root of the time since then has an "
+            "infinite derivative.",
         ) from error
 
 
@@ -116,7 +117,7 @@ def _check_places(
             return
         worst, by = int(over[0]), " by more than a quarter turn"
     raise SolveError(
-        f"at t = {t:.9g} its prescribed motion jumps{by}, and nothing can move so far at once",
+        f"at t = {t:.9g} its prescribed motion jumps{by}, and no position can change discontinuously",
         where=constraints[worst].label,
         advice="Prescribe a motion that is continuous; its speed may jump, which is an impact.",
     )

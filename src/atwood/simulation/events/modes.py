@@ -308,10 +308,11 @@ def _check_in_place(event: EventRecord, moved: FloatArray) -> None:
     farthest = float(np.max(np.abs(moved), initial=0.0))
     if not farthest <= tolerances.IN_PLACE:
         raise SolveError(
-            f"at t = {event.time:.6g} a change of mode ({event.message}) would move something at once by "
+            f"at t = {event.time:.6g} a change of mode ({event.message}) would change a position discontinuously by "
             f"{farthest:.3g} of the scene's size",
             where=event.part,
-            advice="The position does not belong to the mode: change the start, or when the mode is entered.",
+            advice="The position violates the constraints of the new mode: change the start, or the condition of "
+            "the event.",
         )
 
 
@@ -346,9 +347,9 @@ def plastic_impact(
         if abs(impulse) > 1e-9 * size and _is_refused(after, one, state, one.sign * impulse):
             raise SolveError(
                 f"at t = {t:.6g} the impact ({event.message}, {event.part}) needs an impulse of the sign that "
-                "this one-sided constraint does not bear: a rope would have to push",
+                "this one-sided constraint cannot transmit: a rope would have to push",
                 where=one.key[0],
-                advice="Several ropes that jerk at once, of which some go slack, cannot be solved yet.",
+                advice="Simultaneous impacts of several one-sided constraints, some of which open, are not supported.",
             )
     return velocities
 

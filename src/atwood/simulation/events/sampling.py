@@ -252,9 +252,9 @@ def _ordered(updates: Sequence[_Update], reading: _Reading) -> list[_Update]:
         ready = [label for label in waiting if not before[label] & set(waiting)]
         if not ready:
             raise DeclarationError(
-                f"sampled parts feed each other in a circle within one moment: {' -> '.join(_circle(waiting, before))}",
+                f"sampled parts form an algebraic loop: {' -> '.join(_circle(waiting, before))}",
                 where=next(iter(waiting)),
-                advice="Put a delay by one sample somewhere in it.",
+                advice="Break the loop with a delay of one sample.",
             )
         found.append(waiting.pop(ready[0]))
     return found

@@ -237,9 +237,9 @@ class _Search:
         while len(boxes.low):
             if len(boxes.low) > _OPEN * _MOST or sum(len(one.low) for one in found) > _MOST:
                 raise SolveError(
-                    f"by the clock it switches more than {_MOST} times in this run, or is as good as zero all along",
+                    f"a relation of time switches more than {_MOST} times in this run, or is zero throughout",
                     where=self._where(),
-                    advice="Describe what it does on the average, or make the run shorter.",
+                    advice="Replace the function by its mean, or shorten the run.",
                 )
             low, high = self._bounds(self._difference, boxes)
             boxes, low, high = boxes.chosen(kept := (low <= 0.0) & (high >= 0.0)), low[kept], high[kept]

@@ -154,7 +154,7 @@ def _open_loop(failed: Failed, system: System, best: Nearest) -> StartError:
         one for one in closure_errors if one is not worst and one.size(failed.length) > 0.01 * worst.size(failed.length)
     ]
     loop = _loop_through(failed.assembly, worst.part)
-    text = f"the loop cannot close here: the nearest position found misses by {worst.describe(failed.length)}"
+    text = f"the loop cannot be closed here: the smallest closure error found is {worst.describe(failed.length)}"
     if others:
         text += f" (and by {', '.join(f'{one.describe(failed.length)} at {one.part}' for one in others[:4])})"
     if loop:
@@ -240,12 +240,15 @@ def far_from_guess(failed: Failed, found: FloatArray, wrong: Sequence[str]) -> S
         closure_error for closure_error in closure_errors if closure_error.size(failed.length) > tolerances.CLOSED
     ]
     if not open_ones:
-        text, where = "what is fixed cannot hold near the guess", (failed.level.fixed or guessed)[0].where
+        text, where = (
+            "the fixed start values cannot be satisfied near the guess",
+            (failed.level.fixed or guessed)[0].where,
+        )
         return StartError(text, where=where, advice=f"It holds elsewhere; {elsewhere}")
     worst = _largest(open_ones, failed.length)
     by = worst.describe(failed.length)
     return StartError(
-        f"the loop does not close near the guess: the nearest position found there misses by {by}",
+        f"the loop cannot be closed near the guess: the smallest closure error found there is {by}",
         where=worst.part,
         advice=f"It closes elsewhere; {elsewhere}",
     )
@@ -355,7 +358,7 @@ def contradiction(
         return StartError(
             f"constraints contradict each other at the start{remark}",
             where=held,
-            advice="Drives or lengths demand what joints do not allow here; let one of them go.",
+            advice="Drives or lengths contradict the joints here; remove one of them.",
         )
     failing = [target for target, miss in zip(fixed, residual, strict=True) if not abs(miss) <= tolerances.MET]
     names = as_said(failing or fixed)

@@ -45,7 +45,7 @@ def in_a_line(placement: InitializationReport) -> str:
     placed = [one.path for one in placement.bodies if _how_far(*one.placed, length)]
     text = []
     if any(far for _, far in moved):
-        text.append("moved to fit: " + _few([f"{one.path} by {far}" for one, far in moved if far]))
+        text.append("moved by the initialization: " + _few([f"{one.path} by {far}" for one, far in moved if far]))
     if placed:
         what = "it" if len(placed) == 1 else "them"
         text.append(f"placed by the solver, as not all was said of {what}: {_few(placed)}")

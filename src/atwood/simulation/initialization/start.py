@@ -125,7 +125,7 @@ def _solved(assembly: Assembly) -> Start:
     equations, length = assembly.regular, scene_length(assembly)
     if not 1e-100 < length < 1e100:
         raise StartError(
-            f"its extent, {length:g} m, is beyond what can be computed with",
+            f"the extent of the scene, {length:g} m, is too large to compute with",
             where=assembly.flat.name,
             advice="Look at its lengths and at the start values that are lengths.",
         )

@@ -112,7 +112,7 @@ def find_level(assembly: Assembly, equations: Equations, path: str) -> int:
     late, speeds = assembly.shared.get("start symbols", lambda: _later_symbols(assembly, equations))
     if not late.isdisjoint(reads):
         raise StartError(
-            "it follows from positions and speeds and cannot be chosen at the start",
+            "the quantity follows from positions and speeds and cannot be prescribed at the start",
             where=path,
             advice="Give coordinates, positions and velocities.",
         )
@@ -121,7 +121,9 @@ def find_level(assembly: Assembly, equations: Equations, path: str) -> int:
         return 0
     if not _is_linear(one.value, own):
         raise StartError(
-            "it is not linear in the speeds and cannot be chosen at the start", where=path, advice="Give velocities."
+            "the quantity is not linear in the speeds and cannot be prescribed at the start",
+            where=path,
+            advice="Give velocities.",
         )
     return 1
 

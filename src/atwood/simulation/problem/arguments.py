@@ -131,7 +131,7 @@ def check_span(begin: float, end: float, max_step: float | None = None) -> None:
         raise UsageError(f"the end, t = {end:g}, is not after the start, t = {begin:g}", advice="Give a later t_end.")
     if span < _SHORTEST or span < 1e3 * sys.float_info.epsilon * max(abs(begin), abs(end)):
         raise UsageError(
-            f"from the start, t = {begin:g}, to the end, t = {end!r}, is too short a time to be told in numbers",
+            f"from the start, t = {begin:g}, to the end, t = {end!r}, is too short a time for floating-point numbers",
             advice="Give a later t_end.",
         )
     if max_step is not None and span / max_step > _TOO_MANY_STEPS:

@@ -47,7 +47,7 @@ def announce(assembly: Assembly, not_compilable: str) -> None:
         What `find_not_compilable` gave.
     """
     warnings.warn(
-        f"{assembly.flat.name} runs through kernels in Python, which are slower: {not_compilable}. Write it in plain "
+        f"{assembly.flat.name} is evaluated in Python, which is slower: {not_compilable}. Write it in plain "
         "arithmetic with Atwood's functions to have it compiled.",
         stacklevel=2,
     )

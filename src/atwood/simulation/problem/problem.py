@@ -181,10 +181,11 @@ class Plan:
         if not np.all(misses <= tolerances.HELD):
             worst = int(np.argmax(np.where(np.isfinite(misses), misses, np.inf)))
             raise SolveError(
-                f"at t = {t:.6g} the constraints cannot all hold: this is missed by {misses[worst]:.3g} of the scene's "
+                f"at t = {t:.6g} the constraints cannot all be satisfied: the error of this one is "
+                f"{misses[worst]:.3g} of the scene's "
                 "size",
                 where=self.assembly.equations.constraints[worst].label,
-                advice="Drives or lengths contradict each other here, or the mechanism cannot go on from here.",
+                advice="Drives or lengths contradict each other here, or the mechanism is locked.",
             )
 
     def between_steps(self, t: float) -> None:
@@ -371,7 +372,8 @@ def _make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, lengt
         raise StartError(
             f"at the start a law has no value: {error.message}",
             where=assembly.flat.name,
-            advice="Do two points coincide that a spring, damper or rope joins? Give start positions that part them.",
+            advice="Do two points coincide that a spring, damper or rope joins? Give start positions that "
+            "separate them.",
         ) from error
     constraint_jacobian = now.jacobian[list(finding.kept)] if finding.kept else now.jacobian[:0]
     check_massless_directions(assembly, now.mass, constraint_jacobian, sizes)
@@ -405,11 +407,11 @@ def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
     constraints = assembly.equations.constraints
     lost = [constraints[i].label for i in finding.lost_at_start]
     return StartError(
-        "the start is a singular position, from which the mechanism could go on in more than one way: "
+        "the start is a singular position, from which the mechanism has more than one possible motion: "
         f"{', '.join(lost)} {'follows' if len(lost) == 1 else 'follow'} from the other constraints here "
         "and nowhere near",
         where=constraints[finding.lost_at_start[0]].key[0],
-        advice="Start a little away from it, on the side that you mean.",
+        advice="Start at a small distance from it, on the branch that you want.",
     )
 
 

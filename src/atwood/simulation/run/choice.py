@@ -127,7 +127,7 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
     if found is None and plan.balance.kinematic_map.has_singular_coordinates and _has_series(assembly):
         reason = "its orientations are in three coordinates, which are singular somewhere: series err least near there"
         return Choice(t, "taylor", reason)
-    return Choice(t, "explicit", "no constraints are left among its coordinates, and it is not stiff")
+    return Choice(t, "explicit", "its coordinates are independent, and the problem is not stiff")
 
 
 def _has_series(assembly: Assembly) -> bool:

@@ -354,7 +354,7 @@ class _Walk:
             if found is None:
                 raise
             raise StartError(
-                f"{found.describe()}, so that there is nothing to start from",
+                f"{found.describe()}, so that the run cannot start",
                 where=found.part,
                 advice="Do two points coincide that a spring, damper or rope joins? Give start positions that part "
                 "them; or look at the formula of the law.",
@@ -499,8 +499,9 @@ def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
         worst, moment = np.unravel_index(int(np.argmax(misses)), misses.shape)
         part, law, _ = prescribed[int(worst)][0]
         raise TopologyError(
-            f"it cannot hold: at t = {times[moment]:.6g} what is prescribed contradicts what is held, by "
+            f"the constraint cannot be satisfied: at t = {times[moment]:.6g} a prescribed motion contradicts a "
+            "fixed part, by "
             f"{misses[worst, moment]:.3g}",
             where=f"{part}.{law}",
-            advice="Two drives, or a drive and a fixed part, say different things about the same motion.",
+            advice="Two drives, or a drive and a fixed part, prescribe the same motion differently.",
         )

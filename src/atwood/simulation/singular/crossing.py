@@ -112,9 +112,10 @@ def stuck_at(constraint: Constraint, t: float, message: str) -> SolveError:
     """
     return SolveError(
         f"near t = {t:.6g} the mechanism comes to a singular position, where {constraint.label} nearly follows from "
-        f"the other constraints, too slowly or too closely to tell which way it goes on: {message}",
+        f"the other constraints, too slowly or too closely to determine how the motion continues: {message}",
         where=constraint.key[0],
-        advice="Change lengths, start or speed a little, so that it clearly passes through or stays away.",
+        advice="Change lengths, start or speed slightly, so that the motion clearly crosses the singular position "
+        "or avoids it.",
     )
 
 
