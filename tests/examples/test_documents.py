@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+import atwood.solids
+import atwood_library
+
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -23,3 +26,12 @@ def test_code_in_documents_runs(name, tmp_path, monkeypatch):
 
 def test_there_is_code_in_documents():
     assert {"README.md", "writing-a-component.md", "space.md"} <= {name for name, blocks in SHOWN.items() if blocks}
+
+
+def test_every_public_name_has_its_place_in_the_reference():
+    pages = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "api").glob("*.md"))
+    shown = re.findall(r"^\.\. auto(?:class|function|data):: (\w+)", pages, re.MULTILINE)
+    assert len(shown) == len(set(shown))
+    parts = [name for name in atwood_library.__all__ if isinstance(getattr(atwood_library, name), type)]
+    public = {*atwood.__all__, *atwood.solids.__all__, *parts} - {"__version__"}
+    assert set(shown) == public

@@ -47,7 +47,7 @@ def test_two_drives_that_part_ways_are_refused(form: str) -> None:
         scene.connect(ground.frame, drive.a)
     scene.connect(still.b, mass.point)
     scene.connect(still.b, late.b)
-    with pytest.raises((SolveError, StartError, TopologyError), match="cannot (all )?be satisfied|hold"):
+    with pytest.raises((SolveError, StartError, TopologyError), match=r"cannot (all )?be satisfied|hold"):
         simulate(scene, form=form, t_end=5.0)
 
 

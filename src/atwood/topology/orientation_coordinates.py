@@ -123,6 +123,5 @@ def check_orientation(kind: str, form: str) -> None:
     if form == "dae" and kind != "quaternion":
         raise UsageError(
             f"the dae form has orientations as quaternions, not {kind!r}",
-            advice="Modes exchange states in its coordinates, which must be regular everywhere. "
-            "Use the reduced form.",
+            advice="Modes exchange states in its coordinates, which must be regular everywhere. Use the reduced form.",
         )
