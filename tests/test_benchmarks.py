@@ -11,22 +11,11 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 
+SCRIPTS = sorted(file.stem for file in (ROOT / "benchmarks").glob("*.py") if "__main__" in file.read_text("utf-8"))
+
+
 @pytest.mark.sample(3)
-@pytest.mark.parametrize(
-    "name",
-    [
-        "kernels",
-        "ida",
-        "null_space",
-        "work_precision",
-        "startup",
-        "sweep",
-        "taylor",
-        "orientation_coordinates",
-        "space",
-        "dynamics",
-    ],
-)
+@pytest.mark.parametrize("name", SCRIPTS)
 def test_smallest_case(name: str, tmp_path: Path) -> None:
     paths = [str(ROOT / "src"), str(ROOT / "library"), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
