@@ -13,11 +13,13 @@ import operator
 import os
 import reprlib
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
 from atwood.late import dataclass
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 __all__ = [
     "ANYTHING",
@@ -335,6 +337,8 @@ def _not_blank(value: Any) -> str:
 
 
 def _file(value: Any) -> Path:
+    from pathlib import Path
+
     text = os.fspath(value)
     if not isinstance(text, str) or not text.strip() or "\0" in text:
         raise Refused

@@ -8,7 +8,6 @@ pieces stay apart as attributes, so that a program can act on them, and read as 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 
 __all__ = [
     "AtwoodError",
@@ -144,6 +143,8 @@ def near_matches(word: str, choices: Iterable[str], n: int = 3) -> list[str]:
         same = spellings.setdefault(choice.casefold(), [])
         if choice not in same:
             same.append(choice)
+    from difflib import get_close_matches
+
     close = get_close_matches(word.casefold(), spellings, n=max(n, 1), cutoff=0.6)
     return [choice for key in close for choice in spellings[key]][: max(n, 0)]
 

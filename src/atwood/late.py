@@ -2,7 +2,8 @@
 
 `dataclasses.dataclass` writes and compiles several methods of each class when its module is imported, a third of a
 millisecond a class: for all classes of Atwood that takes as long as to import NumPy. A process uses few of them. Here
-the standard library does the same work when a class gets its first instance, or is asked for its fields.
+one method, the constructor, is written when a class gets its first instance; all classes share the others. The standard
+library is asked when somebody asks for the fields of a class, as its `replace`, `fields` and `asdict` do.
 """
 
 from __future__ import annotations
@@ -41,7 +42,10 @@ class _Later:
         self.completion, self.name = completion, name
 
     def __get__(self, _: object, owner: type) -> Any:
-        self.completion.complete()
+        if self.name in _TAKEN:
+            self.completion.take()
+        else:
+            self.completion.complete()
         return getattr(owner, self.name)
 
 
@@ -63,25 +67,94 @@ class _Completion:
         self.made = {name for name in _METHODS if name not in own}
 
     def complete(self) -> None:
-        """Take constructor and fields from a twin of the class, which the standard library makes a dataclass."""
+        """Write the constructor, and find out what is compared and shown."""
         with _WRITING:
             if self.done:
                 return
+            found = self.fields()
+            self.values = _reader([name for name, one in found.items() if one.compare])
+            self.shown = [name for name, one in found.items() if one.repr]
+            self.construct = _constructor(self.cls, found, self.frozen)
+            if vars(self.cls).get("__init__") is self.first:  # and not what checks its arguments before
+                self.cls.__init__ = self.construct
+            if "__signature__" in vars(self.cls):
+                del self.cls.__signature__
+            self.done = True
+
+    def fields(self) -> dict[str, Any]:
+        """Return the fields by name, those of the bases first, without what makes them fields of a class."""
+        found: dict[str, Any] = {}
+        for base in reversed(self.cls.__mro__[1:]):
+            later = vars(base).get("_completion")
+            found |= {one.name: one for one in dataclasses.fields(base)} if later is None and _is_done(base) else {}
+            found |= {} if later is None else later.own_fields()
+        return found | self.own_fields()
+
+    def own_fields(self) -> dict[str, Any]:
+        """Return the fields that the class itself declares."""
+        found = {}
+        for name, kind in vars(self.cls).get("__annotations__", {}).items():
+            if "ClassVar" not in str(kind):
+                given = self.given.get(name, dataclasses.MISSING)
+                found[name] = given if isinstance(given, dataclasses.Field) else dataclasses.field(default=given)
+        return found
+
+    def take(self) -> None:
+        """Take what the standard library gives a dataclass beside its methods from a twin of the class."""
+        with _WRITING:
             cls = self.cls
-            left_out = {"__dict__", "__weakref__", "__setattr__", "__delattr__", "__signature__", *self.made, *_TAKEN}
+            if not isinstance(vars(cls).get(_TAKEN[0]), _Later):
+                return
+            left_out = {"__dict__", "__weakref__", "__setattr__", "__delattr__", "__signature__", "_completion"}
+            left_out |= {*self.made, *_TAKEN}
             own = {name: value for name, value in vars(cls).items() if name not in left_out}
             twin: Any = type(cls)(cls.__name__, cls.__bases__, own | self.given)
-            dataclasses.dataclass(frozen=self.frozen, eq=False, repr=False)(twin)
-            self.values = _reader([one.name for one in dataclasses.fields(twin) if one.compare])
-            self.shown = [one.name for one in dataclasses.fields(twin) if one.repr]
+            dataclasses.dataclass(frozen=self.frozen, init=False, eq=False, repr=False)(twin)
             for name in _TAKEN:
                 setattr(cls, name, twin.__dict__[name])
-            self.construct = twin.__init__
-            if vars(cls).get("__init__") is self.first:  # and not what checks its arguments before
-                cls.__init__ = self.construct
-            if "__signature__" in vars(cls):
-                del cls.__signature__
-            self.done = True
+
+
+class _FromFactory:
+    """The default of a field whose value is made anew for each instance."""
+
+    def __repr__(self) -> str:
+        return "<factory>"
+
+
+_FROM_FACTORY = _FromFactory()
+
+
+def _is_done(base: type) -> bool:
+    return "__dataclass_fields__" in vars(base)
+
+
+def _constructor(cls: Any, fields: dict[str, Any], frozen: bool) -> Any:
+    """Return the constructor of a class with these fields."""
+    known: dict[str, Any] = {"_set": object.__setattr__, "_from_factory": _FROM_FACTORY}
+    arguments, lines = ["self"], []
+    for name, one in fields.items():
+        value, makes = name, one.default_factory is not dataclasses.MISSING
+        if makes:
+            known[f"_make_{name}"] = one.default_factory
+            value = f"_make_{name}() if {name} is _from_factory else {name}" if one.init else f"_make_{name}()"
+        elif one.default is not dataclasses.MISSING:
+            known[f"_default_{name}"] = one.default
+        if one.init:
+            default = "=_from_factory" if makes else f"=_default_{name}" if f"_default_{name}" in known else ""
+            arguments.append(f"{name}{default}")
+        elif not makes:
+            continue  # its default is that of the class
+        lines.append(f" _set(self, {name!r}, {value})" if frozen else f" self.{name} = {value}")
+    if hasattr(cls, "__post_init__"):
+        lines.append(" self.__post_init__()")
+    exec(f"def __init__({', '.join(arguments)}):\n" + ("\n".join(lines) or " pass"), known)
+    made: Any = known["__init__"]
+    made.__qualname__, made.__module__ = f"{cls.__qualname__}.__init__", cls.__module__
+    kinds = {
+        name: kind for base in reversed(cls.__mro__) for name, kind in vars(base).get("__annotations__", {}).items()
+    }
+    made.__annotations__ = {name: kinds[name] for name, one in fields.items() if one.init} | {"return": None}
+    return made
 
 
 def _reader(names: list[str]) -> Any:
@@ -100,7 +173,7 @@ def _refuse_to_delete(_: Any, name: str) -> None:
 
 
 def _declare(cls: Any, frozen: bool, eq: bool) -> Any:
-    completion = _Completion(cls, frozen)
+    completion = cls._completion = _Completion(cls, frozen)
 
     def construct(self: Any, *args: Any, **keywords: Any) -> None:
         completion.complete()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from functools import cached_property
 from typing import NamedTuple
@@ -151,7 +150,9 @@ def _check_symbols(program: str, group: OutputGroup, listed: Iterable[Expression
 
 
 def _hash(*parts: object) -> str:
-    return hashlib.sha256(repr(parts).encode()).hexdigest()
+    from hashlib import sha256
+
+    return sha256(repr(parts).encode()).hexdigest()
 
 
 def _digest(program: Program) -> str:

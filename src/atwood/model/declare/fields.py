@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 from atwood.arguments import (
@@ -297,7 +297,7 @@ class SignalSpec(Field):
 
 
 def _check_text(value: Any, where: str) -> str:
-    text = str(value) if isinstance(value, Path) else value
+    text = fspath(value) if isinstance(value, PathLike) else value
     if not isinstance(text, str) or not text.strip() or "\0" in text:
         raise ParameterError(f"{show(value)} is no text", where=where, advice="Give a word or a path in quotes.")
     return text
