@@ -24,6 +24,7 @@ from atwood import (
     dot,
     equations,
     parameter,
+    potential,
 )
 from atwood.analysis.equations import EquationsOfMotion
 from atwood_library import (
@@ -532,6 +533,37 @@ def test_names_do_not_clash() -> None:
     names = [one.name for one in equations(scene).legend]
     assert len(set(names)) == len(names)
     assert "t" not in names
+
+
+class Oddly(Component):
+    """A point with parameters that are called as much else is."""
+
+    q: float = parameter(2.0, unit="N/m", doc="A stiffness.")
+    t: float = parameter(3.0, unit="N", doc="A force.")
+    u: float = parameter(0.5, unit="N/m^2", doc="A slope.")
+    M: float = parameter(0.7, unit="N", doc="Another force.")
+    pi: float = parameter(0.2, unit="N", doc="One more.")
+    point: Point = connector(Point, "The point.")
+
+    @potential
+    def energy(self) -> Scalar:
+        """Return a potential."""
+        x, z = self.point.position.x, self.point.position.z
+        return self.q * x * x + self.t * x + self.u * x * x * x + (self.M + self.pi) * z
+
+
+def test_names_that_mean_something_else_are_kept_apart() -> None:
+    scene = Scene(gravity=0.0)
+    bob, law = scene.add("bob", PointMass()), scene.add("law", Oddly())
+    scene.connect(bob.point, law.point)
+    eq = equations(scene)
+    x, _ = eq.coordinates
+    assert same(eq.rows[0].subs(eq.values), x.diff(t, 2) + 4 * x + 3 + 1.5 * x**2)
+    assert eq.symbol("law.t") != t
+    assert eq.symbol("law.pi") != sympy.pi
+    names: dict[str, Any] = {}
+    exec(compile(eq.python(), "oddly", "exec"), names)
+    assert names["accelerations"](7.0, [0.5, 0.0], [0.0, 0.0]) == pytest.approx([-2.0 - 3.0 - 0.375, -0.9])
 
 
 def test_sympy_is_not_imported_before_somebody_asks_for_it() -> None:

@@ -389,7 +389,8 @@ class EquationsOfMotion:
     def latex(self) -> str:
         """Return the equations of motion, and the constraints if there are any, as an aligned block of LaTeX."""
         if not self.is_readable:
-            return rf"\text{{{self.structure.sentence}}}"
+            said = self.structure.sentence.replace("_", r"\_")
+            return rf"\text{{{said}}}"
         return page.as_latex(equation_lines(self))
 
     def markdown(self) -> str:

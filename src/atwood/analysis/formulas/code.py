@@ -38,10 +38,18 @@ KNOWN = frozenset({*MATH, *_BINARY, *_NAMES, "select", "logical_not", "sign", "c
 """The functions that can be written down."""
 
 
+RESERVED = frozenset(
+    {"t", "y", "q", "u", "a", "np", "solve", "rates", "mass_matrix", "bias", "constraints", "constraint_jacobian"}
+    | {"constraint_bias", "accelerations", "derivative", "M", "G", *MATH, *_NAMES.values()}
+)
+"""Names that mean something else in a module; a symbol that is called so has a line after its name."""
+
+
 def identifier(symbol: Symbol, dots: int = 0) -> str:
     """Return a symbol as a name of Python."""
     name = "".join(one if one.isalnum() or one == "_" else "_" for one in symbol.name) + _ENDS[dots]
-    return f"{name}_" if keyword.iskeyword(name) or name in _NAMES.values() else name
+    taken = keyword.iskeyword(name) or (name in RESERVED and symbol.kind != "time")
+    return f"{name}_" if taken else name
 
 
 def formula(node: Node) -> str:

@@ -85,7 +85,9 @@ def _power(node: Node, power: Fraction, alone: bool = False) -> str:
     if isinstance(node, Call) and node.function in ("sin", "cos", "tan", "sinh", "cosh", "tanh"):
         raised = "" if power == 1 else f"^{{{exponent}}}"
         return _call(node, raised)
-    if isinstance(node, Sum) and not (alone and power == 1):
+    if isinstance(node, Call) and node.function in _RELATIONS:
+        text = rf"\left[{_call(node)}\right]"
+    elif isinstance(node, Sum) and not (alone and power == 1):
         text = rf"\left({formula(node)}\right)"
     elif isinstance(node, Call) and power != 1:
         text = rf"\left({_call(node)}\right)"

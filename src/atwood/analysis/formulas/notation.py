@@ -293,7 +293,7 @@ def _subscripts(wanted: Sequence[_Wanted]) -> list[tuple[str, ...]]:
         groups.setdefault((one.stem, one.kind == "parameter"), []).append(i)
     numbered = _numbered(wanted, list(groups.values()))
     found: list[tuple[str, ...]] = [()] * len(wanted)
-    taken: set[tuple[str, ...]] = set()
+    taken: set[tuple[str, ...]] = {("t",), ("pi",)}
     stems: set[tuple[str, ...]] = set()
     for (stem, _), members in sorted(groups.items(), key=lambda item: item[0][1]):
         parts = [wanted[i].part for i in members]

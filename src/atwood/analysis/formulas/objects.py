@@ -50,7 +50,7 @@ def formula(node: Node) -> Sympy:
 def _term(term: Term) -> Sympy:
     import sympy
 
-    powers = [formula(node) ** _number(power) for node, power in term.factors]
+    powers = [_value(formula(node)) ** _number(power) for node, power in term.factors]
     return sympy.Mul(_number(term.number), *powers)
 
 
@@ -71,13 +71,30 @@ def _call(node: Call) -> Sympy:
         unknowns = sympy.Matrix(size, size, arguments[: size * size]).LUsolve(sympy.Matrix(arguments[size * size : -1]))
         return unknowns[int(arguments[-1])]
     if name == "select":
-        condition = arguments[0]
-        if not isinstance(condition, sympy.logic.boolalg.Boolean):
-            condition = sympy.Ne(condition, 0)
-        return sympy.Piecewise((arguments[1], condition), (arguments[2], True))
+        return sympy.Piecewise((_value(arguments[1]), _condition(arguments[0])), (_value(arguments[2]), True))
+    if name in ("logical_and", "logical_or", "logical_not"):
+        made = {"logical_and": sympy.And, "logical_or": sympy.Or, "logical_not": sympy.Not}[name]
+        return made(*map(_condition, arguments))
     relations = {"less": sympy.Lt, "less_equal": sympy.Le, "pow": sympy.Pow}
-    relations |= {"logical_and": sympy.And, "logical_or": sympy.Or, "logical_not": sympy.Not}
-    if name in relations:
-        return relations[name](*arguments)
-    made = getattr(sympy, _NAMES.get(name, name), None)
-    return (made or sympy.Function(name))(*arguments)
+    function = relations.get(name) or getattr(sympy, _NAMES.get(name, name), None) or sympy.Function(name)
+    return function(*map(_value, arguments))
+
+
+def _value(item: Sympy) -> Sympy:
+    """Return a condition as 1 or 0, other things as they are."""
+    import sympy
+
+    return sympy.Piecewise((1, item), (0, True)) if _is_condition(item) else item
+
+
+def _condition(item: Sympy) -> Sympy:
+    """Return a number as the condition that it is not zero, conditions as they are."""
+    import sympy
+
+    return item if _is_condition(item) else sympy.Ne(item, 0)
+
+
+def _is_condition(item: Sympy) -> bool:
+    import sympy
+
+    return isinstance(item, sympy.logic.boolalg.Boolean) and not isinstance(item, sympy.Symbol)

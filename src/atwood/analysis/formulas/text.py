@@ -67,6 +67,8 @@ def _power(node: Node, power: Fraction) -> str:
     if isinstance(node, Call) and node.function in ("sin", "cos", "tan"):
         return _call(node, raised)
     text = formula(node)
+    if isinstance(node, Call) and node.function in _RELATIONS:
+        return f"[{text}]{raised}"
     return (f"({text})" if isinstance(node, Sum) or (isinstance(node, Call) and raised) else text) + raised
 
 
@@ -76,6 +78,10 @@ def _call(node: Call, raised: str = "") -> str:
         return f"{arguments[0]} {_RELATIONS[node.function]} {arguments[1]}"
     if node.function == "select":
         return f"({arguments[1]} if {arguments[0]} else {arguments[2]})"
+    if node.function == "logical_not":
+        return f"¬({arguments[0]})"
+    if node.function == "pow":
+        return f"({arguments[0]})^({arguments[1]})"
     if node.function == "absolute":
         return f"|{arguments[0]}|"
     single = isinstance(node.arguments[0], Name) or (len(node.arguments) == 1 and len(arguments[0].split()) == 1)
