@@ -163,6 +163,72 @@ def test_multipliers_of_least_size() -> None:
     assert least_size(slope, np.zeros(0, dtype=np.intp), np.zeros((3, 0))) == pytest.approx(np.zeros((3, 7)))
 
 
+def test_a_row_that_changes_a_tenth_as_much_comes_first_still() -> None:
+    rows = np.array([[0.1, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    assert independent_rows(rows, 4e-15 * np.ones(3)) == [0, 2]
+    rows[0, 0] = 0.01
+    assert independent_rows(rows, 4e-15 * np.ones(3)) == [1, 2]
+
+
+@pytest.mark.parametrize(("weight", "share", "kept"), [(0.5, 1.05, 1), (0.5, 1.2, 2), (2.0, 2.1, 1), (2.0, 2.4, 2)])
+def test_errors_of_other_rows_count_as_often_as_these_are_in_a_row(weight: float, share: float, kept: int) -> None:
+    """What is left is off by the root of 1 + weight^2."""
+    error = 1e-6
+    left = share * certain(np.array([error]), np.array([1.0]))[0]
+    rows = np.array([[1.0, 0.0], [weight, left]])
+    assert len(independent_rows(rows, np.array([error, error]), first=np.array([True, False]))) == kept
+
+
+def test_once_a_choice_is_poor_it_is_improved_as_far_as_it_goes() -> None:
+    rows = np.array([[1.0, 0.0], [0.0, 1.0], [4.0, 0.0], [0.0, 2.0]])
+    assert review_rows(rows, 4e-15 * np.ones(4), [0, 1]) == [2, 3]
+    rows[2, 0] = 2.9
+    assert review_rows(rows, 4e-15 * np.ones(4), [0, 1]) == [0, 1]
+    rows[3, 1] = 1.4
+    rows[2, 0] = 3.1
+    assert review_rows(rows, 4e-15 * np.ones(4), [0, 1]) == [1, 2]
+
+
+def test_rows_are_weighed_by_the_terms_that_they_are_computed_from() -> None:
+    """In other units the same row is a thousand times as large, and so is its error."""
+    rows = np.array([[1e-3, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    assert review_rows(rows, np.array([4e-18, 4e-15, 4e-15]), [0, 2]) == [0, 2]
+    assert review_rows(rows, np.array([4e-15, 4e-15, 4e-15]), [0, 2]) == [1, 2]
+
+
+def test_rows_of_large_matrices_that_are_all_independent() -> None:
+    rows = np.hstack([np.eye(3), 0.5 * np.eye(3)])
+    at = np.nonzero(rows)
+    assert independent_rows(csr_of(*at, rows[at], rows.shape), 1e-15 * np.ones(3)) == [0, 1, 2]
+    assert independent_rows(csr_of(*at, rows[at], rows.shape), 1e-15 * np.ones(3), most=2) == [0, 1]
+
+
+def test_rows_of_any_size_leave_the_same_directions_open() -> None:
+    rows = np.array([[1e-9, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    for least in (0.0, 1e-6):
+        np.testing.assert_allclose(np.abs(open_directions(rows, least)), [[0.0, 0.0, 1.0]], atol=1e-15)
+    assert len(open_directions(np.array([[0.0, 0.0], [0.0, 1.0]]), 1e-6)) == 1
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_system_that_is_not_finite_is_refused(bad: float) -> None:
+    matrix, right = np.eye(2), np.ones(2)
+    np.testing.assert_allclose(least_norm(matrix, right), right)
+    for wrong, other in ((matrix + np.diag([bad, 0.0]), right), (matrix, np.array([1.0, bad]))):
+        with pytest.raises(np.linalg.LinAlgError):
+            least_norm(wrong, other)
+
+
+def test_units_of_columns_change_no_multiplier() -> None:
+    slope = random_rows(5, 6, 3)[None]
+    kept, found = np.array([0, 1, 2]), np.array([[1.0, -2.0, 0.5]])
+    plain = least_size(slope, kept, found)
+    units = 10.0 ** np.array([-9.0, 9.0, 0.0, 5.0, -5.0, 2.0])
+    np.testing.assert_allclose(least_size(slope * units, kept, found), plain, atol=1e-10)
+    silent = np.concatenate([slope, np.zeros((1, 5, 1))], axis=2)  # a coordinate that no constraint depends on
+    np.testing.assert_allclose(least_size(silent, kept, found), plain, atol=1e-12)
+
+
 # -- rough arithmetic -------------------------------------------------------------------------------------------------
 
 
