@@ -48,6 +48,7 @@ def _declared() -> list[object]:
         atwood.formula(sum(sympy.sin(k * x) for k in range(1, 300)), [x]),
         atwood.Placement(atwood.Vector(1.0, 2.0, 3.0)),
         atwood.Load(part.point, force=atwood.Vector(1.0, 2.0, 3.0)),
+        atwood.CoordinateLoad(part.shaft, 2.0),
         atwood.reporting.MergedPart("a" * 200, "b"),
         atwood.reporting.DroppedPart("a", "word " * 500),
         atwood.checking.Finding("failure", "units", "law", "space", "word " * 500),

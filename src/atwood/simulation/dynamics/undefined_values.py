@@ -6,7 +6,7 @@ at the last good state and a little ahead of it, and the first that has no value
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import isfinite
 
 import numpy as np
@@ -163,10 +163,11 @@ def _quantities(local: LocalPart, mode: str) -> Iterator[tuple[str, list[Express
                 yield f"the force of the law {law.name!r}", _slopes(local, found, kind == "dissipation")
 
 
-def _loads(made: Sequence[Load | CoordinateLoad]) -> list[object]:
-    own: list[object] = [load.value for load in made if isinstance(load, CoordinateLoad)]
-    return own + [
-        value for load in made for vector in (load.force, load.torque) for value in (vector.x, vector.y, vector.z)
+def _loads(made: Iterable[Load | CoordinateLoad]) -> list[object]:
+    return [
+        value
+        for load in made  # once, since laws may yield them
+        for value in ((load.value,) if isinstance(load, CoordinateLoad) else load.components)
     ]
 
 
