@@ -167,3 +167,44 @@ def test_what_is_smooth_where_the_point_goes_is_not_refused() -> None:
     assemble(on(lib.PointOnCurve(curve=("p - sin(p)", 0, "cos(p)"), lower_end=0.1, upper_end=6.1), {}))
     assemble(on(lib.PointOnCurve(curve=("p", 0, "log(p)"), lower_end=0.01), {"wire.parameter": 1.0}))
     assemble(on(lib.PointOnCurve(curve=("p", 0, "select(p < 0, p**2, p**3)")), {}))
+
+
+def test_a_cam_with_a_roller() -> None:
+    """An eccentric disc lifts a follower in line with its axle: e cos + sqrt((R + r)^2 - e^2 sin^2)."""
+    e, big, small = 0.1, 0.3, 0.05
+
+    def make() -> Scene:
+        scene = Scene()
+        ground, hinge = scene.add("ground", lib.Ground()), scene.add("hinge", lib.Pivot())
+        wheel = scene.add("wheel", lib.RigidBody(mass=1.0, moments=(0.0, 0.4, 0.0)))
+        # clockwise along the disc, so that outside is to the left
+        disc = (f"{e} + {big}*cos(p)", 0, f"-{big}*sin(p)")
+        cam = scene.add("wire", lib.PointOnCurve(curve=disc, offset=small))
+        guide = scene.add("guide", lib.PointOnLine(axis=(0.0, 0.0, 1.0), stiffness=200.0, natural_length=0.1))
+        roller = scene.add("roller", lib.PointMass(mass=0.5))
+        scene.connect(ground.frame, hinge.a)
+        scene.connect(hinge.b, wheel.frame)
+        scene.connect(wheel.frame, cam.a)
+        scene.connect(ground.frame, guide.a)
+        scene.connect(guide.b, roller.point)
+        scene.connect(cam.b, roller.point)
+        scene.start.update({"hinge.angle": 0.3, "hinge.angular_velocity": 6.0})
+        scene.guess.update({"guide.displacement": 0.35, "wire.parameter": 0.3 - 0.5 * math.pi})
+        return scene
+
+    one, other = (simulate(make(), form=form, t_end=1.5, rtol=1e-10) for form in FORMS)
+    for result in (one, other):
+        turned = result.array("hinge.angle") - 0.5 * math.pi  # of the eccentricity from the follower's line
+        lift = e * np.cos(turned) + np.sqrt((big + small) ** 2 - (e * np.sin(turned)) ** 2)
+        assert np.max(np.abs(result.array("guide.displacement") - lift)) < 1e-10
+        assert result.array("hinge.angle")[-1] > 2.0 * math.pi
+        assert result.energy.max_drift < 1e-7
+    assert np.max(np.abs(one.array("wire.speed") - other.array("wire.speed"))) < 1e-6
+    assert states(make())[1] > 0  # a loop
+
+
+def test_the_speed_along_a_curve_with_an_offset() -> None:
+    scene = on(lib.PointOnCurve(curve=("p", 0, "0.5*p**2"), offset=0.2), {"wire.parameter": 0.4, "wire.rate": 1.0})
+    result = simulate(scene, t_end=0.5, rtol=1e-10)
+    speed = np.hypot(result.array("bead.velocity.x"), result.array("bead.velocity.z"))
+    assert np.max(np.abs(np.abs(result.array("wire.speed")) - speed)) < 1e-9

@@ -16,10 +16,12 @@ from atwood import (
     constraint,
     dot,
     event,
+    is_zero,
     joint,
     norm,
     observable,
     parameter,
+    sqrt,
 )
 from atwood_library.interfaces.bearings import velocity_seen
 from atwood_library.interfaces.curves import check_curve
@@ -32,16 +34,22 @@ class PointOnCurve(Component):
     ``curve=("cos(p)", 0, "sin(p)")``, in units of `scale`. The parameter is the coordinate of the joint, and goes on
     counting where a closed curve comes round. A massless marker on the x axis of frame a is as many `scale` away from
     its origin as the parameter says, which makes the parameter known also where no body hangs on this joint. In a
-    plane, y of the curve does not count.
+    plane, y of the curve does not count. With an offset the point keeps that distance
+    from the curve, as the axle of a roller on a cam does.
     """
 
-    synonyms = ("Bead on a wire", "Curve joint", "Point on a path")
+    synonyms = ("Bead on a wire", "Curve joint", "Point on a path", "Cam with a roller", "Cam follower")
     spaces = ("plane", "space")
 
     curve: Any = parameter(
         ("p", 0.0, 0.0), size=3, function_of={"p": "rad"}, doc="The curve in the axes of frame a, in units of scale."
     )
     scale: float = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the curve's functions.")
+    offset: float = parameter(
+        0.0,
+        unit="m",
+        doc="Distance of the point from a curve in the x-z plane of frame a, to its left as the parameter grows.",
+    )
     lower_end: float | None = parameter(
         None, unit="rad", doc="Parameter at which the curve begins; none if it goes on."
     )
@@ -57,7 +65,13 @@ class PointOnCurve(Component):
 
     def place(self, p: Scalar) -> Vector:
         """Return the place on the curve, in the axes of frame a."""
-        return self.within(self.curve(p))
+        place = self.within(self.curve(p))
+        if is_zero(self.offset):
+            return place
+        tangent = self.curve.derivative("p")(p)
+        left = Vector(-1.0 * tangent.z, 0.0, tangent.x)
+        aside: Vector = left * (self.offset / sqrt(tangent.x * tangent.x + tangent.z * tangent.z))
+        return place + aside
 
     def within(self, vector: Vector) -> Vector:
         """Return a vector of the curve in metres; in a plane, only what lies there."""
@@ -65,8 +79,14 @@ class PointOnCurve(Component):
 
     def tangent(self) -> Vector:
         """Return the derivative of the place by the parameter, in world axes."""
-        slope = self.curve.derivative("p")(self.parameter())
-        return self.a.to_world(self.within(slope))
+        p, curve = self.parameter(), self.curve
+        slope = self.within(curve.derivative("p")(p))
+        if not is_zero(self.offset):  # the offset curve is longer, or shorter, as the curve bends
+            first, second = curve.derivative("p")(p), curve.derivative("p").derivative("p")(p)
+            square = first.x * first.x + first.z * first.z
+            bend = (first.x * second.z - first.z * second.x) / (square * sqrt(square))
+            slope = slope * (1.0 - self.offset * bend / self.scale)
+        return self.a.to_world(slope)
 
     @constraint(
         reaction=("marker_force_1", "marker_force_2"),
