@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from dataclasses import replace
+from typing import Any, get_args
 
 from atwood.checking.expressions import wrong_on_expressions
 from atwood.checking.forces import wrong_forces
@@ -17,6 +18,7 @@ from atwood.consistency.trials import make_trial
 from atwood.errors import AtwoodError, UsageError
 from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
+from atwood.model.declare.laws import Kind
 from atwood.model.local.flatten import Part
 from atwood.model.values.outline import Outline
 from atwood.model.values.space import Space, make_space
@@ -95,8 +97,18 @@ def check(component: Component | type[Component], *, run: bool = True) -> CheckR
             placed = in_space(sample.component, space_name)
             with_runs = run and (runs == 1 or (sample.full and fully == 1))
             _look(as_part(placed), _space_for(placed, space_name), book, measured, with_runs)
-    findings = sorted(book.found.values(), key=lambda one: (one.gravity, one.test, one.law, one.space))
+    if not any(cls.laws(kind) for kind in get_args(Kind)):
+        book.add("content", [Finding("note", "content", "", "", "it has no law, so that there is nothing to check")])
+    findings = sorted(_merged(book.found.values()), key=lambda one: (one.gravity, one.test, one.law, one.space))
     return CheckReport(cls.__name__, tuple(cls.spaces), dict(book.counts), tuple(findings))
+
+
+def _merged(findings: Iterable[Finding]) -> list[Finding]:
+    """Return findings of which each is said once, with all spaces that it was made in."""
+    spaces: dict[Finding, list[str]] = {}
+    for one in findings:
+        spaces.setdefault(replace(one, space=""), []).append(one.space)
+    return [replace(one, space=", ".join(name for name in names if name)) for one, names in spaces.items()]
 
 
 def _look(part: Part, space: Space, book: _Book, measured: bool, with_runs: bool) -> None:

@@ -25,7 +25,7 @@ class Finding:
     law
         The law that it is about; empty for the component as a whole.
     space
-        ``"line"``, ``"plane"`` or ``"space"``; empty where it does not matter.
+        ``"line"``, ``"plane"`` or ``"space"``, or several of them with commas; empty where it does not matter.
     message
         What was found.
     """
@@ -68,6 +68,11 @@ class CheckReport:
         return not self.failures
 
     @property
+    def is_empty(self) -> bool:
+        """Whether there was nothing to check."""
+        return any(one.test == "content" for one in self.findings)
+
+    @property
     def failures(self) -> tuple[Finding, ...]:
         """What is wrong."""
         return tuple(one for one in self.findings if one.gravity == "failure")
@@ -89,7 +94,8 @@ class CheckReport:
 
     def __str__(self) -> str:
         made = ", ".join(f"{name} {count}" for name, count in self.tests.items())
-        head = f"{self.component}: {'sound' if self.ok else f'{len(self.failures)} failures'} ({made})"
+        said = "nothing to check" if self.is_empty else "sound" if self.ok else f"{len(self.failures)} failures"
+        head = f"{self.component}: {said} ({made})"
         return "\n".join([head, *(f"  {one}" for one in self.findings)])
 
     def __repr__(self) -> str:

@@ -88,7 +88,8 @@ def _print(reports: Sequence[CheckReport]) -> None:
     for column in ("component", "spaces", "comparisons", "result"):
         table.add_column(column, no_wrap=column != "spaces")
     for one in reports:
-        result = Text("sound", style="green") if one.ok else Text(f"{len(one.failures)} wrong", style="red")
+        sound = Text("nothing to check", style="yellow") if one.is_empty else Text("sound", style="green")
+        result = sound if one.ok else Text(f"{len(one.failures)} wrong", style="red")
         table.add_row(one.component, ", ".join(one.spaces), str(sum(one.tests.values())), result)
     out.print(table)
     for one in reports:

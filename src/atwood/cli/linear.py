@@ -23,7 +23,7 @@ def _state(scene: Model, texts: Sequence[str]) -> dict[str, str] | None:
         return None
     found = dict(pairs(texts, "--at"))
     for path, value in found.items():
-        warn_of_radians(scene, path, [value], "--at")
+        warn_of_radians(scene, path, [value], "--at", value)
     return {} if found == {"rest": "yes"} else found
 
 

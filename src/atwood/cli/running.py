@@ -12,7 +12,7 @@ import click
 
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, warn
-from atwood.cli.scenes import prepare
+from atwood.cli.scenes import check_applies, prepare
 from atwood.errors import AtwoodError, UsageError
 from atwood.late import dataclass
 from atwood.stages import watching
@@ -81,6 +81,7 @@ def run_scene(request: RunRequest) -> None:
 def _run(request: RunRequest) -> Result:
     """Return the run of a scene; what came before an error is kept where that was asked for."""
     scene, name = prepare(request.scene, request.settings, request.starts)
+    check_applies(scene, request.form, request.level, request.orientation)
     from atwood.pipeline import assemble, simulate
 
     assembly = assemble(scene, form=request.form, level=request.level, orientation=request.orientation, name=name)

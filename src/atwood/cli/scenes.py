@@ -21,7 +21,7 @@ from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
 if TYPE_CHECKING:
     from atwood.model.compose.composite import Model
 
-__all__ = ["bundled_scenes", "find_scene", "pairs", "prepare", "warn_of_radians"]
+__all__ = ["bundled_scenes", "check_applies", "find_scene", "pairs", "prepare", "warn_of_radians"]
 
 
 def bundled_scenes() -> dict[str, type[Model]]:
@@ -100,13 +100,13 @@ def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[
     scene, name = find_scene(text)
     for path, value in pairs(settings, "--set"):
         scene.set(path, value)
-        warn_of_radians(scene, path, [value], "--set")
+        warn_of_radians(scene, path, [value], "--set", value)
     for path, value in pairs(starts, "--start"):
         if not isinstance(scene, Scene):
             raise UsageError("this is a model and no scene, and has no start of its own", where=name)
         if value.strip() != "free":
             scene.start[path] = value
-            warn_of_radians(scene, path, [value], "--start")
+            warn_of_radians(scene, path, [value], "--start", value)
         elif path in scene.start:
             scene.guess[path] = scene.start.pop(path)
         else:
@@ -114,7 +114,38 @@ def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[
     return scene, name
 
 
-def warn_of_radians(scene: Model, path: str, values: Iterable[object], option: str) -> None:
+def check_applies(scene: Model, form: str, level: str, orientation: str = "quaternion") -> None:
+    """Refuse what was asked for on the command line and would change nothing.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    form, level, orientation
+        See `atwood.assemble`.
+
+    Raises
+    ------
+    UsageError
+        If the form has no levels, or the scene no orientations.
+    """
+    from atwood.model.compose.scene import Scene
+
+    if form == "reduced" and level != "ggl":
+        raise UsageError(
+            f"the reduced form has no levels, and no {level!r}: its constraints are eliminated",
+            where="--level",
+            advice="Add --form dae.",
+        )
+    if isinstance(scene, Scene) and scene.space != "space" and orientation != "quaternion":
+        raise UsageError(
+            f"there are no orientations in a {scene.space} for which {orientation!r} would be coordinates",
+            where="--orientation",
+            advice="Leave it away; it is for scenes in space.",
+        )
+
+
+def warn_of_radians(scene: Model, path: str, values: Iterable[object], option: str, typed: str) -> None:
     """Say that an angle without a unit is in radians, where it is beyond a turn, as degrees mostly are.
 
     Parameters
@@ -125,11 +156,10 @@ def warn_of_radians(scene: Model, path: str, values: Iterable[object], option: s
         Of a parameter, or of a start value.
     values
         Numbers, or texts with or without a unit.
-    option
-        Where they were given.
+    option, typed
+        Where they were given, and how.
     """
     from atwood.model.local.flatten import unit_at
-    from atwood.model.values.units import split_quantity
 
     owner, _, name = path.rpartition(".")
     if option in ("--set", "--vary"):
@@ -139,12 +169,20 @@ def warn_of_radians(scene: Model, path: str, values: Iterable[object], option: s
         unit = unit_at(scene, path)
     if unit is None or unit.text != "rad":
         return
-    for value in values:
-        number, given = (split_quantity(value) or (0.0, "")) if isinstance(value, str) else (value, "")
-        if not given and isinstance(number, (int, float)) and abs(number) > math.tau:
-            turns = f"{number:g} rad, which is {math.degrees(number):g} degrees"
-            warn(f"Warning: {option} {path}: it is taken as {turns}. If degrees are meant, write '{number:g} deg'.")
-            return
+    plain = [number for number, given in map(_number_and_unit, values) if not given]
+    if plain and max(map(abs, plain)) > math.tau:
+        farthest = max(plain, key=abs)
+        taken = "it is taken as" if len(plain) == 1 else f"{typed} is taken as up to"
+        turns = f"{taken} {farthest:g} rad, which is {math.degrees(farthest):g} degrees"
+        warn(f"Warning: {option} {path}: {turns}. If degrees are meant, write '{typed} deg'.")
+
+
+def _number_and_unit(value: object) -> tuple[float, str]:
+    from atwood.model.values.units import split_quantity
+
+    if isinstance(value, str):
+        return split_quantity(value) or (0.0, "?")
+    return (float(value), "") if isinstance(value, (int, float)) else (0.0, "?")
 
 
 def pairs(texts: Sequence[str], option: str) -> Iterator[tuple[str, str]]:

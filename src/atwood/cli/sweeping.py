@@ -14,7 +14,7 @@ import numpy as np
 
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import console, print_json, warn
-from atwood.cli.scenes import pairs, prepare, warn_of_radians
+from atwood.cli.scenes import check_applies, pairs, prepare, warn_of_radians
 from atwood.errors import UsageError
 from atwood.late import dataclass
 from atwood.tolerances import tolerances
@@ -73,9 +73,11 @@ def sweep_scene(request: SweepRequest) -> None:
     if not vary and not start:
         raise UsageError("nothing is varied", advice="Write --vary PATH=FROM:TO:COUNT or --vary-start PATH=A,B,C.")
     scene, name = prepare(request.scene, request.settings, request.starts)
-    for option, axes in (("--vary", vary), ("--vary-start", start)):
+    check_applies(scene, request.form, request.level)
+    for option, texts, axes in (("--vary", request.vary, vary), ("--vary-start", request.vary_start, start)):
+        typed = dict(pairs(texts, option))
         for path, values in axes.items():
-            warn_of_radians(scene, path, values, option)
+            warn_of_radians(scene, path, values, option, typed[path])
     from atwood.study import sweep
 
     with _progress(request.progress, name) as progress:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from atwood.errors import AtwoodError, DeclarationError, is_about
+from atwood.errors import AtwoodError, DeclarationError, is_about, suggestion
 from atwood.expr import Expression, Graph
+from atwood.model.declare.connectors import Frame, Point
 from atwood.model.declare.contributions import Load, Placement, PointInertia
 from atwood.model.declare.laws import Law
 from atwood.model.values.vector import Vector
@@ -47,8 +48,18 @@ def not_evaluated(path: str, law: Law, error: Exception) -> DeclarationError:
     return DeclarationError(
         f"the law cannot be evaluated ({type(error).__name__}: {error})",
         where=f"{path}.{law.name}",
-        advice="A law is plain arithmetic with Atwood's functions, on self's parameters and connectors.",
+        advice=_what_to_write(error),
     )
+
+
+def _what_to_write(error: Exception) -> str:
+    """Return the advice for a law that raises something."""
+    plain = "A law is plain arithmetic with Atwood's functions, on self's parameters and connectors."
+    if not isinstance(error, AttributeError) or not isinstance(error.name, str) or error.obj is None:
+        return plain
+    if isinstance(error.obj, Point) and not isinstance(error.obj, Frame) and hasattr(Frame, error.name):
+        return "A Point has a position and no orientation: declare the connector as a Frame."
+    return suggestion(error.name, [name for name in dir(error.obj) if not name.startswith("_")]) or plain
 
 
 def one_scalar(graph: Graph, value: Any) -> Expression:

@@ -200,7 +200,7 @@ class Expression:
         if self.operation == "constant":
             return bool(self.payload != 0.0)
         raise AtwoodError(
-            f"the truth of {self!r} is not known before the program runs",
+            "an if, a while, or one of and, or, not asks whether something holds that is only known while a scene runs",
             advice="Write select(condition, a, b) instead of if, and & | ~ instead of and, or, not.",
         )
 

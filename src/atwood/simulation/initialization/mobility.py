@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.linalg.matrices import LARGEST_FULL, scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
+from atwood.model.declare.component import Component
+from atwood.model.declare.laws import Kind
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.rank import independent_rows
 from atwood.simulation.dynamics.scales import motion_scales
@@ -114,6 +116,12 @@ def refuse_immobile(assembly: Assembly, freedom: int, start: Start) -> None:
     TopologyError
         If it is so; it says what would have to let go.
     """
+    if all(_only_holds(part.component) for part in assembly.flat.parts.values()):
+        raise TopologyError(
+            "there is nothing in it but what is fixed in the world",
+            where=assembly.flat.name,
+            advice="Add what moves: scene.add('bob', PointMass()), and connect it.",
+        )
     found = find_immobile(assembly, freedom, start) if freedom <= 0 and not assembly.modes else None
     if found is None:
         return
@@ -123,6 +131,12 @@ def refuse_immobile(assembly: Assembly, freedom: int, start: Start) -> None:
         advice="Look at the axes and places of the joints; if it is meant as a structure, say structure=True "
         "(on the command line: --structure).",
     )
+
+
+def _only_holds(component: Component) -> bool:
+    """Return whether all that a component does is to fix frames in the world."""
+    fixes = all(law.options.a == "world" and law.options.rigid for law in component.laws("joint"))
+    return fixes and not any(component.laws(kind) for kind in get_args(Kind) if kind != "joint")
 
 
 def _name(assembly: Assembly, one: Constraint) -> str:
