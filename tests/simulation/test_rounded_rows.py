@@ -10,7 +10,7 @@ from atwood import Component, Frame, Point, Scalar, Scene, connector, constraint
 from atwood.pipeline import assemble
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.problem import make_plan
-from atwood_library import Ground, Link, Pivot, PointMass, Rod, Weld
+from atwood_library import Cylindrical, Ground, Link, Pivot, PointMass, PointOnPlane, RigidBody, Rod, Weld
 
 FORMS = ("reduced", "dae")
 
@@ -71,3 +71,26 @@ def test_an_axis_that_was_computed_is_the_axis(slant: float, form: str) -> None:
 
 def test_in_a_plane_an_axis_that_was_computed_is_the_normal() -> None:
     assert Pivot(axis=(math.cos(math.pi / 2.0), -1.0, 0.0)).axis == (0.0, -1.0, 0.0)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("angle", [0.3, 0.7, 1.1, 1.9])
+def test_a_plane_along_an_axis_holds_nothing_along_it(angle: float, form: str) -> None:
+    """The normal is at a right angle to the axis but for rounding, which nothing is solved for."""
+    scene = Scene(space="space", gravity=0.0)
+    ground, body = scene.add("ground", Ground()), scene.add("body", RigidBody(mass=1.0, moments=(1.0, 1.0, 1.0)))
+    tilt = scene.add("tilt", Weld(angle=angle, axis=(1.0, 2.0, -0.5)))
+    back = scene.add("back", Weld(angle=-angle, axis=(1.0, 2.0, -0.5)))
+    guide, plane = scene.add("guide", Cylindrical(axis=(1.0, 0.0, 0.0))), scene.add("plane", PointOnPlane(axis="z"))
+    scene.connect(ground.frame, tilt.a)
+    scene.connect(tilt.b, guide.a)
+    scene.connect(guide.b, body.frame)
+    scene.connect(tilt.b, back.a)
+    second = scene.add("second", Weld(angle=angle, axis=(1.0, 2.0, -0.5)))
+    scene.connect(back.b, second.a)
+    scene.connect(second.b, plane.a)
+    scene.connect(body.frame, plane.b)
+    scene.start.update({"guide.displacement": 0.2, "guide.speed": 0.3, "guide.angular_velocity": 0.4})
+    assert freedom(scene, form) == 2
+    found = simulate(scene, form=form, t_end=1.0, outputs=2)
+    assert found["guide.displacement"][-1] == pytest.approx(0.5, abs=1e-6)

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 
+import numpy as np
+
 from atwood.errors import TopologyError
 from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, substitute
+from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.inertia import Masses
 from atwood.mechanics.kinematics.mechanism import Mechanism, decide, extent
@@ -95,9 +98,13 @@ def eliminate_linear(
 def _pivot(coefficients: list[Expression], light: list[bool], mechanism: Mechanism) -> int | None:
     """Return which coordinate to solve a linear constraint for: a weightless one, or the last; None if there is none.
 
-    What is smaller than a tenth of the largest coefficient is not divided by.
+    What is smaller than a tenth of the largest coefficient is not divided by, nor what is nothing but rounding, as the
+    product of two directions at a right angle.
     """
-    sizes = [abs(c) for c in evaluate(coefficients, mechanism.table.values)] if coefficients else []
+    if not coefficients:
+        return None
+    numbers = np.array(evaluate(coefficients, mechanism.table.values))
+    sizes = np.where(rounds_to_zero(coefficients, mechanism.table.values), 0.0, np.abs(numbers)).tolist()
     largest = max(sizes, default=0.0)
     if largest == 0.0:
         return None

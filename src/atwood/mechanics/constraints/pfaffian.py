@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.codegen.rounding import RoughProgram, roughly
 from atwood.errors import AtwoodError
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, evaluate, jacobian, live, substitute
+from atwood.expr import Expression, evaluate, jacobian, live, substitute
 from atwood.expr.core.operations import PIECEWISE_CONSTANT
 from atwood.late import dataclass
+from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism, decide, extent
 from atwood.mechanics.kinematics.motion import Movement
@@ -133,19 +133,16 @@ class Places:
 
     def certain(self, mechanism: Mechanism, expressions: Sequence[Expression]) -> NDArray[np.bool_]:
         """Return whether expressions are more than rounding at the places where all have values, one row each."""
-        numbers, symbols = self.values(mechanism, expressions), [*self.state.coordinates, self.time]
-        parameters = tuple(mechanism.table.values)
-        inputs, outputs = (InputGroup("place", tuple(symbols)),), (OutputGroup("wanted", tuple(expressions)),)
-        rough = RoughProgram(Program("some places", inputs, parameters, outputs), list(expressions))
-        values, found = np.array([mechanism.table.values[one] for one in parameters]), []
+        found, symbols = [], [*self.state.coordinates, self.time]
         for place in self._places(mechanism):
-            at = np.array([place[one] for one in symbols])
-            ways = rough(values, at[:, None] * roughly(len(at)))
-            if np.all(np.isfinite(ways)):
-                found.append(np.ptp(ways, axis=1))
-        if len(found) != len(numbers):  # where a place is next to one without a value
-            return np.abs(numbers) > 0.0
-        return np.abs(numbers) > tolerances.CERTAIN * np.array(found).reshape(numbers.shape)
+            try:
+                numbers = evaluate(expressions, {**mechanism.table.values, **place})
+            except (AtwoodError, ArithmeticError):
+                continue
+            if np.all(np.isfinite(numbers)):
+                at = {one: place[one] for one in symbols}
+                found.append(~rounds_to_zero(expressions, mechanism.table.values, at))
+        return np.array(found, dtype=bool).reshape(len(found), len(expressions))
 
     def some(self, mechanism: Mechanism) -> dict[Expression, float]:
         """Return one of the places."""

@@ -19,7 +19,7 @@ from atwood.forms.assembly import Assembly, Coordinates
 from atwood.forms.program import RatesProgram
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["KinematicMap", "best_rough_orientation", "kinematic_map_of", "reference_coordinates"]
+__all__ = ["KinematicMap", "best_rough_orientation", "kinematic_map_of", "orientations", "reference_coordinates"]
 
 
 class KinematicMap:
@@ -157,7 +157,7 @@ def best_rough_orientation(equations: Equations, far_off: Callable[[FloatArray],
         if orientation.kind != "quaternion" or least == 0.0:
             continue
         start = best
-        for candidate in _orientations():
+        for candidate in orientations():
             trial = start.copy()
             trial[list(orientation.coordinates)] = candidate
             size = far_off(trial)
@@ -167,7 +167,7 @@ def best_rough_orientation(equations: Equations, far_off: Callable[[FloatArray],
 
 
 @cache
-def _orientations() -> tuple[tuple[float, ...], ...]:
+def orientations() -> tuple[tuple[float, ...], ...]:
     """Return quaternions that cover all orientations: the 24 turns of a cube, each also turned a little askew."""
     square = [tuple(1.0 if i == k else 0.0 for i in range(4)) for k in range(4)]
     halves = [(0.5, a, b, c) for a in (0.5, -0.5) for b in (0.5, -0.5) for c in (0.5, -0.5)]

@@ -17,8 +17,9 @@ from atwood.simulation.dynamics.kinematic_map import (
     kinematic_map_of,
     reference_coordinates,
 )
-from atwood.simulation.dynamics.rank import row_sizes
+from atwood.simulation.dynamics.rank import row_scales
 from atwood.simulation.initialization.assembly_branch import wrongly_turned
+from atwood.simulation.initialization.body_by_body import placed_in_turn
 from atwood.simulation.initialization.errors import Failed, explain_positions, far_from_guess, wrong_way_round
 from atwood.simulation.initialization.loop_closure import closest, places_around, units_of_rows
 from atwood.simulation.initialization.system import System, counted, newton
@@ -84,11 +85,11 @@ def solve_positions(
     if not is_direct:
         system = System(assembly, equations, every, False)
         near = _brought_near(system, equations, scales, t, q)
-        if _far_off(system, t, near) > 1.0:  # what is said may fit together but for whole turns
+        if _far_off(system, scales, t, near) > 1.0:  # what is said may fit together but for whole turns
             system = System(assembly, equations, every, False, whole_turns=True)
             other = _brought_near(system, equations, scales, t, q)
-            near = other if _far_off(system, t, other) < 1e-3 else near
-        q = near
+            near = other if _far_off(system, scales, t, other) < 1e-3 else near
+        q = _better_placed(equations, system, scales, length, t, near_to, near)
     q = rough = unwound(assembly, equations, every, False, scales, length, t, near_to, q)
     system = System(assembly, equations, level.fixed, True)
     q, residual, matrix = newton(system, scales, t, q)
@@ -180,20 +181,32 @@ def _brought_near(system: System, equations: Equations, scales: FloatArray, t: f
     except KernelEvaluationError:
         if not equations.orientation_coordinates:
             raise
-    turned = best_rough_orientation(equations, lambda trial: _far_off(system, t, trial), q)
+    turned = best_rough_orientation(equations, lambda trial: _far_off(system, scales, t, trial), q)
     found = newton(system, scales, t, turned, iterations=20)[0]
     # What is said may not fit together; then the better of the two is what was meant.
-    return near if near is not None and _far_off(system, t, near) <= _far_off(system, t, found) else found
+    if near is None or _far_off(system, scales, t, found) < _far_off(system, scales, t, near):
+        return found
+    return near
 
 
-def _far_off(system: System, t: float, q: FloatArray) -> float:
+def _better_placed(
+    equations: Equations, system: System, scales: FloatArray, length: float, t: float, q: FloatArray, near: FloatArray
+) -> FloatArray:
+    """Return a configuration nearer to what is said than one that was found, if bodies are better placed in turn."""
+    left = _far_off(system, scales, t, near)
+    if not left > 1e-12:
+        return near
+    found = newton(system, scales, t, placed_in_turn(equations, system, length, t, q), iterations=20)[0]
+    return found if _far_off(system, scales, t, found) < 0.5 * left else near
+
+
+def _far_off(system: System, scales: FloatArray, t: float, q: FloatArray) -> float:
     """Return how far a configuration is from what is asked for; infinite where that has no value."""
     try:
         residual, matrix = system.at(t, q, np.zeros(system.speeds))
     except KernelEvaluationError:
         return np.inf
-    rows = row_sizes(matrix, np.ones(matrix.shape[1]))
-    return float(np.sum((residual / np.where(rows > 0.0, rows, 1.0)) ** 2))
+    return float(np.sum((residual / row_scales(matrix, scales, system.errors.near(t, q, scales))) ** 2))
 
 
 def _turned(equations: Equations, kinematic_map: KinematicMap, q: FloatArray) -> FloatArray:
