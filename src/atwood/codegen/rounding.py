@@ -16,7 +16,6 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression
-from atwood.expr.core.program import Program
 
 __all__ = ["ROUGHNESS", "WAYS", "RoughProgram", "roughly"]
 
@@ -86,26 +85,23 @@ def roughly(count: int, start: int = 0) -> FloatArray:
 
 
 class RoughProgram:
-    """Some results of a program in rough arithmetic.
+    """Expressions in rough arithmetic.
 
     Parameters
     ----------
-    program
-        The program.
+    symbols
+        What they depend on: the parameters, and groups of inputs.
     results
-        What is wanted of it.
+        The expressions.
     """
 
-    def __init__(self, program: Program, results: Sequence[Expression]) -> None:
+    def __init__(self, symbols: Sequence[Sequence[Expression]], results: Sequence[Expression]) -> None:
         nodes = live(results)
         place = {node.index: i for i, node in enumerate(nodes)}
         self._count = len(nodes)
         self._constants = [(place[n.index], float(n.payload)) for n in nodes if n.operation == "constant"]
         self._rounded = {i for i, value in self._constants if not (2.0 * value).is_integer()}
-        self._groups = [
-            [(place[s.index], k) for k, s in enumerate(symbols) if s.index in place]
-            for symbols in (program.parameters, *(group.symbols for group in program.inputs))
-        ]
+        self._groups = [[(place[s.index], k) for k, s in enumerate(group) if s.index in place] for group in symbols]
         self._steps = [
             (place[node.index], *_function_of(node), [place[argument.index] for argument in node.arguments])
             for node in nodes
@@ -121,7 +117,7 @@ class RoughProgram:
         parameters
             Values of the parameters; they are rounded here.
         *groups
-            Values of the program's inputs, of shape (size,) or (size, `WAYS`), rounded already.
+            Values of the inputs, of shape (size,) or (size, `WAYS`), rounded already.
         """
         factors = roughly(self._count)
         values: list[Any] = [None] * self._count

@@ -237,7 +237,9 @@ def spread_of(make, value: float) -> np.ndarray:  # type: ignore[no-untyped-def]
     x, p = graph.symbol("x"), graph.symbol("p")
     results = make(x, p)
     program = Program("rough", (InputGroup("x", (x,)),), (p,), (OutputGroup("results", tuple(results)),))
-    found = RoughProgram(program, results)(np.array([3.0]), value * roughly(1))
+    found = RoughProgram((program.parameters, *(one.symbols for one in program.inputs)), results)(
+        np.array([3.0]), value * roughly(1)
+    )
     assert found.shape == (len(results), WAYS)
     return np.ptp(found, axis=1)
 

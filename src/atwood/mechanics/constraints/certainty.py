@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, evaluate
+from atwood.expr import Expression, evaluate
 from atwood.tolerances import tolerances
 
 __all__ = ["rounds_to_zero"]
@@ -33,11 +33,9 @@ def rounds_to_zero(
     where = place or {}
     if all(one.is_constant for one in expressions):
         return np.array([one.is_zero for one in expressions], dtype=bool)
-    outputs = (OutputGroup("values", tuple(expressions)),)
-    inputs = (InputGroup("place", tuple(where)),) if where else ()
-    rough = RoughProgram(Program("numbers", inputs, tuple(parameters), outputs), list(expressions))
     at = np.array(list(where.values()))
-    ways = rough(np.array(list(parameters.values())), *([at[:, None] * roughly(len(at))] if where else []))
+    rough = RoughProgram((tuple(parameters), tuple(where)), list(expressions))
+    ways = rough(np.array(list(parameters.values())), at[:, None] * roughly(len(at)))
     numbers = np.abs(evaluate(expressions, {**parameters, **where}))
     spread = np.maximum(np.ptp(ways, axis=1), ROUGHNESS * numbers)  # not finite next to a place without a value
     return np.array((numbers <= tolerances.CERTAIN * spread) & np.isfinite(spread), dtype=bool)

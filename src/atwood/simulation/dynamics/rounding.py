@@ -152,7 +152,8 @@ class RowErrors:
         """Return the rough program."""
         by_name = {one.name: one.expressions for one in self._program.outputs}
         values, entries = (by_name[name] for name in self._groups)
-        return RoughProgram(self._program, (*values, *entries))
+        symbols = self._program.parameters, *(group.symbols for group in self._program.inputs)
+        return RoughProgram(symbols, (*values, *entries))
 
     def _kinematic_matrix(self, t: float, q: FloatArray) -> FloatArray:
         return np.abs(self._kinematic_map.matrix(t, q)) if self._of_coordinates else np.zeros(0)
