@@ -366,6 +366,42 @@ def test_a_loop_keeps_its_constraints_and_multipliers() -> None:
         assert same(mine, by_hand - push)
 
 
+@pytest.mark.parametrize(
+    ("name", "paths", "given"),
+    [
+        ("four-bar", ("rocker.angle", "coupler.angle"), "crank.angle"),
+        ("slider-crank", ("connecting_rod.angle",), "crank.angle"),
+        (
+            "four-bar-row",
+            ("crank[1].angle", "crank[2].angle", "coupler[0].angle", "coupler[1].angle"),
+            "crank[0].angle",
+        ),
+    ],
+)
+def test_loops_in_closed_form_on_request(name: str, paths: tuple[str, ...], given: str) -> None:
+    eq = equations(SCENES[name]())
+    ways = eq.eliminate(*paths)
+    assert len(ways) == 2 ** (len(paths) // 2 or 1)
+    numbers = {**eq.values, eq.symbol(given): 0.7}
+    known = [*numbers]
+    for way in ways:
+        values = sympy.lambdify(known, [*way.values()], "math", cse=True)(*numbers.values())
+        closing = sympy.lambdify([*known, *way], list(eq.constraints), "math")
+        assert closing(*numbers.values(), *values) == pytest.approx([0.0] * len(paths), abs=1e-12)
+    assert ways[0] != ways[1]
+    with pytest.raises(UsageError, match="cannot follow"):
+        eq.eliminate()
+
+
+def test_loops_without_a_closed_form_say_so() -> None:
+    eq = equations(SCENES["bricard"]())
+    with pytest.raises(UnsupportedError, match="no closed form") as caught:
+        eq.eliminate(
+            *(one.path for one in eq.legend if one.kind == "coordinate" and one.path != "hinge1.angle"), "hinge1.angle"
+        )
+    assert "multipliers" in caught.value.advice
+
+
 def damped() -> Scene:
     scene = Scene()
     bob, ground = scene.add("bob", PointMass(mass=2.0)), scene.add("ground", Ground())

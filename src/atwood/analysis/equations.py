@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, Literal
 
+from atwood.analysis.closed_form import solve_closures
 from atwood.analysis.equation_modules import module_of
 from atwood.analysis.equation_pages import as_data, equation_lines, html_of, sections_of, symbol_lines, symbol_table
 from atwood.analysis.formulas import objects, page
@@ -348,6 +349,48 @@ class EquationsOfMotion:
         """Names in formulas that are too long to be written out, and what they stand for, in order."""
         _ = self.written
         return tuple((objects.formula(name), objects.formula(value)) for name, value in self.book.shared)
+
+    def eliminate(self, *paths: str) -> list[dict[Sympy, Sympy]]:
+        """Return dependent coordinates of closed loops in closed form.
+
+        Parameters
+        ----------
+        *paths
+            Coordinates, as many as there are constraints.
+
+        Returns
+        -------
+        list of dict
+            What each of these coordinates is in terms of the others: one dictionary for each way in which the mechanism
+            can be put together, such as a four-bar linkage with its coupler on either side.
+
+        Raises
+        ------
+        UnsupportedError
+            If there is no closed form that one would find by hand.
+        UsageError
+            If a path is no coordinate, or their number is not that of the constraints.
+        """
+        if len(paths) != len(self.expressions.constraints) or not all(
+            one.holonomic for one in self.expressions.constraints
+        ):
+            raise UsageError(
+                f"{len(paths)} coordinates cannot follow from {len(self.expressions.constraints)} constraints",
+                where=self.name,
+                advice="Name a coordinate for each constraint on positions.",
+            )
+        unknowns = [self.symbol(path) for path in paths]
+        for path, one in zip(paths, unknowns, strict=True):
+            if one not in self.coordinates:
+                raise UsageError("it is no coordinate", where=path)
+        found = solve_closures(self.constraints, unknowns)
+        if found is None:
+            raise UnsupportedError(
+                "its loops have no closed form that one would find by hand",
+                where=self.name,
+                advice="Keep the constraints and their multipliers, or name other coordinates.",
+            )
+        return found
 
     def terms(self, path: str) -> PartOfEquations:
         """Return what a part contributes, or a model with all its parts.
