@@ -23,13 +23,20 @@ __all__ = ["Rest", "is_at_rest", "same_rest", "seek_rest", "slopes_at"]
 _FAR = 0.5
 """A step moves nothing by more of its size; an angle by so many radians."""
 
-_STEPS = 60
+_STEPS = 40
+
+_PATIENCE = 12
+"""So many steps that lead no nearer end the search."""
 
 _MET = 1e-11
 """Relative to the accelerations that a displacement of the scene's size makes: what is left is rounding."""
 
 _FLAT = 1e-9
 """Relative: singular values of the stiffness below it belong to directions along which nothing changes."""
+
+_WALK, _BACK = 40, 10
+"""So many steps lead from one state to another along directions in which nothing changes, each followed by so many of
+Newton's method at most."""
 
 _SAME = 1e-6
 """Displacements, relative to the scene's sizes, by which states that count as one may differ."""
@@ -91,7 +98,7 @@ def seek_rest(
         The largest number of steps.
     """
     still = np.zeros(len(scene.sizes))
-    best = np.inf
+    best, waiting = np.inf, 0
     for _ in range(steps):
         try:
             q, _ = balance.project(t, q, still, scene.sizes)
@@ -107,6 +114,9 @@ def seek_rest(
         missed = float(np.max(np.abs(a), initial=0.0)) / size
         if missed <= _MET and not 0.0 < missed < 0.3 * best:  # as long as it gets better it goes on
             return Rest(q, flow, minimal, slopes / size, missed)
+        waiting = 0 if missed < 0.9 * best else waiting + 1
+        if waiting > _PATIENCE:
+            return None
         best = min(best, missed)
         step = -np.linalg.lstsq(slopes, a, rcond=_FLAT)[0]
         step *= min(1.0, _FAR / max(float(np.max(np.abs(step), initial=0.0)), 1e-300))
@@ -130,18 +140,42 @@ def is_at_rest(scene: LinearScene, rest: Rest, t: float, kept: Sequence[int], la
     return True
 
 
-def same_rest(scene: LinearScene, one: Rest, other: Rest) -> bool:
-    """Return whether two states are one: apart by turns, or along directions in which nothing changes."""
-    apart = difference(scene, one.q, other.q)
-    for k, unit in enumerate(scene.tangents.units):
-        if unit == "rad":
+def same_rest(scene: LinearScene, one: Rest, other: Rest, t: float, kept: Sequence[int], balance: Balance) -> bool:
+    """Return whether two states are one: apart by turns, or along directions in which nothing changes.
+
+    Parameters
+    ----------
+    scene, balance, t, kept
+        See `seek_rest`.
+    one, other
+        The states.
+    """
+    q, slopes, minimal = one.q, one.slopes, one.minimal
+    for _ in range(_WALK):
+        apart = _wrapped(scene, difference(scene, q, other.q))
+        scaled = apart[list(minimal.displacements)] / scene.displacement_sizes[list(minimal.displacements)]
+        if float(np.max(np.abs(scaled), initial=0.0)) < _SAME:
+            return True
+        _, sizes, directions = np.linalg.svd(slopes)
+        flat = directions[int(np.sum(sizes > _FLAT)) :]
+        step = flat.T @ (flat @ scaled)
+        if float(np.max(np.abs(step), initial=0.0)) < _SAME:
+            return False
+        step *= min(1.0, 0.5 * _FAR / float(np.max(np.abs(step))))
+        # Along directions in which nothing changes, which need not be straight: a disc may stand at any heading.
+        moved = minimal.shift[:, : len(step)] @ (step * scene.displacement_sizes[list(minimal.displacements)])
+        there = seek_rest(scene, balance, t, scene.tangents.moved(q, moved), kept, _BACK)
+        if there is None:
+            return False
+        q, slopes, minimal = there.q, there.slopes, there.minimal
+    return False
+
+
+def _wrapped(scene: LinearScene, apart: FloatArray) -> FloatArray:
+    for i, k in scene.tangents.plain:
+        if scene.tangents.units[k] == "rad" and i < scene.equations.placing:
             apart[k] = (apart[k] + np.pi) % (2.0 * np.pi) - np.pi
-    minimal = one.minimal
-    scaled = apart[list(minimal.displacements)] / scene.displacement_sizes[list(minimal.displacements)]
-    _, sizes, directions = np.linalg.svd(one.slopes) if one.slopes.size else (None, np.zeros(0), np.zeros((0, 0)))
-    rank = int(np.sum(sizes > _FLAT))
-    along = directions[:rank] @ scaled if len(directions) else scaled
-    return bool(np.max(np.abs(along), initial=0.0) < _SAME)
+    return apart
 
 
 def difference(scene: LinearScene, first: FloatArray, second: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from atwood.analysis.linear.minimal import Minimal, find_minimal
-from atwood.analysis.linear.steady import Steady
+from atwood.analysis.linear.steady import Steady, pace_of
 from atwood.analysis.linear.variations import Flow, LinearScene
 from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
@@ -57,7 +57,7 @@ def find_state_space(scene: LinearScene, flow: Flow, steady: Steady, kept: Seque
     matrix = _matrix(scene, flow, steady, minimal)
     random, largest = np.random.default_rng(1974), np.zeros_like(matrix)
     now = flow.variation
-    pace = max(1e-300, float(np.max(np.abs(now.u) / scene.sizes, initial=0.0)))
+    pace = pace_of(scene, flow)
     for _ in range(_WAYS):
         other = scene.disturbed(random)
         by = ROUGHNESS * scene.displacement_sizes * random.uniform(-1.0, 1.0, len(scene.tangents))

@@ -18,7 +18,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.late import dataclass
 
-__all__ = ["Steady", "find_steady", "still"]
+__all__ = ["Steady", "find_steady", "pace_of", "still"]
 
 
 _STEADY = 1e-7
@@ -94,7 +94,7 @@ def find_steady(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> Steady:
         Independent constraints.
     """
     size = len(flow.field)
-    pace = _pace(scene, flow)
+    pace = pace_of(scene, flow)
     extents = np.concatenate([scene.displacement_sizes, scene.sizes * pace])
     sizes = extents * pace
     goal = flow.field / sizes
@@ -130,7 +130,7 @@ def still(flow: Flow) -> Steady:
     return Steady(True, np.zeros((size, size)), np.zeros((size, 0)))
 
 
-def _pace(scene: LinearScene, flow: Flow) -> float:
+def pace_of(scene: LinearScene, flow: Flow) -> float:
     """Return how fast things happen, 1/s: the largest of what speeds and accelerations say beside the scene's sizes."""
     found = [1e-300]
     found += list(np.abs(flow.variation.displacement_rates) / scene.displacement_sizes)

@@ -26,10 +26,15 @@ from atwood.theory.linearization.operating_point import OperatingPoint, find_ope
 __all__ = ["Equilibria", "Equilibrium", "equilibria"]
 
 
-_STARTS = 48
+_STARTS = 32
 """For each independent coordinate, so many starts of Newton's method, spread evenly over the region."""
 
-_MOST_STARTS = 600
+_MOST_STARTS = 400
+
+_LEAST = 48
+
+_IDLE = 24
+"""For each independent coordinate, so many starts one after another that lead to nothing new end the search."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +48,7 @@ class Equilibrium:
     stable
         Whether no small deviation grows: of the linear model, which says nothing of deviations that keep their size.
     modes
-        Its normal modes.
+        Its normal modes; where equations depend on time though the state keeps still, those at the scene's start.
     """
 
     values: Mapping[str, float]
@@ -170,11 +175,15 @@ def _search(point: OperatingPoint, bounds: FloatArray) -> tuple[list[Rest], bool
     free = max(1, len(scene.tangents) - len(point.kept))
     starts = min(_MOST_STARTS, _STARTS * free)
     found: list[Rest] = []
-    seen_moving = False
+    seen_moving, idle = False, 0
     for q in [point.q, *_places(point, bounds, starts)]:
         rest = seek_rest(scene, balance, point.t, q, point.kept)
-        if rest is None or any(same_rest(scene, one, rest) for one in found):
+        idle += 1
+        if idle > max(_LEAST, _IDLE * free):
+            break
+        if rest is None or any(same_rest(scene, one, rest, point.t, point.kept, balance) for one in found):
             continue
+        idle = 0
         if not is_at_rest(scene, rest, point.t, point.kept, _LATER):
             seen_moving = True
             continue
@@ -242,7 +251,7 @@ def _equilibrium(point: OperatingPoint, rest: Rest, bounds: FloatArray) -> Equil
     for (i, value), (_, k) in zip(_wrapped(point, rest, bounds).items(), point.scene.tangents.plain, strict=True):
         q[i] = point.q[i] if k in flat else value  # what does not matter stays where it starts
     there = moved_to(point, q, np.zeros_like(point.u))
-    modes = modes_of(there)
+    modes = modes_of(there, is_steady=True)
     speeds = set(list(values_at(there))[len(point.scene.tangents.plain) :])
     values = {path: value for path, value in values_at(there).items() if path not in speeds}
     return Equilibrium(values, modes.is_stable, modes)

@@ -184,15 +184,16 @@ def modes_of(point: OperatingPoint, is_steady: bool = False) -> NormalModes:
     point
         The operating point.
     is_steady
-        Whether it is known that nothing changes there.
+        Whether it is known that it stays there, though other things may change with time.
     """
     flow = point.scene.flow(point.t, point.q, point.u, point.kept)
-    known = is_steady or point.is_from_result
     if not is_steady:
         refuse_switches(point.scene, flow, point.kept)
-    steady = still(flow) if known else find_steady(point.scene, flow, point.kept)
+    steady = still(flow) if point.is_from_result else find_steady(point.scene, flow, point.kept)
     if not steady.is_steady:
-        raise not_steady(point, flow, steady)
+        if not is_steady:
+            raise not_steady(point, flow, steady)
+        steady = still(flow)  # it keeps still in a scene that changes, as a load that is hoisted
     space = find_state_space(point.scene, flow, steady, point.kept)
     found = find_modes(flow, space)
     names = point.scene.tangents.names
