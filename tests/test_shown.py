@@ -96,9 +96,6 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "locus": atwood.root_locus(scene, "gravity", [9.0, 10.0, 11.0], at=hanging),
         "branches": atwood.equilibrium_branches(FourBar(), "gravity", (9.0, 10.0)),
         "branch point": atwood.BranchPoint(1.0, dict.fromkeys(angles, 0.0)),
-        "equations": atwood.equations(DoublePendulum()),
-        "part of equations": atwood.equations(DoublePendulum()).terms("rod1"),
-        "dynamics": atwood.dynamics(FourBar()),
         "declared": _declared(),
         "box": atwood.solids.box(1.0, 2.0, 3.0, density=1e3),
     }

@@ -19,7 +19,12 @@ def gap(a: object, b: object) -> float:
 
 
 def test_states() -> None:
-    expected = {"chaplygin-sleigh": (3, 3, 1), "rattleback": (6, 3, 0), "ball-in-shell": (7, 6, 3)}
+    expected = {
+        "chaplygin-sleigh": (3, 3, 1),
+        "rattleback": (6, 3, 0),
+        "ball-in-shell": (7, 6, 3),
+        "benchmark-bicycle": (9, 8, 5),
+    }
     for name, numbers in expected.items():
         equations = assemble(SCENES[name]()).reduced
         found = len(equations.coordinates), len(equations.speeds), len(equations.constraints)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from atwood_library.scenes.ball_in_shell import BallInShell as BallInShell
     from atwood_library.scenes.bead_on_surface import BeadOnSurface as BeadOnSurface
     from atwood_library.scenes.bead_on_wire import BeadOnWire as BeadOnWire
+    from atwood_library.scenes.benchmark_bicycle import BenchmarkBicycle as BenchmarkBicycle
     from atwood_library.scenes.bricard import Bricard as Bricard
     from atwood_library.scenes.car_axis import CarAxis as CarAxis
     from atwood_library.scenes.chain import Chain as Chain
@@ -118,6 +119,7 @@ _CLASSES = {
     "chaplygin-sleigh": "ChaplyginSleigh",
     "rattleback": "Rattleback",
     "ball-in-shell": "BallInShell",
+    "benchmark-bicycle": "BenchmarkBicycle",
     "andrews-squeezer": "AndrewsSqueezer",
     "car-axis": "CarAxis",
     "double-cardan-twice": "DoubleCardanTwice",

@@ -13,63 +13,17 @@ from atwood_library import (
     Ground,
     Pivot,
     PointMass,
-    RigidBody,
     RollingDisc,
     RotaryDrive,
     Weld,
 )
+from atwood_library.scenes import BenchmarkBicycle
 
 
 def bicycle(heading: float = 0.0, place: Sequence[float] = (0.0, 0.0)) -> Scene:
-    """Return the benchmark bicycle (Meijaard, Papadopoulos, Ruina, Schwab, Proc. R. Soc. A 463, 2007, table 1).
-
-    Its axes are x forward and z up, the paper's x forward and z down; the whole can head anywhere.
-    """
-    base, trail, tilt = 1.02, 0.08, math.pi / 10.0
-    rear_radius, front_radius = 0.3, 0.35
-    steering = np.array([-math.sin(tilt), 0.0, math.cos(tilt)])
-    head = np.array([base + trail, 0.0, 0.0]) + 0.9 / math.cos(tilt) * steering
-    rear, front = np.array([0.0, 0.0, rear_radius]), np.array([base, 0.0, front_radius])
-    scene = Scene(space="space", gravity=9.81)
-    ground = scene.add("ground", Ground())
-    frame = scene.add(
-        "frame",
-        RigidBody(
-            mass=85.0,
-            center=tuple(np.array([0.3, 0.0, 0.9]) - rear),
-            moments=(9.2, 11.0, 2.8),
-            products=(0.0, -2.4, 0.0),
-        ),
-    )
-    to_head = scene.add("to_head", Weld(displacement=tuple(head - rear)))
-    steer = scene.add("steer", Pivot(axis=tuple(steering)))
-    fork_end = scene.add("fork_end", Weld(displacement=tuple(front - head)))
-    fork = scene.add(
-        "fork",
-        RigidBody(
-            mass=4.0,
-            center=tuple(np.array([0.9, 0.0, 0.7]) - head),
-            moments=(0.05892, 0.06, 0.00708),
-            products=(0.0, 0.00756, 0.0),
-        ),
-    )
-    scene.connect(frame.frame, to_head.a)
-    scene.connect(to_head.b, steer.a)
-    scene.connect(steer.b, fork.frame)
-    scene.connect(steer.b, fork_end.a)
-    axis = (0.0, 1.0, 0.0)
-    wheels = (
-        ("rear", frame.frame, 2.0, 0.0603, 0.12, rear_radius),
-        ("front", fork_end.b, 3.0, 0.1405, 0.28, front_radius),
-    )
-    for name, carrier, mass, across, axial, radius in wheels:
-        wheel = scene.add(name, RigidBody(mass=mass, moments=(across, axial, across)))
-        axle = scene.add(f"{name}_axle", Pivot(axis=axis))
-        contact = scene.add(f"{name}_contact", RollingDisc(radius=radius, axis=axis))
-        scene.connect(carrier, axle.a)
-        scene.connect(axle.b, wheel.frame)
-        scene.connect(ground.frame, contact.a)
-        scene.connect(contact.b, wheel.frame)
+    """Return the benchmark bicycle, which may stand anywhere and head anywhere."""
+    scene = BenchmarkBicycle()
+    del scene.start["frame.x_axis.y"], scene.start["frame.y_axis.z"]
     scene.start["frame.phi"], scene.start["frame.theta"], scene.start["frame.psi"] = heading, 0.0, 0.0
     scene.start["rear_contact.displacement_1"], scene.start["rear_contact.displacement_2"] = place
     return scene

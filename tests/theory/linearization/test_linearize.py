@@ -23,7 +23,7 @@ from atwood_library import (
     Mass1D,
     Spring,
 )
-from atwood_library.scenes import FreeBody, LagrangeTop, PendulumOnCart, SliderCrank, StewartPlatform
+from atwood_library.scenes import BenchmarkBicycle, FreeBody, LagrangeTop, PendulumOnCart, SliderCrank, StewartPlatform
 
 
 def four(model: atwood.LinearModel) -> np.ndarray:
@@ -40,6 +40,19 @@ def test_the_benchmark_bicycle_has_its_published_eigenvalues(heading: float) -> 
         found = model.spectrum.others
         for value in known:
             assert np.min(np.abs(found - value)) < 1e-12 * np.max(np.abs(known)) * (10.0 if heading else 1.0)
+
+
+def test_a_small_deviation_of_the_bicycle_moves_as_its_linear_model_says() -> None:
+    scene = BenchmarkBicycle(lean_rate=1e-3, t_end=2.0)
+    result = simulate(scene, rtol=1e-11, outputs=9)
+    at = {"rear_axle.angular_velocity": scene.speed / 0.3}
+    model = linearize(scene, at=at, outputs=["steer.angle"])
+    values = result.array("steer.angle")
+    # Every linear model fulfils its own recurrence (Cayley and Hamilton): here of the four motions that are not zero.
+    poles = np.exp(model.spectrum.others * 0.25)
+    recurrence = np.real(np.poly(np.append(poles, 1.0)))
+    left = np.convolve(values, recurrence, mode="valid")
+    assert np.max(np.abs(left)) < 1e-5 * np.max(np.abs(values)) * np.sum(np.abs(recurrence))
 
 
 def test_weave_and_capsize_speeds_of_the_bicycle() -> None:
