@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from atwood_library.joints.constant_velocity import ConstantVelocity as ConstantVelocity
     from atwood_library.joints.cylindrical import Cylindrical as Cylindrical
     from atwood_library.joints.drive import Drive as Drive
+    from atwood_library.joints.frame_on_curve import FrameOnCurve as FrameOnCurve
     from atwood_library.joints.free_joint import FreeJoint as FreeJoint
     from atwood_library.joints.gear import Gear as Gear
     from atwood_library.joints.pivot import Pivot as Pivot
@@ -141,6 +142,7 @@ _MODULES = {
     "FirstOrder": "blocks.first_order",
     "Force": "forces.force",
     "ForceSensor": "sensors.force_sensor",
+    "FrameOnCurve": "joints.frame_on_curve",
     "FrameSensor": "sensors.frame_sensor",
     "FreeJoint": "joints.free_joint",
     "Gain": "blocks.gain",
@@ -157,9 +159,9 @@ _MODULES = {
     "MinimumJerk": "sources.minimum_jerk",
     "MutualPotential": "fields.mutual_potential",
     "OrientationSensor": "sensors.orientation_sensor",
-    "PairPotential": "fields.pair_potential",
     "PI": "blocks.pi",
     "PID": "blocks.pid",
+    "PairPotential": "fields.pair_potential",
     "Pivot": "joints.pivot",
     "Planar": "joints.planar",
     "PlanetaryGear": "joints.planetary_gear",

@@ -9,6 +9,7 @@ import atwood as aw
 import atwood_library as lib
 from atwood import ParameterError, Result, Scene, simulate
 from atwood.pipeline import assemble
+from atwood_library.scenes import SCENES
 
 from ..helpers.runs import FORMS
 
@@ -208,3 +209,23 @@ def test_the_speed_along_a_curve_with_an_offset() -> None:
     result = simulate(scene, t_end=0.5, rtol=1e-10)
     speed = np.hypot(result.array("bead.velocity.x"), result.array("bead.velocity.z"))
     assert np.max(np.abs(np.abs(result.array("wire.speed")) - speed)) < 1e-9
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("space", ["plane", "space"])
+def test_a_car_on_a_round_track_is_a_compound_pendulum(form: str, space: str) -> None:
+    radius, inertia, mass = 0.8, 0.3, 1.5
+    scene = Scene(space=space)
+    ground = scene.add("ground", lib.Ground())
+    track = scene.add("track", lib.FrameOnCurve(curve=("sin(p)", 0, "-cos(p)"), scale=radius))
+    car = scene.add("car", lib.RigidBody(mass=mass, moments=(0.1, inertia, 0.2)))
+    scene.connect(ground.frame, track.a)
+    scene.connect(track.b, car.frame)
+    scene.start.update({"track.parameter": 1.0, "track.rate": 0.0})
+    result = simulate(scene, form=form, t_end=2.0, rtol=1e-11)
+    pendulum = SCENES["simple-pendulum"](length=radius + inertia / (mass * radius), t_end=2.0)
+    pendulum.start.update({"rod.angle": 1.0, "rod.angular_velocity": 0.0})
+    exact = simulate(pendulum, rtol=1e-11).array("rod.angle")
+    assert np.max(np.abs(result.array("track.parameter") - exact)) < 1e-7
+    assert np.max(np.abs(result.array("track.slope_angle") - result.array("track.parameter"))) < 1e-9
+    assert result.energy.max_drift < 1e-7

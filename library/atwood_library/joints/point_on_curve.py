@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from atwood import (
     Component,
@@ -38,7 +38,13 @@ class PointOnCurve(Component):
     from the curve, as the axle of a roller on a cam does.
     """
 
-    synonyms = ("Bead on a wire", "Curve joint", "Point on a path", "Cam with a roller", "Cam follower")
+    synonyms: ClassVar[tuple[str, ...]] = (
+        "Bead on a wire",
+        "Curve joint",
+        "Point on a path",
+        "Cam with a roller",
+        "Cam follower",
+    )
     spaces = ("plane", "space")
 
     curve: Any = parameter(
