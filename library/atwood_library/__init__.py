@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from atwood_library.blocks.pid import PID as PID
     from atwood_library.blocks.sample_and_hold import SampleAndHold as SampleAndHold
     from atwood_library.blocks.sample_delay import SampleDelay as SampleDelay
+    from atwood_library.blocks.sampled_feedback import SampledFeedback as SampledFeedback
     from atwood_library.blocks.second_order import SecondOrder as SecondOrder
     from atwood_library.blocks.state_space import StateSpace as StateSpace
     from atwood_library.blocks.transfer_function import TransferFunction as TransferFunction
@@ -199,6 +200,7 @@ _MODULES = {
     "RotationalSpringDamper": "drives.rotational_spring_damper",
     "SampleAndHold": "blocks.sample_and_hold",
     "SampleDelay": "blocks.sample_delay",
+    "SampledFeedback": "blocks.sampled_feedback",
     "Screw": "joints.screw",
     "SecondOrder": "blocks.second_order",
     "Sine": "sources.sine",

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from atwood_library.scenes.benchmark_bicycle import BenchmarkBicycle as BenchmarkBicycle
     from atwood_library.scenes.bricard import Bricard as Bricard
     from atwood_library.scenes.car_axis import CarAxis as CarAxis
+    from atwood_library.scenes.cart_pole import CartPole as CartPole
     from atwood_library.scenes.chain import Chain as Chain
     from atwood_library.scenes.chaplygin_sleigh import ChaplyginSleigh as ChaplyginSleigh
     from atwood_library.scenes.charged_particle import ChargedParticle as ChargedParticle
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from atwood_library.scenes.four_bar_row import FourBarRow as FourBarRow
     from atwood_library.scenes.free_body import FreeBody as FreeBody
     from atwood_library.scenes.free_symmetric_body import FreeSymmetricBody as FreeSymmetricBody
+    from atwood_library.scenes.furuta_pendulum import FurutaPendulum as FurutaPendulum
     from atwood_library.scenes.gyroscope import Gyroscope as Gyroscope
     from atwood_library.scenes.heavy_top import HeavyTop as HeavyTop
     from atwood_library.scenes.intermediate_axis import IntermediateAxis as IntermediateAxis
@@ -48,6 +50,7 @@ if TYPE_CHECKING:
     from atwood_library.scenes.overhead_crane import OverheadCrane as OverheadCrane
     from atwood_library.scenes.pendulum_on_cart import PendulumOnCart as PendulumOnCart
     from atwood_library.scenes.pulley_with_inertia import PulleyWithInertia as PulleyWithInertia
+    from atwood_library.scenes.quarter_car import QuarterCar as QuarterCar
     from atwood_library.scenes.rattleback import Rattleback as Rattleback
     from atwood_library.scenes.rigid_bodies import RigidBodies as RigidBodies
     from atwood_library.scenes.rolling_ball import RollingBall as RollingBall
@@ -125,6 +128,9 @@ _CLASSES = {
     "double-cardan-twice": "DoubleCardanTwice",
     "scott-russell-lift": "ScottRussellLift",
     "strandbeest": "Strandbeest",
+    "cart-pole": "CartPole",
+    "quarter-car": "QuarterCar",
+    "furuta-pendulum": "FurutaPendulum",
 }
 """The class of each scene by the name that the command line knows it by."""
 
