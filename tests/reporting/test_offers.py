@@ -28,7 +28,9 @@ from atwood import (
     select,
     simulate,
 )
+from atwood.analysis.free_scene import LooseScene
 from atwood.reporting import Offer
+from atwood.simulation.initialization.start import find_start
 from atwood_library import (
     Box,
     Cone,
@@ -52,6 +54,7 @@ from atwood_library.scenes import (
     DoublePendulum,
     DrivenPendulum,
     FoucaultPendulum,
+    FourBar,
     FreeBody,
     LagrangeTop,
     PendulumOnCart,
@@ -449,3 +452,21 @@ def test_welded_bodies_with_turns_may_be_offered() -> None:
     scene.connect(rod.b, bob.point)
     scene.guess.update({"bob.position.x": 1.0, "bob.position.y": 0.0, "bob.position.z": -0.9})
     assert offers(scene) == ()
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-6, 1e6])
+def test_no_unit_of_length_decides(scale: float) -> None:
+    lengths = {"crank_length": 1.0, "coupler_length": 2.5, "rocker_length": 2.0, "frame_length": 2.5}
+    scene = FourBar(space="space", **{name: scale * length for name, length in lengths.items()})
+    scene.gravity = 9.81 * scale
+    assembly = atwood.assemble(scene)
+    start = find_start(assembly)
+    loose = LooseScene(assembly, start)
+    still = np.zeros(len(loose.sizes))
+    now, bodies = loose.at(0.0, start.coordinates, still)
+    rows = np.concatenate([now.jacobian[loose.holonomic], *bodies.by_place]) * loose.sizes
+    sizes, units = np.max(np.abs(rows), axis=1), loose.row_units(0.0, start.coordinates, rows, len(bodies.by_place) * 3)
+    known = sizes > 1e-9 * scale  # of the constraints some hold what stays in the plane anyway
+    assert np.array_equal(units[known], sizes[known])
+    assert np.all(units[~known] > 1e-6 * scale)
+    assert [one.space for one in report(scene).offers] == ["plane"]

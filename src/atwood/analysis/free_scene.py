@@ -9,6 +9,7 @@ import numpy as np
 from atwood.analysis.freeing import Loosened, loosen
 from atwood.arrays import FloatArray
 from atwood.codegen import compile_program
+from atwood.codegen.rounding import ROUGHNESS
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
@@ -17,7 +18,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, solve_balance
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
-from atwood.simulation.dynamics.rank import independent_rows
+from atwood.simulation.dynamics.rank import certain, independent_rows
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start
 
@@ -91,6 +92,25 @@ class LooseScene:
     def exactly(self) -> None:
         """Take what they are."""
         self.bound = self._exact.bind(self.assembly.parameter_values)
+
+    def row_units(self, t: float, q: FloatArray, rows: FloatArray, shifts: int) -> FloatArray:
+        """Return the size of each row, and of one that is rounding alone the size of what it is computed from.
+
+        Parameters
+        ----------
+        t, q
+            Where they belong.
+        rows
+            Those of the constraints on positions, then so many of displacements, then those of rotations.
+        shifts
+            How many belong to displacements.
+        """
+        held = self._errors.near(t, q, self.sizes)[self.holonomic] / ROUGHNESS
+        turns = len(rows) - len(held) - shifts
+        made_of = np.concatenate([held, np.full(shifts, self.start.length), np.ones(turns)])
+        sizes = np.max(np.abs(rows), axis=1, initial=0.0)
+        is_known = sizes > certain(ROUGHNESS * made_of, sizes)
+        return np.where(is_known, sizes, np.where(made_of > 0.0, made_of, 1.0))
 
     def at(self, t: float, q: FloatArray, u: FloatArray, a: FloatArray | None = None) -> tuple[BalanceValues, Bodies]:
         """Return the balance of forces and the bodies at a state, with accelerations these in place of speeds."""

@@ -224,8 +224,7 @@ def _place(scene: LooseScene, one: Symmetry, t: float, first: Bodies, random: np
             now, bodies = scene.at(t, q, still)
             misses = np.concatenate([now.value[scene.holonomic], _misses(one, bodies, first)])
             slopes = np.concatenate([now.jacobian[scene.holonomic], _slopes(one, bodies)]) * scene.sizes
-            rows = np.max(np.abs(slopes), axis=1, initial=0.0)
-            rows[rows < 1e-12 * max(scene.start.length, 1.0)] = 1.0
+            rows = scene.row_units(t, q, slopes, bodies.by_place.shape[0] * len(_outward(one)[0]))
             miss = float(np.max(np.abs(misses / rows), initial=0.0))
             if miss < 1e-12 or (miss < 1e-10 and miss > 0.5 * last):
                 return q
