@@ -17,7 +17,7 @@ from timing import at_error, best_of, number, options, print_table, ratio, save
 from atwood import Result, Scene, assemble, simulate
 from atwood_library.scenes import FreeBody, HeavyTop, LagrangeTop
 
-KINDS = ("quaternion", "rodrigues", "rotation-vector", "euler-zyz", "euler-xyz")
+KINDS = ("quaternion", "euler-zyz", "euler-xyz")
 
 CASES: dict[str, tuple[Callable[[], Scene], str, float]] = {
     "free-body": (lambda: FreeBody(moments=(1.0, 2.0, 3.0), spin=(1.0, 0.2, 1.3)), "body", 200.0),

@@ -95,10 +95,10 @@ def assemble(
     level
         Of the dae form: ``"ggl"``, ``"index1-projected"`` or ``"index1"``.
     orientation
-        In which coordinates the reduced form has orientations in space: ``"quaternion"``, ``"rodrigues"`` (modified
-        Rodrigues parameters), ``"rotation-vector"``, or Euler angles such as ``"euler-zyz"``, in any of the twelve
-        conventions, as turns about axes of the frame that the turns before have made. Three coordinates are restated
-        along a run before they become singular. The speeds are the angular velocity in the axes of the body in all.
+        In which coordinates the reduced form has orientations in space: ``"quaternion"``, or Euler angles
+        such as ``"euler-zyz"``, in any of the twelve conventions, as turns about axes of the frame that the turns
+        before have made. Euler angles are switched along a run before they become singular. The speeds are the angular
+        velocity in the axes of the body in both.
     name
         What to call the scene.
 

@@ -14,16 +14,16 @@ def run(*arguments: str) -> Result:
     return CliRunner().invoke(main, list(arguments))
 
 
-def test_a_run_says_when_coordinates_were_restated() -> None:
-    done = run("run", "lagrange-top", "--orientation", "rodrigues", "--t-end", "1")
+def test_a_run_says_when_coordinates_were_switched() -> None:
+    done = run("run", "lagrange-top", "--orientation", "euler-xzy", "--t-end", "1")
     assert done.exit_code == 0, done.stderr
     assert "6 states" in done.stdout
-    assert "rodrigues, restated" in done.stdout
-    data = json.loads(run("run", "lagrange-top", "--orientation", "rodrigues", "--t-end", "1", "--json").stdout)
-    assert data["orientation"] == "rodrigues"
+    assert "euler-xzy, switched" in done.stdout
+    data = json.loads(run("run", "lagrange-top", "--orientation", "euler-xzy", "--t-end", "1", "--json").stdout)
+    assert data["orientation"] == "euler-xzy"
     assert len(data["restated"]) > 3
     assert {one["body"] for one in data["restated"]} == {"top"}
-    assert "top.rodrigues.x" in data["coordinates"]
+    assert "top.euler.theta" in data["coordinates"]
     usual = json.loads(run("run", "lagrange-top", "--t-end", "1", "--json").stdout)
     assert (usual["orientation"], usual["restated"], usual["states"]) == ("quaternion", [], 7)
     assert usual["end"].keys() == data["end"].keys()
@@ -40,7 +40,7 @@ def test_the_report_has_the_coordinates_that_were_asked_for() -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
-    [(("--orientation", "euler-zyy"), "euler-zyz"), (("--orientation", "rodrigues", "--form", "dae"), "reduced form")],
+    [(("--orientation", "euler-zyy"), "euler-zyz"), (("--orientation", "euler-zyz", "--form", "dae"), "reduced form")],
 )
 def test_what_there_is_not_is_refused(arguments: tuple[str, ...], said: str) -> None:
     done = run("run", "lagrange-top", *arguments)

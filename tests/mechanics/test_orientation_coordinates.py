@@ -33,9 +33,7 @@ def places(kind: str) -> list[list[float]]:
     """Return coordinates to look at: some, and those of no rotation or a long one, where they are regular."""
     if kind == "quaternion":
         return [[0.5, -0.7, 0.3, 0.4]]
-    if kind.startswith("euler-"):
-        return [[0.4, 1.1, -0.8], [2.5, 0.6 if kind[6] == kind[8] else -0.3, 3.0]]
-    return [[0.3, -0.5, 0.2], [0.0, 0.0, 0.0], [1e-9, -2e-9, 1e-10], [-0.6, 0.9, 0.5]]
+    return [[0.4, 1.1, -0.8], [2.5, 0.6 if kind[6] == kind[8] else -0.3, 3.0]]
 
 
 def numbers(kind: str, base: int, at: list[float]) -> dict[str, Any]:
@@ -91,15 +89,6 @@ def test_euler_angles_are_turns_about_axes_that_have_turned(kind: str) -> None:
     assert np.allclose(numbers(kind, 1, angles)["axes"], base @ turned, atol=1e-15)
 
 
-def test_a_rotation_vector_is_exact_up_to_a_full_turn() -> None:
-    axis = np.array([0.36, -0.48, 0.8])
-    for angle in (1e-8, 0.1, 1.0, 3.0, 4.5, 6.2):
-        found = numbers("rotation-vector", 0, list(axis * angle))
-        assert np.allclose(found["axes"], about(axis, angle), atol=1e-14)
-        # Near a full turn the rates grow without bound, and rounding with them.
-        assert np.allclose(found["moving"], found["axes"] @ cross_matrix(SPIN), atol=1e-13 / (6.3 - angle))
-
-
 @pytest.mark.parametrize("kind", ORIENTATIONS)
 def test_every_chart_tells_before_it_is_singular(kind: str) -> None:
     graph = Graph()
@@ -113,15 +102,10 @@ def test_every_chart_tells_before_it_is_singular(kind: str) -> None:
         assert margin is not None
         return float(evaluate([margin], dict(zip(symbols, values, strict=True)))[0])
 
-    if kind.startswith("euler-"):
-        singular = 0.0 if kind[6] == kind[8] else np.pi / 2.0
-        assert at(0.0, singular, 0.0) > 0.0
-        assert at(0.0, singular + 0.4, 0.0) > 0.0
-        assert at(0.0, singular + 0.5, 0.0) < 0.0
-    else:
-        full = np.inf if kind == "rodrigues" else 2.0 * np.pi
-        half = 1.0 if kind == "rodrigues" else np.pi
-        assert at(half, 0.0, 0.0) < 0.0 < at(0.0, min(full, 1.3 * half), 0.0)
+    singular = 0.0 if kind[6] == kind[8] else np.pi / 2.0
+    assert at(0.0, singular, 0.0) > 0.0
+    assert at(0.0, singular + 0.4, 0.0) > 0.0
+    assert at(0.0, singular + 0.5, 0.0) < 0.0
 
 
 def test_what_there_is_not_is_refused_with_what_is_near() -> None:
@@ -131,5 +115,8 @@ def test_what_there_is_not_is_refused_with_what_is_near() -> None:
         check_orientation("euler-zzy", "reduced")
     assert "euler-zyz" in str(caught.value)
     with pytest.raises(UsageError, match="quaternions"):
-        check_orientation("rodrigues", "dae")
-    assert len(ORIENTATIONS) == 15
+        check_orientation("euler-zyz", "dae")
+    for kind in ("rodrigues", "rotation-vector"):
+        with pytest.raises(UsageError, match="euler-zyz"):
+            check_orientation(kind, "reduced")
+    assert len(ORIENTATIONS) == 13

@@ -19,7 +19,7 @@ from ..references.rotations import about, about_x, angle_between
 from .test_orientations import caught, linkage, top
 
 OTHERS = ORIENTATIONS[1:]
-FEW = ("rodrigues", "rotation-vector", "euler-zyz", "euler-yxz")
+FEW = ("euler-zyz", "euler-yxz")
 MOMENTS = (1.0, 2.0, 3.0)
 
 
@@ -75,7 +75,7 @@ def test_energy_and_momentum_stay_while_charts_change(kind: str, solver: str, rt
     size = np.linalg.norm(momentum, axis=-1)
     assert np.max(np.abs(size - size[0])) < 1e-12 * size[0]
     assert np.max(np.abs(momentum - momentum[0])) < 1e-11 * size[0]
-    if kind in ("rodrigues", "rotation-vector", "euler-zyz"):
+    if kind == "euler-zyz":
         assert len(result.coordinate_switches) > 2
         assert all(one.body == "body" for one in result.coordinate_switches)
         assert np.all(np.diff([one.time for one in result.coordinate_switches]) > 0.0)
@@ -92,17 +92,6 @@ def test_as_few_states_as_regular_coordinates_can_have(kind: str) -> None:
     assert found.states["reduced"] == 6 + more
     assert found.degrees_of_freedom == 3
     assert (kind == "quaternion") == any("quaternion" in name for name in found.coordinates + found.free_coordinates)
-
-
-@pytest.mark.parametrize("kind", ["rodrigues", "rotation-vector"])
-def test_changes_of_chart_are_counted(kind: str) -> None:
-    """A body that turns uniformly about z has its coordinates restated once a turn, soon after the angle for it."""
-    result = simulate(FreeBody(spin=(0.0, 0.0, 2.0)), orientation=kind, t_end=20.0, rtol=1e-10, outputs=5)
-    first = 2.0 * np.arctan(np.sqrt(1.5)) if kind == "rodrigues" else 1.15 * np.pi / 2.0
-    late = np.array([one.time for one in result.coordinate_switches]) - first - np.pi * np.arange(6)
-    assert np.all((late >= 0.0) & (late < 1.0))
-    turned = about([0.0, 0.0, 1.0], 2.0 * result.time)
-    assert np.max(angle_between(axes(result), turned)) < 1e-9
 
 
 @pytest.mark.sample(4)
@@ -219,7 +208,7 @@ def test_scenes_that_roll_and_stand_on_legs_have_any_coordinates(name: str, kind
             assert np.allclose(other[path], exact[path], atol=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["rodrigues", "euler-zyz"])
+@pytest.mark.parametrize("kind", ["euler-xyz", "euler-zyz"])
 def test_other_values_and_sweeps_keep_the_coordinates(kind: str) -> None:
     masses, path = [0.5, 1.0, 2.0], "body.x_axis.y"
     assembly = assemble(top(), orientation=kind)

@@ -289,7 +289,7 @@ def test_a_disc_that_starts_flat_is_named(form: str) -> None:
         simulate(scene, form=form)
 
 
-@pytest.mark.parametrize("orientation", ["rodrigues", "rotation-vector", "euler-zyz"])
+@pytest.mark.parametrize("orientation", ["euler-yxz", "euler-zyz"])
 def test_three_coordinates_of_orientation_do_as_well(orientation: str) -> None:
     made = simulate(assemble(tumbling(), orientation=orientation), rtol=1e-12, outputs=11)
     motion = uniform_disc(0.5, 2.0).motion(made.time, ANGLES, RATES, (0.1, -0.2))

@@ -110,7 +110,7 @@ def test_the_report_drops_the_spin_from_the_freedom() -> None:
 
 
 @pytest.mark.parametrize("solver", ["explicit", "taylor"])
-@pytest.mark.parametrize("orientation", ["quaternion", "rotation-vector", "euler-zyx"])
+@pytest.mark.parametrize("orientation", ["quaternion", "euler-xyz", "euler-zyx"])
 def test_no_constraint_is_left_where_there_is_no_loop(solver: str, orientation: str) -> None:
     scene = spun(hang(Link(length=1.0, mass=2.0), WELDS[1]))
     ida = simulate(scene, rtol=1e-10, outputs=5, solver="ida")

@@ -72,7 +72,7 @@ def _other_way(random: np.random.Generator, mechanism: Mechanism) -> Way:
         return Way("dae", level, str(random.choice(["ida", "ida-sundae"])), start="all")
     orientation = "quaternion"
     if mechanism.space == "space":
-        orientation = str(random.choice(["quaternion", "rodrigues", "rotation-vector", "euler-xyz", "euler-zyz"]))
+        orientation = str(random.choice(["quaternion", "euler-zyx", "euler-xyz", "euler-zyz"]))
     return Way("reduced", "ggl", str(random.choice(["auto", "ida"])), orientation, "all")
 
 

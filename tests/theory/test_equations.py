@@ -615,8 +615,6 @@ def test_sympy_is_not_imported_before_somebody_asks_for_it() -> None:
 def test_arguments_are_checked() -> None:
     with pytest.raises(UsageError, match="parameters cannot be 'numbers'"):
         equations(SCENES["simple-pendulum"](), parameters="numbers")
-    with pytest.raises(UsageError, match="no velocities that one would read"):
-        equations(SCENES["lagrange-top"](), orientation="rodrigues")
 
 
 def test_fractions_are_exact() -> None:

@@ -202,13 +202,6 @@ def lagrangian_of(assembly: Assembly, form: FormName | None = None) -> Lagrangia
         If orientations are in three coordinates that are no Euler angles.
     """
     equations = assembly.in_coordinates(form or assembly.form)
-    for orientation in equations.orientation_coordinates:
-        if not orientation.is_homogeneous and not orientation.kind.startswith("euler-"):
-            raise UsageError(
-                f"the derivatives of {orientation.kind} coordinates are no velocities that one would read",
-                where=assembly.flat.name,
-                advice="Take quaternions, for Euler's equations, or Euler angles such as euler-zxz.",
-            )
     made = _along_speeds(assembly, equations)
     return _along_angles(made) if any(c.kind.startswith("euler-") for c in equations.orientation_coordinates) else made
 

@@ -109,7 +109,7 @@ _ORIENTATION = click.option(
     default="quaternion",
     show_default=True,
     metavar="NAME",
-    help="Coordinates of orientations in space: quaternion, rodrigues, rotation-vector, euler-zyz and its like.",
+    help="Coordinates of orientations in space: quaternion, or Euler angles such as euler-zyz.",
 )
 
 

@@ -100,7 +100,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         times = sorted({one.time for one in result.coordinate_switches})
         often = count_of(len(result.coordinate_switches), "time")
         span = f"at t = {times[0]:.6g} s" if len(times) == 1 else f"from t = {times[0]:.6g} to {times[-1]:.6g} s"
-        yield "orientation", f"{result.assembly.orientation.kind}, restated {often} {span}"
+        yield "orientation", f"{result.assembly.orientation.kind}, switched {often} {span}"
     yield (
         "solver",
         f"{solver_name(result)}, {count_of(statistics.steps, 'step')}, {statistics.residual_evaluations} residuals, "

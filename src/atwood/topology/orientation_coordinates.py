@@ -1,4 +1,4 @@
-"""Charts: groups of coordinates that stand for an orientation together, and which kind of them a scene uses."""
+"""Orientation coordinates: which kind of them a scene uses, and the coordinates of one orientation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["ORIENTATIONS", "Orientation", "OrientationCoordinates", "check_orien
 
 _EULER = tuple(f"euler-{a}{b}{c}" for a, b, c in product("xyz", repeat=3) if a != b != c)
 
-ORIENTATIONS = ("quaternion", "rodrigues", "rotation-vector", *_EULER)
+ORIENTATIONS = ("quaternion", *_EULER)
 """In which coordinates orientations can be."""
 
 
@@ -37,17 +37,15 @@ class OrientationCoordinates:
     """Coordinates of an orientation, whose rates are not the speeds that belong to them.
 
     The size of a quaternion means nothing, nor that of a direction: everything that is computed from them is the same
-    for any multiple. So no constraint holds it, and whoever hands a state on may bring it back to one. Three
-    coordinates are singular somewhere and are restated before they come near.
+    for any multiple. So no constraint holds it, and whoever hands a state on may bring it back to one. Euler
+    angles are singular somewhere and are switched before they come near.
 
     Attributes
     ----------
     kind
-        ``"quaternion"``: scalar part first. ``"rodrigues"``: the modified Rodrigues parameters, the axis times the
-        tangent of a quarter of the angle. ``"rotation-vector"``: the axis times the angle. ``"euler-zyz"`` and its
-        like: angles of turns one after another about axes of the frame that those before have made. Of all these the
-        speeds are the angular velocity in the axes of the body. ``"direction"``: cosine and sine of an angle in a
-        plane; the speed is the angle's.
+        ``"quaternion"``: scalar part first. ``"euler-zyz"`` and its like: angles of turns one after another about axes
+        of the frame that those before have made. Of both the speeds are the angular velocity in the axes of the body.
+        ``"direction"``: cosine and sine of an angle in a plane; the speed is the angle's.
     coordinates, speeds
         Their numbers.
     body
@@ -95,12 +93,7 @@ def coordinates_of(kind: str, body: str) -> list[tuple[str, str]]:
     """
     if kind.startswith("euler-"):
         return [(f"{body}.euler.{name}", "rad") for name in ("phi", "theta", "psi")]
-    parts, unit = {
-        "quaternion": ("wxyz", "1"),
-        "rodrigues": ("xyz", "1"),
-        "rotation-vector": ("xyz", "rad"),
-    }[kind]
-    return [(f"{body}.{kind.replace('-', '_')}.{part}", unit) for part in parts]
+    return [(f"{body}.quaternion.{part}", "1") for part in "wxyz"]
 
 
 def check_orientation(kind: str, form: str) -> None:
@@ -119,7 +112,11 @@ def check_orientation(kind: str, form: str) -> None:
         If there are no such coordinates, or the form does not have them.
     """
     if kind not in ORIENTATIONS:
-        raise UsageError(f"there are no coordinates of orientations {kind!r}", advice=suggestion(kind, ORIENTATIONS))
+        raise UsageError(
+            f"there are no coordinates of orientations {kind!r}",
+            advice=suggestion(kind, ORIENTATIONS)
+            or "There are quaternions ('quaternion') and Euler angles in the twelve conventions, such as 'euler-zyz'.",
+        )
     if form == "dae" and kind != "quaternion":
         raise UsageError(
             f"the dae form has orientations as quaternions, not {kind!r}",

@@ -38,12 +38,6 @@ class KinematicMap:
         homogeneous = [orientation for orientation in program.orientation_coordinates if orientation.is_homogeneous]
         self._homogeneous = [np.asarray(orientation.coordinates, dtype=np.intp) for orientation in homogeneous]
         self._kinds = [orientation.kind for orientation in homogeneous]
-        vectors = [
-            orientation.coordinates
-            for orientation in program.orientation_coordinates
-            if orientation.kind == "rotation-vector"
-        ]
-        self._vectors = [np.asarray(one, dtype=np.intp) for one in vectors]
 
     @property
     def is_plain(self) -> bool:
@@ -112,19 +106,12 @@ class KinematicMap:
         return np.asarray(np.linalg.lstsq(matrix, target - q, rcond=None)[0], dtype=float)
 
     def normalized(self, q: FloatArray) -> FloatArray:
-        """Return coordinates with orientations of size one: one state, or many of shape (coordinates, samples).
-
-        Rotation vectors of more than three quarters of a turn go the other way round.
-        """
-        if not self._homogeneous and not self._vectors:
+        """Return coordinates with orientations of size one: one state, or many of shape (coordinates, samples)."""
+        if not self._homogeneous:
             return q
         q = np.array(q, dtype=float)
         for orientation in self._homogeneous:
             q[orientation] /= np.sqrt(np.sum(q[orientation] ** 2, axis=0))
-        for orientation in self._vectors:
-            size = np.sqrt(np.sum(q[orientation] ** 2, axis=0))
-            turns = np.where(size > 1.5 * np.pi, np.round(size / (2.0 * np.pi)), 0.0)
-            q[orientation] *= 1.0 - 2.0 * np.pi * turns / np.where(turns > 0.0, size, 1.0)
         return q
 
     def needs_normalization(self, q: FloatArray) -> bool:

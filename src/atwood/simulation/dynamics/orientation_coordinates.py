@@ -1,8 +1,7 @@
-"""Changes of chart along a run, in numbers: orientations from any coordinates to any others.
+"""Switches of orientation coordinates along a run, in numbers: from any coordinates to any others.
 
-Three coordinates are left before they become singular. Modified Rodrigues parameters and rotation vectors have other
-values for the same orientation, which fulfil the same equations; Euler angles go on from another base, with equations
-of their own. The speeds are the angular velocity in the axes of the body before and after.
+Euler angles are left before they become singular, and go on from another base, with equations of their own. The speeds
+are the angular velocity in the axes of the body before and after.
 """
 
 from __future__ import annotations
@@ -18,8 +17,6 @@ from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.orientation_coordinates import (
     FARTHEST_COSINE,
-    FARTHEST_RODRIGUES,
-    FARTHEST_ROTATION,
     orientation_margin,
 )
 from atwood.mechanics.outputs.event_functions import EventFunction
@@ -33,20 +30,19 @@ __all__ = [
     "own_names",
     "switch_coordinates",
     "switch_functions",
-    "switched",
     "to_regular",
 ]
 
 Reassemble = Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float], Orientation], Assembly]
 
 COORDINATE_SWITCH = "coordinate switch"
-"""Target of the event that a chart is to be left."""
+"""Target of the event that orientation coordinates are to be switched."""
 
 _NEARLY = 0.95
-"""What is so near to where a chart is left leaves it with another that is there."""
+"""What is so near to where coordinates are switched is switched with another that is there."""
 
 _FARTHEST_STEP = 2.0
-"""Angle that a body may turn in a step, rad: together with the margin of a chart it is less than a full turn."""
+"""Angle that a body may turn in a step, rad: together with their margin it is less than a full turn."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ class CoordinateSwitch:
 
 
 def switch_functions(equations: Equations) -> tuple[EventFunction, ...]:
-    """Return what tells that a chart is to be left."""
+    """Return what tells that orientation coordinates are to be switched."""
     found = []
     for body_orientation in equations.orientation_coordinates:
         margin = orientation_margin(body_orientation, [equations.coordinates[i] for i in body_orientation.coordinates])
@@ -136,10 +132,10 @@ def own_names(assembly: Assembly, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def longest_step(equations: Equations, u: FloatArray) -> float:
-    """Return the longest step that an explicit method may take in charts that can be left, s; perhaps infinite.
+    """Return the longest step that an explicit method may take with coordinates that can be switched, s or infinity.
 
-    A uniform turn is no more than a straight line in some of them, and its steps would grow until rounding is
-    amplified; and a step that is longer than the margin of a chart could pass its singular place unseen.
+    A uniform turn is a straight line in some of them, and its steps would grow until rounding is amplified; and a
+    step that is longer than the margin could pass its singular place unseen.
 
     Parameters
     ----------
@@ -163,39 +159,8 @@ def _plain(equations: Equations) -> list[str]:
     return [one.name for i, one in enumerate(equations.names) if i not in turned]
 
 
-def switched(assembly: Assembly, q: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the same place with long rotations the other way round, which fulfil the same equations.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    q
-        Its coordinates.
-
-    Returns
-    -------
-    q
-        The coordinates after that.
-    bodies
-        Which orientations have changed; none of those that are Euler angles.
-    """
-    q, bodies = q.copy(), []
-    for body_orientation in assembly.equations.orientation_coordinates:
-        own = list(body_orientation.coordinates)
-        size = float(np.linalg.norm(q[own]))
-        if body_orientation.kind == "rodrigues" and size * size > _NEARLY * FARTHEST_RODRIGUES:
-            q[own] /= -(size * size)
-        elif body_orientation.kind == "rotation-vector" and size > _NEARLY * FARTHEST_ROTATION:
-            q[own] *= 1.0 - 2.0 * np.pi * max(1.0, round(size / (2.0 * np.pi))) / size
-        else:
-            continue
-        bodies.append(body_orientation.body)
-    return q, tuple(bodies)
-
-
 def switch_coordinates(assembly: Assembly, q: FloatArray, reassemble: Reassemble) -> tuple[Assembly, FloatArray]:
-    """Return a scene in charts that are far from singular, and its coordinates there.
+    """Return a scene in coordinates that are far from singular, and its coordinates there.
 
     Parameters
     ----------
@@ -204,7 +169,7 @@ def switch_coordinates(assembly: Assembly, q: FloatArray, reassemble: Reassemble
     q
         Its generalized coordinates with quaternions.
     reassemble
-        Gives the scene in other charts.
+        Gives the scene in other coordinates.
     """
     orientation = assembly.orientation
     if not orientation.kind.startswith("euler-"):
@@ -237,22 +202,16 @@ def _matrix(base: int, quaternion: FloatArray) -> FloatArray:
 
 
 def _quaternion(body_orientation: OrientationCoordinates, values: FloatArray) -> FloatArray:
-    """Return unit quaternions from coordinates of a chart."""
+    """Return unit quaternions from orientation coordinates."""
     if body_orientation.is_homogeneous:
         return np.asarray(values / np.sqrt(np.sum(values**2, axis=0)))
-    if body_orientation.kind.startswith("euler-"):
-        found = np.array([1.0, 0.0, 0.0, 0.0] if body_orientation.base == 0 else [0.5, 0.5, 0.5, 0.5])
-        found = found.reshape(4, *[1] * (values.ndim - 1)) * np.ones(values.shape[1:])
-        for axis, angle in zip(body_orientation.turns, values, strict=True):
-            turn = np.zeros_like(found)
-            turn[0], turn[1 + axis] = np.cos(0.5 * angle), np.sin(0.5 * angle)
-            found = _product(found, turn)
-        return found
-    square = np.sum(values**2, axis=0)
-    if body_orientation.kind == "rodrigues":
-        return np.asarray(np.concatenate([[1.0 - square], 2.0 * values]) / (1.0 + square))
-    size = np.sqrt(square)
-    return np.concatenate([[np.cos(0.5 * size)], 0.5 * values * np.sinc(0.5 * size / np.pi)])
+    found = np.array([1.0, 0.0, 0.0, 0.0] if body_orientation.base == 0 else [0.5, 0.5, 0.5, 0.5])
+    found = found.reshape(4, *[1] * (values.ndim - 1)) * np.ones(values.shape[1:])
+    for axis, angle in zip(body_orientation.turns, values, strict=True):
+        turn = np.zeros_like(found)
+        turn[0], turn[1 + axis] = np.cos(0.5 * angle), np.sin(0.5 * angle)
+        found = _product(found, turn)
+    return found
 
 
 def _product(p: FloatArray, q: FloatArray) -> FloatArray:
@@ -267,17 +226,10 @@ def _product(p: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def _coordinates(body_orientation: OrientationCoordinates, quaternion: FloatArray) -> FloatArray:
-    """Return coordinates of a chart from unit quaternions."""
+    """Return orientation coordinates from unit quaternions."""
     if body_orientation.is_homogeneous:
         return quaternion
-    if body_orientation.kind.startswith("euler-"):
-        return _euler_angles(body_orientation.turns, _matrix(body_orientation.base, quaternion))
-    short = np.where(quaternion[0] < 0.0, -1.0, 1.0) * quaternion
-    if body_orientation.kind == "rodrigues":
-        return np.asarray(short[1:] / (1.0 + short[0]))
-    sine = np.sqrt(np.sum(short[1:] ** 2, axis=0))
-    half = np.arctan2(sine, short[0])
-    return np.asarray(short[1:] * 2.0 * np.where(sine > 0.0, half / np.where(sine > 0.0, sine, 1.0), 1.0))
+    return _euler_angles(body_orientation.turns, _matrix(body_orientation.base, quaternion))
 
 
 def _euler_angles(turns: tuple[int, int, int], matrix: FloatArray) -> FloatArray:

@@ -58,9 +58,6 @@ def coordinate_scales(equations: Equations, length: float) -> FloatArray:
     sizes = np.array([length if one.unit == "m" else 1.0 for one in equations.names])
     for i, one in enumerate(equations.states, start=equations.placing):
         sizes[i] = one.nominal or sizes[i]
-    for orientation in equations.orientation_coordinates:
-        if orientation.kind == "rodrigues":
-            sizes[list(orientation.coordinates)] = 0.25  # the tangent of a quarter of an angle
     return sizes
 
 

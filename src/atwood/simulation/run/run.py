@@ -315,7 +315,6 @@ class _Walk:
             return recorder, outcome
         self.segments.append(recorder.segment(self.impact, after_time_event))
         self.statistics = self.statistics + outcome.statistics
-        self.coordinate_switches += outcome.coordinate_switches
         for choice in outcome.choices:
             if not self.choices or choice.solver != self.choices[-1].solver:
                 self.choices.append(choice)

@@ -18,9 +18,6 @@ from atwood.late import dataclass
 from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
-    CoordinateSwitch,
-    longest_step,
-    switched,
 )
 from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.dynamics.undefined_values import find_undefined_value, states_ahead
@@ -96,8 +93,6 @@ class Outcome:
         What solved it, one after the other.
     error
         What went wrong, where that names a part.
-    switched
-        Orientations that went on in other coordinates.
     noted
         Events on the way that change nothing.
     """
@@ -109,7 +104,6 @@ class Outcome:
     choices: tuple[Choice, ...]
     event: EventRecord | None = None
     error: SolveError | None = None
-    coordinate_switches: tuple[CoordinateSwitch, ...] = ()
     noted: tuple[EventRecord, ...] = ()
 
 
@@ -177,7 +171,6 @@ class _Runner:
         self.session: Session | None = None
         self.monitor: SingularityMonitor | None = None
         self.request: SolverRequest | None = None
-        self.coordinate_switches: list[CoordinateSwitch] = []
         self.noted: list[EventRecord] = []
 
     def run(self, t: float, y: FloatArray, yp: FloatArray) -> Outcome:
@@ -193,9 +186,7 @@ class _Runner:
                     session = self.session or session
                 if step_result is not None and step_result.status is Status.STIFF:
                     session = self._open(*self._change_solver(step_result))
-                elif step_result is None or not (
-                    self._notes(step_result) or self._switches_coordinates(session, step_result)
-                ):
+                elif step_result is None or not self._notes(step_result):
                     break
             return self._outcome(step_result)
         except KeyboardInterrupt:  # from the progress function, or between two steps; what is there already is kept
@@ -235,7 +226,6 @@ class _Runner:
             message,
             self._cost(),
             tuple(self.choices),
-            coordinate_switches=tuple(self.coordinate_switches),
             noted=tuple(self.noted),
         )
 
@@ -281,30 +271,6 @@ class _Runner:
             return False
         if noted:
             self.recorder.take(step_result.t, step_result.y, True)
-        return True
-
-    def _switches_coordinates(self, session: Session, step_result: StepResult) -> bool:
-        """After an event, go on in other coordinates of an orientation, if that is all that has happened."""
-        segment = self.segment
-        plan = segment.plan
-        event = segment.probe.name(step_result) if step_result.status is Status.EVENT else None
-        if event is None or event.target != COORDINATE_SWITCH:
-            return False
-        q, u = (part.copy() for part in plan.program.split(step_result.y))
-        q, bodies = switched(plan.assembly, q)
-        if not bodies:
-            return False
-        if plan.is_projected:
-            q, u = plan.balance.project(step_result.t, q, u, plan.sizes)
-        if isinstance(session, ExplicitSession):
-            session.limit_steps(longest_step(plan.assembly.equations, u))
-            session.reinitialize(step_result.t, np.concatenate([q, u]))
-        else:
-            y, yp = pack_state(plan, step_result.t, q, u)
-            session.reinitialize(step_result.t, y, yp)
-            if self.monitor is not None:
-                self.monitor.restart(StepResult(step_result.t, y, yp, Status.REACHED))
-        self.coordinate_switches += [CoordinateSwitch(step_result.t, body) for body in bodies]
         return True
 
     def _explain(self, step_result: StepResult) -> SolveError | None:
