@@ -18,7 +18,7 @@ import json
 import sys
 import warnings
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +62,9 @@ def plain(value: Any) -> Any:
 
 def mechanism(name: str) -> dict[str, Any]:
     """Return what the report says of a scene: freedoms, states, constraints and operations of every form."""
-    found: dict[str, Any] = plain(asdict(report(SCENES[name]())))
+    made = report(SCENES[name]())
+    offers = tuple(replace(one, assembly=None) for one in made.offers)
+    found: dict[str, Any] = plain(asdict(replace(made, offers=offers)))
     return found
 
 
