@@ -134,7 +134,7 @@ def check(scene: Model, form: str, orientation: str) -> None:
     assert matrix @ a + evaluate(list(found.velocity_terms), values) == pytest.approx(inertial, rel=1e-11, abs=1e-11)
 
 
-@pytest.mark.sample(24)
+@pytest.mark.sample(16)
 @pytest.mark.parametrize(("name", "form", "orientation"), CASES)
 def test_lagranges_equations_are_the_equations_of_motion(name: str, form: str, orientation: str) -> None:
     check(SCENES[name](), form, orientation)
