@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from atwood import Scene, StartError, assemble, simulate
+from atwood import Scene, StartError, assemble, simulate, sin
 from atwood.simulation.initialization.start import find_start
-from atwood_library import Ground, Link, Pivot, Weld
+from atwood_library import Drive, Ground, Link, Pivot, PointMass, Weld
 
 FORMS = ("reduced", "dae")
 
@@ -50,3 +52,22 @@ def test_speeds_that_are_more_than_rounding_still_contradict() -> None:
         scene.start["rocker.velocity.y"] = 1e-9
         with pytest.raises(StartError, match=r"rocker\.velocity\.y"):
             find_start(assemble(scene))
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_prescribed_speed_may_be_said_as_well_as_it_is_known(form: str) -> None:
+    """Nothing can change the speed of a drive: what is said of it is compared with what rounding makes of that."""
+    for off, is_met in ((3e-13, True), (-3e-13, True), (1e-7, False)):
+        scene = Scene(space="plane")
+        ground, bob = scene.add("ground", Ground(angle=0.7)), scene.add("bob", PointMass(mass=1.0))
+        drive = scene.add("drive", Drive(axis=(0.6, 0.0, 0.8), motion=lambda t: 0.3 + 2.0 * sin(1.7 * t + 0.4)))
+        scene.connect(ground.frame, drive.a)
+        scene.connect(drive.b, bob.point)
+        rate = 3.4 * math.cos(0.4)
+        along = 0.6 * math.cos(0.7) - 0.8 * math.sin(0.7)
+        scene.start["bob.velocity.x"] = rate * along + off
+        if is_met:
+            assert simulate(scene, form=form, t_end=0.1, outputs=2).status == "finished"
+        else:
+            with pytest.raises(StartError, match=r"bob\.velocity\.x"):
+                find_start(assemble(scene, form=form))

@@ -207,11 +207,12 @@ def _freedom(result: Result, oracle: Oracle) -> Iterator[tuple[str, float]]:
     rank, rows = plan.finding.rank, len(equations.constraints)
     yield "degrees of freedom", abs(len(equations.speeds) - rank - (oracle.size - oracle.rank))
     if result.form == "dae":
-        yield "redundant constraints", abs(rows - rank - (len(oracle.owners()) - _idle(oracle) - oracle.rank))
+        more, idle = rows - rank - (len(oracle.owners()) - oracle.rank), _idle(oracle)
+        yield "redundant constraints", max(more, -idle - more, 0)
 
 
 def _idle(oracle: Oracle) -> int:
-    """Return the number of constraints between parts of one rigid body, which Atwood leaves out."""
+    """Return the number of constraints between parts of one rigid body, which Atwood may leave out."""
     mechanism = oracle.mechanism
     idle = {
         tie.name

@@ -20,7 +20,7 @@ from atwood.linalg.matrices import (
 )
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
-from atwood.simulation.dynamics.rank import independent_rows, least_norm, open_directions, row_scales
+from atwood.simulation.dynamics.rank import certain, independent_rows, least_norm, open_directions, row_scales
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.simulation.initialization.targets import Target
 from atwood.tolerances import tolerances
@@ -154,6 +154,8 @@ def newton(
         rows = row_scales(matrix, scales, errors)
     # What hardly changes with any coordinate, as where links line up, is measured by the scene.
     sizes = np.maximum(rows, 1e-4 * max(np.max(rows, initial=0.0), np.max(scales, initial=0.0)))
+    # What rounding could have left of a condition that nothing changes, as of a speed that a drive prescribes, is met.
+    sizes = np.maximum(sizes, certain(errors, np.zeros_like(errors)) / tolerances.MET)
     return q, residual / sizes, scaled(matrix, scales)
 
 
