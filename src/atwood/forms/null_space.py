@@ -1,7 +1,7 @@
 """The reduced form of a mechanism with loops, before it is decided which of its coordinates are dependent.
 
 The rows of the reduced form depend on that choice, and the choice can change between two steps. What does not depend
-on it is a stack of kinematic rows, balances of forces, constraints and their rates, with the slopes of the constraints;
+on it is a stack of kinematic rows, balances of forces, constraints and their rates, with the constraint Jacobian;
 from these and from the derivatives at given multipliers, residual and Jacobian follow by linear algebra on numbers.
 """
 

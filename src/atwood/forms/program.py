@@ -219,7 +219,7 @@ def rows_along_speeds(equations: Equations) -> list[Expression]:
     """Return kinematic rows of which each says what one speed does to the coordinates; those without a speed last.
 
     With loops, the row of a speed that follows from the constraints is left out, and a constraint takes its place. That
-    is as good a choice for the coordinates as for the speeds: for a chart the rows are ``B^T q' = B^T B u``, where
+    is as good for the coordinates as for the speeds: for an orientation the rows are ``B^T q' = B^T B u``; there
     B^T B is a multiple of one for a quaternion, and one more keeps its size.
 
     Parameters

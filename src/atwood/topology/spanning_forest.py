@@ -62,7 +62,7 @@ class Attachment:
     orientation
         In space: numbers of the coordinates of its orientation, if the body has one of its own.
     spin
-        Numbers of the speeds that belong to the chart.
+        Numbers of the speeds that belong to the orientation.
     turns_with_joint
         In space: whether the joint also gives the orientation.
     """
@@ -112,7 +112,7 @@ class SpanningForest:
     coordinates
         The coordinates, in the order in which they are met.
     speeds
-        The speeds; as many as coordinates, except where there are charts.
+        The speeds; as many as coordinates, except of orientations in space.
     orientation_coordinates
         The coordinates that stand for an orientation together.
     attachments

@@ -105,6 +105,6 @@ def _same_speeds(scene: LinearScene, dependent: Sequence[int]) -> tuple[int, ...
     e = scene.equations
     number = {speed: i for i, speed in enumerate(e.speeds)}
     of = {k: number[e.rates[i]] for i, k in scene.tangents.plain if e.rates[i] in number}
-    for chart, numbers in scene.tangents.charts:
-        of |= dict(zip(numbers, chart.speeds, strict=False))
+    for orientation, numbers in scene.tangents.orientation_coordinates:
+        of |= dict(zip(numbers, orientation.speeds, strict=False))
     return tuple(sorted(of[k] for k in dependent)) if all(k in of for k in dependent) else None

@@ -183,8 +183,8 @@ def difference(scene: LinearScene, first: FloatArray, second: FloatArray) -> Flo
     found = np.zeros(len(scene.tangents))
     for i, k in scene.tangents.plain:
         found[k] = second[i] - first[i]
-    for chart, numbers in scene.tangents.charts:
-        a, b = first[list(chart.coordinates)], second[list(chart.coordinates)]
+    for orientation, numbers in scene.tangents.orientation_coordinates:
+        a, b = first[list(orientation.coordinates)], second[list(orientation.coordinates)]
         if len(a) == 2:
             found[numbers[0]] = np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)
             continue

@@ -216,8 +216,8 @@ def _shifts(scene: LinearScene) -> list[_Field]:
         value = np.zeros(size)
         value[k] = 1.0
         found.append(_constant(value))
-    for chart, numbers in scene.tangents.charts:
-        if chart.kind == "direction":
+    for orientation, numbers in scene.tangents.orientation_coordinates:
+        if orientation.kind == "direction":
             value = np.zeros(size)
             value[numbers[0]] = 1.0
             found.append(_constant(value))
@@ -227,8 +227,8 @@ def _shifts(scene: LinearScene) -> list[_Field]:
 def _rotations(scene: LinearScene) -> list[_Field]:
     """Return rotations of places and of orientations about axes of the space that they are in."""
     found = [_place_rotation(scene, pair) for pair in _pairs(scene)]
-    for number, (chart, _) in enumerate(scene.tangents.charts):
-        if chart.kind == "quaternion":
+    for number, (orientation, _) in enumerate(scene.tangents.orientation_coordinates):
+        if orientation.kind == "quaternion":
             found += [_turned_in_space(scene, number, axis) for axis in np.eye(3)]
     return found
 
@@ -271,10 +271,10 @@ def _speed_of(scene: LinearScene) -> dict[int, int]:
     return {k: number[e.rates[i]] for i, k in scene.tangents.plain if e.rates[i] in number}
 
 
-def _turned_in_space(scene: LinearScene, chart: int, axis: FloatArray) -> _Field:
+def _turned_in_space(scene: LinearScene, orientation: int, axis: FloatArray) -> _Field:
     """Return the rotation of an orientation about an axis of the space: neighbours are moved alike."""
     size = len(scene.tangents) + len(scene.sizes)
-    own, numbers = scene.tangents.charts[chart]
+    own, numbers = scene.tangents.orientation_coordinates[orientation]
 
     def at(flow: Flow) -> FloatArray:
         value = np.zeros(size)
@@ -300,10 +300,10 @@ def _own_rotations(scene: LinearScene) -> list[_Field]:
     """Return rotations of bodies about axes of their own, of which only the body's own velocities know."""
     found: list[_Field] = []
     size, count = len(scene.tangents) + len(scene.sizes), len(scene.tangents)
-    for chart, numbers in scene.tangents.charts:
-        if chart.kind != "quaternion":
+    for orientation, numbers in scene.tangents.orientation_coordinates:
+        if orientation.kind != "quaternion":
             continue
-        spins = [count + k for k in chart.speeds]
+        spins = [count + k for k in orientation.speeds]
         for axis in np.eye(3):
             matrix = np.zeros((size, size))
             crossed = -np.array([np.cross(axis, e) for e in np.eye(3)]).T

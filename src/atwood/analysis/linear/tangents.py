@@ -28,7 +28,7 @@ class Tangents:
         Of each displacement: the coordinate's name, or that of a small rotation, such as ``body.rotation.x``.
     plain
         For each coordinate that is displaced by itself: its number, and that of the displacement.
-    charts
+    orientation_coordinates
         The orientations, each with the numbers of its displacements.
     """
 
@@ -36,7 +36,7 @@ class Tangents:
     names: tuple[str, ...]
     units: tuple[str, ...]
     plain: tuple[tuple[int, int], ...]
-    charts: tuple[tuple[OrientationCoordinates, tuple[int, ...]], ...]
+    orientation_coordinates: tuple[tuple[OrientationCoordinates, tuple[int, ...]], ...]
 
     def __len__(self) -> int:
         return len(self.names)
@@ -46,8 +46,8 @@ class Tangents:
         found = np.zeros((self.coordinates, len(self)))
         for i, k in self.plain:
             found[i, k] = 1.0
-        for chart, numbers in self.charts:
-            found[np.ix_(chart.coordinates, numbers)] = _block(q[list(chart.coordinates)])
+        for orientation, numbers in self.orientation_coordinates:
+            found[np.ix_(orientation.coordinates, numbers)] = _block(q[list(orientation.coordinates)])
         return found
 
     def inverse(self, q: FloatArray) -> FloatArray:
@@ -55,10 +55,10 @@ class Tangents:
         found = np.zeros((len(self), self.coordinates))
         for i, k in self.plain:
             found[k, i] = 1.0
-        for chart, numbers in self.charts:
-            own = q[list(chart.coordinates)]
+        for orientation, numbers in self.orientation_coordinates:
+            own = q[list(orientation.coordinates)]
             scale = (4.0 if len(own) == 4 else 1.0) / float(own @ own)
-            found[np.ix_(numbers, chart.coordinates)] = scale * _block(own).T
+            found[np.ix_(numbers, orientation.coordinates)] = scale * _block(own).T
         return found
 
     def moved(self, q: FloatArray, displacement: FloatArray) -> FloatArray:
@@ -66,12 +66,12 @@ class Tangents:
         found = q.copy()
         for i, k in self.plain:
             found[i] += displacement[k]
-        for chart, numbers in self.charts:
-            own, by = q[list(chart.coordinates)], displacement[list(numbers)]
+        for orientation, numbers in self.orientation_coordinates:
+            own, by = q[list(orientation.coordinates)], displacement[list(numbers)]
             angle = float(np.linalg.norm(by))
             half = 0.5 * angle if len(own) == 4 else angle
             step = _block(own) @ by * (np.sinc(half / np.pi) if angle else 1.0)
-            found[list(chart.coordinates)] = np.cos(half) * own + step
+            found[list(orientation.coordinates)] = np.cos(half) * own + step
         return found
 
 
@@ -85,21 +85,21 @@ def _block(own: FloatArray) -> FloatArray:
 
 def find_tangents(equations: Equations) -> Tangents:
     """Return the displacements of the coordinates of a set of equations, whose orientations are quaternions."""
-    of_chart = {chart.coordinates[0]: chart for chart in equations.orientation_coordinates}
-    inside = {i for chart in equations.orientation_coordinates for i in chart.coordinates}
+    of_orientation = {orientation.coordinates[0]: orientation for orientation in equations.orientation_coordinates}
+    inside = {i for orientation in equations.orientation_coordinates for i in orientation.coordinates}
     names: list[str] = []
     units: list[str] = []
     plain: list[tuple[int, int]] = []
-    charts: list[tuple[OrientationCoordinates, tuple[int, ...]]] = []
+    orientation_coordinates: list[tuple[OrientationCoordinates, tuple[int, ...]]] = []
     for i, one in enumerate(equations.names):
         if i not in inside:
             plain.append((i, len(names)))
             names.append(one.name)
             units.append(one.unit)
-        elif i in of_chart:
-            chart = of_chart[i]
-            axes = ("x", "y", "z") if chart.kind == "quaternion" else ("",)
-            charts.append((chart, tuple(range(len(names), len(names) + len(axes)))))
-            names += [f"{chart.body}.rotation{'.' * bool(axis)}{axis}" for axis in axes]
+        elif i in of_orientation:
+            orientation = of_orientation[i]
+            axes = ("x", "y", "z") if orientation.kind == "quaternion" else ("",)
+            orientation_coordinates.append((orientation, tuple(range(len(names), len(names) + len(axes)))))
+            names += [f"{orientation.body}.rotation{'.' * bool(axis)}{axis}" for axis in axes]
             units += ["rad"] * len(axes)
-    return Tangents(len(equations.names), tuple(names), tuple(units), tuple(plain), tuple(charts))
+    return Tangents(len(equations.names), tuple(names), tuple(units), tuple(plain), tuple(orientation_coordinates))

@@ -301,7 +301,7 @@ class LinearScene:
         """Return how displacements of neighbours change: ``ds' = N^+ (R_q N - N') ds + N^+ R_u du + ...``."""
         inverse = self.tangents.inverse(now.q)
         found = np.hstack(now.along("rates"))
-        if self.tangents.charts:
+        if self.tangents.orientation_coordinates:
             # N is linear in q; coordinates that move by themselves have a constant part of it, which does not change.
             turned = self.tangents.basis(now.basis @ now.displacement_rates)
             for i, k in self.tangents.plain:

@@ -1,7 +1,7 @@
 """Rows of a mechanism with loops, projected on the null space of its constraints, in LLVM's language.
 
 Two kernels compute what does not depend on which coordinates are dependent: the stack ``(K, r, g, g')`` of kinematic
-rows, balances of forces, constraints and their rates, together with the slopes ``G``; and the derivatives of the stack
+rows, balances of forces, constraints and their rates, with their Jacobian ``G``; and the derivatives of the stack
 with ``r - G^T lambda`` in the place of r, at given multipliers.  What does depend on it comes in as numbers:
 
     lambda = G_d^-T r_d,    F = (K_i, g, r_i - G_i^T lambda, g'),    dF = (..., dR_i - G_i^T G_d^-T dR_d, ...)

@@ -41,7 +41,7 @@ def compile_null_space_callbacks(
     stack
         Program of (t, y, y') with kinematic rows, balances, constraints, their rates, and their slopes.
     derivatives
-        Program of (t, y, y', cj, multipliers) with the entries of the derivatives of all but the slopes.
+        Program of (t, y, y', cj, multipliers) with the entries of the derivatives of all but the Jacobian.
     jacobian, pattern
         Row and column of each slope, and of each derivative.
     shape

@@ -188,7 +188,7 @@ def _stands_by_itself(
 ) -> bool:
     """Return whether a coordinate starts at a root that stands by itself, of a value with the given slope.
 
-    The slope depends on no other coordinate, so any place will do for those that the start gives in another chart.
+    The slope depends on no other coordinate, so any place will do for those that the start gives in other coordinates.
     """
     assert mechanism.places is not None
     start = {**places.some(mechanism), **mechanism.table.values, **mechanism.places["reduced"]}

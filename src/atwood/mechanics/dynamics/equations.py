@@ -115,7 +115,7 @@ class Equations:
     names, speed_names
         Names and units of the coordinates and of the speeds.
     rates
-        Derivatives of the coordinates, affine in the speeds; the speeds themselves unless there are charts.
+        Derivatives of the coordinates, affine in the speeds; the speeds themselves without orientations in space.
     rows
         For each speed, inertial less applied generalized force; zero if there are no constraints.
     constraint_rows

@@ -56,7 +56,7 @@ class Course:
     values
         Each coordinate of the forest as an expression of the coordinates that are left.
     spins, spin_rates
-        Each speed of the forest and its derivative; only those of charts are read.
+        Each speed of the forest and its derivative; only those of orientations are read.
     first
         Directions of the first time derivative: time, and each coordinate that is left with its rate.
     second
@@ -176,7 +176,7 @@ class _Walk:
         return substitute([self.graph.convert(value) for value in values], self.known)
 
     def turn(self, attachment: Attachment) -> None:
-        """Work out how a body is turned, from its own chart or across its joint."""
+        """Work out how a body is turned, from its own coordinates or across its joint."""
         joint, child = attachment.joint, attachment.body
         if attachment.orientation:
             orientation = self.orientation_coordinates[attachment.orientation]

@@ -51,7 +51,7 @@ class KinematicMap:
 
     @property
     def has_singular_coordinates(self) -> bool:
-        """Whether there are charts that are singular somewhere, and are left before."""
+        """Whether there are orientation coordinates that are singular somewhere, and are switched before."""
         return not all(orientation.is_homogeneous for orientation in self.program.orientation_coordinates)
 
     def rates(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
@@ -133,7 +133,7 @@ def best_rough_orientation(equations: Equations, far_off: Callable[[FloatArray],
     Parameters
     ----------
     equations
-        With the charts.
+        With the orientation coordinates.
     far_off
         How far coordinates are from what is wanted.
     q

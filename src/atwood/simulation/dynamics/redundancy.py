@@ -49,7 +49,7 @@ class RankFinding:
     lost_at_start
         Numbers of independent constraints that follow from the others at the start position.
     errors
-        How far rounding can take the slopes of each constraint.
+        How far rounding can take the Jacobian's row of each constraint.
     """
 
     kept: tuple[int, ...]

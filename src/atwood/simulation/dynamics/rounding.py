@@ -1,4 +1,4 @@
-"""How far rounding can take the slopes of conditions: what they were computed from is off by a little, too.
+"""How far rounding can take the Jacobian of conditions: what they were computed from is off by a little, too.
 
 Coordinates are known to a few units in the last place, of the larger of their value and of what counts as large for
 them; parameters and every operation round as well (`atwood.codegen.rounding`).

@@ -104,7 +104,7 @@ class States:
         Parameters
         ----------
         jacobian
-            Entries of the slopes, shape (entries, states).
+            Entries of the Jacobian, shape (entries, states).
         multipliers
             Of the independent constraints, shape (number, states).
         """

@@ -282,7 +282,7 @@ def enter_mode(
     event
         The event.
     reassemble
-        Gives the scene in other modes and charts.
+        Gives the scene in other modes and orientation coordinates.
     length
         Extent of the scene, m.
     """
@@ -481,7 +481,7 @@ def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatAr
 
 
 def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
-    """Return the program that gives maximal coordinates, their speeds and the slopes of these, and where slopes go.
+    """Return the program that gives maximal coordinates, their speeds, the Jacobian of these, and its pattern.
 
     Speeds of bodies change with generalized speeds as their places do with displacements along these.
     """

@@ -81,14 +81,14 @@ def maximal_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatAr
 
 
 def settle(assembly: Assembly, start: Start, reassemble: Reassemble) -> tuple[Assembly, FloatArray, FloatArray]:
-    """Return an assembly in charts that are regular at a start, with the start in its coordinates.
+    """Return an assembly in orientation coordinates that are regular at a start, with the start in its coordinates.
 
     Parameters
     ----------
     assembly, start
         The scene and its start.
     reassemble
-        Gives the scene in other charts.
+        Gives the scene in other orientation coordinates.
     """
     if assembly.form == "reduced":
         return *switch_coordinates(assembly, start.coordinates, reassemble), start.speeds

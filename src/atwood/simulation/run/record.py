@@ -140,12 +140,12 @@ class Recorder:
             self._finish(t, y, shown)
 
     def pass_over(self, crossing: SingularCrossing, t: FloatArray, shown: NDArray[np.bool_]) -> None:
-        """Record a passage, in place of all samples since its start; its states are not to be projected.
+        """Record a singular crossing, in place of all samples since its start; its states are not to be projected.
 
         Parameters
         ----------
         crossing
-            The passage, with its path.
+            The crossing, with its path.
         t, shown
             Sample times on its way, and which of them are outputs.
         """
@@ -159,7 +159,7 @@ class Recorder:
             self._add(_Block(t, q, u, shown.copy(), misses_of(self.plan, t, q, u)))
 
     def note(self, singular_crossings: Sequence[SingularCrossing]) -> None:
-        """Record passages that the solver made by itself; states quite near the place cannot be projected well."""
+        """Record crossings that the solver made by itself; states quite near the place cannot be projected well."""
         self.settle()
         for crossing in singular_crossings:
             self.singular_crossings.append(crossing)

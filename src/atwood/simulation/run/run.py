@@ -133,7 +133,7 @@ def run(
     options
         How.
     reassemble
-        Gives the scene in other modes and charts, with lengths on a line signed as given.
+        Gives the scene in other modes and orientation coordinates, with lengths on a line signed as given.
     clock
         Its limit of time; one that begins now if not given.
 

@@ -402,7 +402,7 @@ class _Runner:
         return done, None
 
     def _pass_over(self, session: Session, crossing: SingularCrossing) -> tuple[int, StepResult | None]:
-        """Take a passage into the record and go on behind it, unless something happens on its way."""
+        """Take a singular crossing into the record and go on behind it, unless something happens on its way."""
         segment, plan, path = self.segment, self.segment.plan, crossing.path
         assert path is not None
         times = segment.samples.times

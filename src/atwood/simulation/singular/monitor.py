@@ -96,7 +96,7 @@ class SingularityMonitor:
     seconds
         Time spent.
     agreed
-        Passages that the solver made by itself, and well; whoever takes them into a record empties the list.
+        Crossings that the solver made by itself, and well; whoever takes them into a record empties the list.
     lookout
         What a session may look with; None where nothing can be compiled.
     next
@@ -171,7 +171,7 @@ class SingularityMonitor:
         step_result
             Where the solver is, or where and why it ended.
         between
-            Whether this is where the guard wanted to look, or a session noticed something, and not an output.
+            Whether this is where the monitor wanted to look, or a session noticed something, and not an output.
         at_end
             Whether the run is to end here.
         """
@@ -224,7 +224,7 @@ class SingularityMonitor:
     def _from_start(self, near: float) -> SingularCrossing | None:
         """Return the way on from a start that is near a singular position, or has one just ahead, at a time.
 
-        Behind a passage rounding can be too large for a solver at first; there the motion goes away from the place.
+        Behind a crossing rounding can be too large for a solver at first; there the motion goes away from the place.
         """
         first = self._looks[0]
         stride = stride_from(self.plan, first, self._whole)
@@ -336,7 +336,7 @@ class SingularityMonitor:
         return float(t[least]), float(away[least])
 
     def _pass(self, near: float, away: float = 0.0, failed: bool = False) -> SingularCrossing | None:
-        """Return the passage near a time; None where the motion is as anywhere else."""
+        """Return the singular crossing near a time; None where the motion is as anywhere else."""
         self.plan.compiles_columns = True  # the arcs take many evaluations of few states each
         tried: set[float] = set()
         for reach in (1.0, 2.0, 0.5, 0.25, 0.1):
@@ -443,7 +443,7 @@ class SingularityMonitor:
         return both[: self._n], both[self._n :]
 
     def _crossing(self, arc: Arc, t: float, away: float) -> SingularCrossing | None:
-        """Return the passage that an arc makes at a time; None if that is no singular position."""
+        """Return the singular crossing that an arc makes at a time; None if that is no singular position."""
         loss = find_loss(self._measures, arc, t, away)
         return (
             None

@@ -96,7 +96,7 @@ class RankMeasure:
         return size
 
     def jacobian_at(self, t: float, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return slopes of all constraints at one place, scaled, and by how much positions miss them."""
+        """Return the Jacobian of all constraints at one place, scaled, and by how much positions miss them."""
         now = self.plan.balance.constraints_at(t, q, np.zeros_like(self.plan.sizes))
         constraint_jacobian = to_array(scaled(now.jacobian, self.plan.sizes, self.rows))
         return constraint_jacobian, np.abs(now.value / self.rows)[self.plan.balance.holonomic]

@@ -208,7 +208,7 @@ def _places(point: OperatingPoint, bounds: FloatArray, count: int) -> list[Float
         for i, k in scene.tangents.plain:
             q[i] = values[k]
         moved = np.zeros(size)
-        for _, numbers in scene.tangents.charts:
+        for _, numbers in scene.tangents.orientation_coordinates:
             moved[list(numbers)] = values[list(numbers)]
         made.append(scene.tangents.moved(q, moved))
     return made

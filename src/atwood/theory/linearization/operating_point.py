@@ -319,6 +319,6 @@ _SPEEDS = ("angular_velocity", "speed", "velocity.x", "velocity.y", "velocity.z"
 def values_at(point: OperatingPoint) -> dict[str, float]:
     """Return the coordinates and speeds of a state that have one number each, by path."""
     e = point.scene.equations
-    charted = {i for chart in e.orientation_coordinates for i in chart.coordinates}
+    charted = {i for orientation in e.orientation_coordinates for i in orientation.coordinates}
     found = {one.name: float(q) for i, (one, q) in enumerate(zip(e.names, point.q, strict=True)) if i not in charted}
     return found | {speed_name(point, k): float(u) for k, u in enumerate(point.u)}
