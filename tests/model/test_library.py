@@ -24,7 +24,7 @@ from atwood.model.values.units import parse_si_unit
 
 ROOT = Path(atwood_library.__file__).parent
 TETRAHEDRON = Path(__file__).parent / "tetrahedron.stl"
-GROUPS = ("fields", "forces", "joints", "parts", "ropes", "sensors", "sources")
+GROUPS = ("blocks", "drives", "fields", "forces", "joints", "parts", "ropes", "sensors", "sources")
 
 
 def library_modules() -> list:
@@ -88,7 +88,7 @@ def test_everything_is_said(cls):
             says_something(law.options.message + ".")
             spec = cls.parameter_specs().get(law.options.target)
             targets = spec.choices if spec is not None else (law.options.target,)
-            assert set(targets) <= {*cls.modes, "stop"}
+            assert set(targets) <= {*cls.modes, "stop", ""}
 
 
 def says_something(line: str) -> None:
@@ -141,7 +141,7 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
     values = {}
     for name, spec in component.parameter_specs().items():
         value = component.parameters()[name]
-        if value is None or spec.integer or spec.choices or spec.text or spec.function_of:
+        if value is None or spec.integer or spec.choices or spec.text or spec.function_of or spec.array:
             values[name] = value
         elif spec.direction:
             values[name] = aw.Vector(*value)
@@ -152,6 +152,9 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
             values[name] = numbers.named(name, value if value != 0.0 else 0.75)
     for name in component.signal_specs():
         values[name] = numbers.draw(name)
+    for name, state in component.state_specs().items():
+        made = [numbers.draw(one) for one in state.names(component.parameters())]
+        values[name] = tuple(made) if state.count else made[0]
     motions = {}
     for index, (name, connector) in enumerate(component.connectors().items()):
         turns = isinstance(connector, Frame) and space.has_rotation
@@ -207,6 +210,8 @@ def flat_values(made) -> list:
             return [mass for row in made.masses for mass in row]
         case BodyInertia():
             return [made.mass, *made.center_of_mass, made.moment]
+        case aw.CoordinateLoad():
+            return [made.value]
         case Load():
             return [*made.force, *made.torque]
         case Placement():
@@ -221,7 +226,7 @@ def angles_of(rotation) -> list:
 
 
 def nested(item) -> bool:
-    return isinstance(item, (PointInertia, BodyInertia, Load, Placement, aw.Vector, list, tuple))
+    return isinstance(item, (PointInertia, BodyInertia, Load, aw.CoordinateLoad, Placement, aw.Vector, list, tuple))
 
 
 def law_values(cls: type[aw.Component], space: str, kind: str) -> Mapping[str, list[float]]:
@@ -230,9 +235,10 @@ def law_values(cls: type[aw.Component], space: str, kind: str) -> Mapping[str, l
     bound = bind(component, binding_of(component, space, numbers))
     found = {}
     for law in component._laws.values():
-        if law.holds_in(space):
+        if law.holds_in(space) and law.kind != "update":  # which is called on numbers alone
             coordinates = [numbers.draw(name) for name in getattr(law.options, "coordinates", ())]
-            made = flat_values(getattr(bound, law.name)(*coordinates))
+            made = getattr(bound, law.name)
+            made = flat_values(made(*coordinates) if callable(made) else made)
             found[f"{law.kind} {law.name} {len(found)}"] = [numbers.read(one) for one in made]
     return found
 
