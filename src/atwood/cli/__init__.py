@@ -4,7 +4,7 @@ import gc
 import os
 
 # What is built stays until the end: to look through it again and again for something to free takes a tenth of a run.
-gc.set_threshold(100_000, 20, 100)
+gc.set_threshold(400_000, 20, 100)
 
 # Matrices here are small: threads of the linear algebra would wait for each other longer than they work. It is read
 # when NumPy is loaded, so it stands before everything else; whoever has set it keeps the last word.
