@@ -41,7 +41,7 @@ def test_the_state_itself_comes_first_and_the_farthest_is_a_small_share_of_the_r
     assert t[2] - t[1] < 1e-14
     near, far = (ahead([0.0], [1.0], ([1.0], [0.0]), horizon, t=0.0)[0] for horizon in (1.0, 100.0))
     assert np.allclose(far, 100.0 * near)
-    assert near[1] == pytest.approx(1e-16)
+    assert near[1] == pytest.approx(1e-16, rel=1e-9, abs=0.0)
 
 
 def test_coordinates_go_along_a_parabola_and_speeds_along_a_line() -> None:

@@ -37,7 +37,7 @@ def given(away: list[float], step: float = 1.0, largest: float = 1.0) -> Singula
     one._n, one._m = 1, 1
     one._looks = [Look(step * k, np.array([float(k), 1.0]), np.zeros(2)) for k in range(len(away))]
     one._away, one._judged, one._largest = list(away), -INF, largest
-    one._compiled = None
+    one._compiled, one._is_behind, one._measures = None, False, None
     one.trouble = None
     return one
 
