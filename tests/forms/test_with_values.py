@@ -31,6 +31,8 @@ from atwood.pipeline import assemble, assemble_flat, simulate
 from atwood_library import Ground, Link, Pivot, PointMass, Rod, Rope, Spring
 from atwood_library.scenes import SCENES, Atwood, Chain, DoublePendulum
 
+from ..helpers.runs import GENERAL
+
 
 @contextmanager
 def counting(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, int]]:
@@ -67,7 +69,7 @@ def moved(scene: Scene) -> dict[str, float]:
 
 @pytest.mark.sample(36)
 @pytest.mark.parametrize("solver", ["ida", "explicit", "auto"])
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", GENERAL)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 def test_other_values_compile_nothing(name: str, form: str, solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = SCENES[name]()
@@ -89,7 +91,7 @@ def test_other_values_compile_nothing(name: str, form: str, solver: str, monkeyp
 
 
 @pytest.mark.sample(12)
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", GENERAL)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 def test_answers_are_those_of_a_scene_made_so(name: str, form: str) -> None:
     scene = SCENES[name]()
@@ -268,9 +270,9 @@ def closed(length: float) -> Scene:
 
 def test_rigid_parts_must_fit_with_other_values_too() -> None:
     first = assemble(closed(2.0))
-    with pytest.raises(TopologyError, match=r"fight|fit"):
+    with pytest.raises(TopologyError, match="contradict"):
         assemble(closed(2.5))
-    with pytest.raises(TopologyError, match=r"fight|fit"):
+    with pytest.raises(TopologyError, match="contradict"):
         first.with_values({"post.length": 2.5})
 
 

@@ -47,7 +47,7 @@ EVENT = aw.event(target="stop", message="it happened")
         (aw.force, lambda self: None, "it returns nothing"),
         (aw.force, lambda self: aw.Load(self.b, LOAD), "it returns one Load and no list"),
         (aw.force, lambda self: LOAD, "it returns a Vector"),
-        (aw.force, lambda self: [LOAD], "it gives a Vector where a Load is wanted"),
+        (aw.force, lambda self: [LOAD], "it gives a Vector where a Load or CoordinateLoad is wanted"),
         (aw.inertia, lambda self: None, "it returns nothing"),
         (aw.inertia, lambda self: aw.PointInertia((self.b,), ((1.0,),)), "it returns one PointInertia and no list"),
         (CONSTRAINT, lambda self: None, "it returns nothing"),
@@ -64,7 +64,7 @@ def test_what_a_law_returns(mark, law, text: str) -> None:
 
 
 def test_a_connector_that_is_not_there() -> None:
-    with pytest.raises(aw.DeclarationError, match=r"a Mass1D has no 'point'.*Its connectors are flange\."):
+    with pytest.raises(aw.DeclarationError, match=r"a Mass1D has no 'point'.*Its connectors are flange, slide\."):
         _ = lib.Mass1D().point
     with pytest.raises(aw.AtwoodError, match="Did you mean 'frame'"):
         _ = lib.RigidBody().frames

@@ -58,6 +58,8 @@ SIZES = {
     "bead-on-wire": (1, 1, 0, 1),
     "bead-on-surface": (2, 2, 0, 2),
     "rotating-frame": (2, 2, 0, 2),
+    "benchmark-bicycle": (9, 8, 5, 3),
+    "furuta-pendulum": (2, 2, 0, 2),
     "free-symmetric-body": (7, 6, 0, 6),
     "rigid-bodies": (29, 27, 10, 18),
     "wilberforce-pendulum": (2, 2, 0, 2),

@@ -320,7 +320,7 @@ def test_an_algebraic_loop_of_blocks_is_named() -> None:
     scene.connect(a.output("y"), b.input("u"))
     scene.connect(b.output("y"), a.input("u"))
     scene.connect(a.output("y"), c.input("u"))
-    with pytest.raises(DeclarationError, match=r"circle: first\.y -> second\.u, second\.y -> first\.u$|circle: ") as e:
+    with pytest.raises(DeclarationError, match="algebraic loop") as e:
         simulate(scene, t_end=1.0)
     assert "first" in str(e.value)
     assert "second" in str(e.value)

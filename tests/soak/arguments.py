@@ -43,6 +43,8 @@ BAD: dict[str, list[Any]] = {
     "optional number": [one for one in NO_NUMBER if one is not None],
     "scalar": [one for one in NO_NUMBER if not isinstance(one, (float, bool, int, list))],
     "condition": ["x", b"x", object(), Odd(), None, [], {}],
+    "array": [b"x", 1j, object(), {"x": 1}, Odd(), "x", [[1.0], [2.0, 3.0]], [math.nan], [None], True],
+    "stop condition": ["x", b"x", object(), 3, 2.5, 1j, ["x"]],
     "direction": [*NO_NUMBER, 2, 0.5],
     "words": [3, 2.5, b"x", 1j, object(), Odd(), [3], [None], True, None],
     "positive": NOT_POSITIVE,

@@ -128,7 +128,11 @@ def _runs() -> Iterator[Call]:
             "max_step": "optional positive",
             "samples": "whole",
             "structure": "flag",
+            "atol": "optional positive",
+            "until": "stop condition",
+            "record": "stop condition",
         },
+        said_as={"until": ("crosses",), "record": ("crosses",)},
     )
     yield Call(
         "sweep",
@@ -647,6 +651,8 @@ def _parts() -> Iterator[Call]:
                 kind = "word"
             elif spec.text:
                 kind = "needed text"
+            elif spec.array:
+                kind = "array"
             elif spec.size is not None or spec.direction:
                 kind = "axis" if spec.direction else "vector"
             else:
