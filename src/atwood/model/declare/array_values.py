@@ -36,7 +36,10 @@ def check_array(value: Any, where: str) -> tuple[Any, ...]:
         return tuple(_number(one, where) for one in plain)
     found = tuple(tuple(_number(one, where) for one in row) for row in plain)
     if len({len(row) for row in found}) > 1:
-        raise ParameterError("its rows are not equally long", where=where)
+        lengths = ", ".join(str(len(row)) for row in found[:5])
+        raise ParameterError(
+            f"its rows are not equally long: {lengths}", where=where, advice="Give rows with as many numbers each."
+        )
     return found
 
 
