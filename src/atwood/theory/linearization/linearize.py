@@ -15,6 +15,7 @@ from atwood.analysis.linear.variations import Flow
 from atwood.arguments import TEXT, each, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
+from atwood.expr import live
 from atwood.forms.assembly import Assembly
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
@@ -182,19 +183,26 @@ def _inputs(
     found: dict[str, tuple[int, int, int]] = {}
     units: dict[str, str] = {}
     moved = []
-    everything = np.vstack([space.matrix, rows, np.zeros((0, space.matrix.shape[1]))])
     for k, one in enumerate(point.inputs):
         for other in range(1, len(one.keys)):  # one source that feeds several inputs
             for matrix in (space.matrix, rows):
                 matrix[:, n + first : n + first + 3] += matrix[:, n + first + 3 * other : n + first + 3 * other + 3]
         found[one.path] = (first, first + 1, first + 2)
-        later = everything[:, n + first + 1 : n + first + 3]
         units[one.path] = one.unit
-        if np.any(later != 0.0):
+        if _places_bodies(point, first):
             moved.append(k)
             units |= {f"{one.path}'": f"{one.unit}/s", f"{one.path}''": f"{one.unit}/s^2"}
         first += 3 * len(one.keys)
     return found, units, tuple(moved)
+
+
+def _places_bodies(point: OperatingPoint, number: int) -> bool:
+    """Return whether an input is a motion that is prescribed: whether positions or orientations depend on it."""
+    placements, value = point.scene.equations.kinematics.placements, point.scene.inputs[number]
+    found = [one for position in placements.positions.values() for one in position]
+    found += [one for axes in placements.axes.values() for axis in axes for one in axis]
+    found += list(placements.angles.values())
+    return any(node is value for node in live(found))
 
 
 def _moves(point: OperatingPoint, flow: Flow) -> bool:
