@@ -99,5 +99,7 @@ def moved_to(assembly: Assembly, flat: FlatScene) -> tuple[Mechanism | None, str
     values = {**own.table.values, **mechanism.table.values}
     made = replace(own, table=replace(own.table, values=values), locals_=mechanism.locals_)
     made = started_at(made, places)
+    if places == own.places and made.table.values == own.table.values:
+        return made, ""  # at the same place with the same numbers everything was decided already
     with assembly.shared.lock:
         return (made, "") if decided_alike(made) else (None, DECIDED)

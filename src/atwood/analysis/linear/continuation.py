@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from atwood.arrays import FloatArray
 from atwood.late import dataclass
@@ -199,6 +198,8 @@ def _located(
     def at(length: float) -> float:
         point = now if length == 0.0 else _step(problem, now, length)
         return np.nan if point is None else value(point)
+
+    from scipy.optimize import brentq
 
     try:
         length = brentq(at, 0.0, step, xtol=1e-13, rtol=1e-13)

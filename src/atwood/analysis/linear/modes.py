@@ -8,7 +8,6 @@ problem ``K v = omega^2 M v`` (Goldstein, section 6.2). With damping or gyroscop
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
 
 from atwood.analysis.linear.spectrum import find_spectrum
 from atwood.analysis.linear.state_space import StateSpace
@@ -86,8 +85,10 @@ def _undamped(flow: Flow, space: StateSpace) -> ModeValues | None:
     error = np.abs(mass) @ space.error[n:, :n] + 1e-12 * np.max(np.abs(stiffness / size), initial=0.0) * size
     if np.any(np.abs(stiffness - stiffness.T) > error + error.T):
         return None
+    from scipy.linalg import eigh  # a fifth of a second
+
     try:
-        squares, vectors = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), mass)
+        squares, vectors = eigh(0.5 * (stiffness + stiffness.T), mass)
     except np.linalg.LinAlgError:  # the mass matrix is not positive: something without mass is free
         return None
     noise = np.sqrt(np.sum((error / size) ** 2))
@@ -114,7 +115,8 @@ def _damped(space: StateSpace, n: int) -> ModeValues:
     # A coordinate that nothing depends on, with its speed: one mode with a double zero.
     zeros = (spectrum.zeros + 1) // 2
     free = np.zeros((len(shapes), zeros), dtype=complex)
-    null = scipy.linalg.null_space(space.matrix[:, : minimal.states], rcond=1e-10)
+    _, sizes, directions = np.linalg.svd(space.matrix[:, : minimal.states])
+    null = directions[int(np.sum(sizes > 1e-10 * max(float(np.max(sizes, initial=0.0)), 1e-300))) :].T
     count = min(zeros, null.shape[1])
     free[:, :count] = minimal.shift[:, :n] @ null[:n, :count]
     values = np.concatenate([np.zeros(zeros, dtype=complex), values])

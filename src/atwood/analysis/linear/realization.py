@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
 
 from atwood.arrays import ComplexArray, FloatArray
 
@@ -34,7 +33,9 @@ def balanced(model: Matrices) -> Matrices:
     a, b, c, d = model
     if not len(a):
         return model
-    _, (scale, _) = scipy.linalg.matrix_balance(a, permute=False, separate=True)
+    from scipy.linalg import matrix_balance
+
+    _, (scale, _) = matrix_balance(a, permute=False, separate=True)
     return a * scale / scale[:, None], b / scale[:, None], c * scale, d
 
 

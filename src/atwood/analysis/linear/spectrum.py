@@ -8,7 +8,6 @@ step by step (the staircase form; Golub and Wilkinson, SIAM Review 18, 1976); th
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
 
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.late import dataclass
@@ -109,10 +108,10 @@ def _split(matrix: FloatArray, bound: float) -> tuple[int, FloatArray, FloatArra
 def _lifted(matrix: FloatArray, basis: FloatArray, values: ComplexArray, own: ComplexArray) -> ComplexArray:
     """Return eigenvectors of the whole matrix from those on the quotient."""
     found = np.empty((len(matrix), len(values)), dtype=complex)
+    rest = np.linalg.svd(basis.T)[2][basis.shape[1] :].T if len(values) else np.zeros((len(matrix), 0))
     for k, value in enumerate(values):
         # (A - lambda) v = 0 with v = basis y + what was split off; A is not singular there at lambda != 0.
         v = basis @ own[:, k]
-        rest = scipy.linalg.null_space(basis.T) if basis.shape[1] < len(matrix) else np.zeros((len(matrix), 0))
         if rest.shape[1]:
             shifted = matrix - value * np.eye(len(matrix))
             v = v - rest @ np.linalg.lstsq(shifted @ rest, shifted @ v, rcond=None)[0]

@@ -7,7 +7,6 @@ from dataclasses import field
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from atwood.analysis.linear.rest import Rest, is_at_rest, same_rest, seek_rest
 from atwood.arguments import BY_PATH, optional, takes
@@ -200,6 +199,8 @@ def _places(point: OperatingPoint, bounds: FloatArray, count: int) -> list[Float
     size = len(bounds)
     if not size:
         return []
+    from scipy.stats import qmc  # a third of a second
+
     spread = qmc.Halton(size, seed=7).random(count)
     made = []
     for row in spread:

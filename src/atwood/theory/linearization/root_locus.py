@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from atwood.arguments import TEXT, Kind, takes
 from atwood.arrays import ComplexArray, FloatArray
@@ -115,6 +114,8 @@ def root_locus(
 
 def _followed(rows: list[ComplexArray]) -> ComplexArray:
     """Return eigenvalues sorted so that each column changes little from row to row."""
+    from scipy.optimize import linear_sum_assignment
+
     found = np.array(rows)
     for i in range(1, len(found)):
         guess = found[i - 1] if i == 1 else 2.0 * found[i - 1] - found[i - 2]
