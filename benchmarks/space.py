@@ -65,7 +65,7 @@ def called(call: Callable[[], object], times: int = 1000) -> Callable[[], float]
 
 def check(pinocchio: Any, assembly: Assembly, residual: np.ndarray, state: Sequence[np.ndarray]) -> None:
     """Stop if generalized forces differ from Pinocchio's."""
-    order = [int(one.name.split(".")[0][5:]) * 2 + one.name.endswith("b") for one in assembly.equations.names]
+    order = [int(one.name.split(".")[0][5:]) * 2 + one.name.endswith("b") for one in assembly.own_equations.names]
     n = len(order)
     q, v, a = (np.empty(n) for _ in range(3))
     q[order], v[order], a[order] = state[1][:n], state[1][n:], state[2][n:]

@@ -329,7 +329,7 @@ def test_many_threads_call_one_kernel_at_once():
 @pytest.mark.parametrize("name", SCENES)
 def test_every_scene_agrees_with_the_python_back_end(name, form):
     assembly = assemble(SCENES[name](), form=form)
-    equations = assembly.equations
+    equations = assembly.own_equations
     loops = len(assembly.reduced.constraints) if form == "reduced" else 0
     size, speeds = len(equations.coordinates), len(equations.speeds)
     dependent = tuple(range(size - loops, size)), tuple(range(speeds - loops, speeds))

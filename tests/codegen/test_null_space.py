@@ -33,7 +33,7 @@ SCENES = {
 
 
 def made_of(assembly):
-    return null_space_program("loops", assembly.equations, assembly.parameters, assembly.rows)
+    return null_space_program("loops", assembly.own_equations, assembly.parameters, assembly.rows)
 
 
 def compiled_of(program, sparse=False):

@@ -37,7 +37,7 @@ def energies(prepared: Prepared, t: float, q: FloatArray, u: FloatArray) -> tupl
 def test_rows_are_lagranges_equations(name: str, form: str) -> None:
     # d/dt dT/du - dT/dq + dV/dq, time derivatives along (u, a); Goldstein, equation 1.57
     prepared = prepare(SCENES[name](), form)
-    if prepared.assembly.equations.orientation_coordinates or dampers(prepared):
+    if prepared.assembly.own_equations.orientation_coordinates or dampers(prepared):
         return  # speeds that are no rates of coordinates, forces that have no potential: see the balance of power below
     balance, t = prepared.plan.balance, 0.4
     n = len(prepared.q)
@@ -99,7 +99,7 @@ def test_power_balance_at_any_state(name: str, form: str) -> None:
         if dampers(prepared):
             assembly = prepared.assembly
             program = assembly.known_program(
-                "power", "power", lambda a=assembly: [applied_power(a.mechanism, a.equations)]
+                "power", "power", lambda a=assembly: [applied_power(a.mechanism, a.own_equations)]
             )
             power += assembly.kernel(program)([t], q, u, a, [0.0] * len(assembly.reactions))[0][0]
         if name == "foucault-pendulum":

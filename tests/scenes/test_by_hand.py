@@ -91,7 +91,7 @@ def test_the_table_is_complete() -> None:
 def test_not_more_than_by_hand(name: str, form: str) -> None:
     expected = TABLE[name, form]
     prepared = prepare(SCENES[name](), form)
-    program, equations = prepared.plan.program, prepared.assembly.equations
+    program, equations = prepared.plan.program, prepared.assembly.own_equations
     assert len(equations.coordinates) == expected.coordinates
     assert len(equations.speeds) == expected.speeds
     assert len(equations.constraints) == expected.constraints

@@ -51,7 +51,7 @@ def test_a_wheel_on_a_slope(form: str) -> None:
     assert np.max(np.abs(made["wheel.angle"] - 0.2 + (run - 0.3) / 0.5)) < 1e-9
     assert np.max(np.abs(made["contact.friction"] + 2.0 * G * np.sin(0.3) / 3.0)) < 1e-8
     assert np.max(np.abs(made["contact.normal_force"] - 2.0 * G * np.cos(0.3))) < 1e-8
-    equations = made.assembly.equations
+    equations = made.assembly.own_equations
     (integral,) = equations.integrals
     assert integral.keys == (("contact", "rolling_on_line", 0),)
     assert all(one.holonomic for one in equations.constraints)

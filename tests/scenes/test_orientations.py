@@ -136,7 +136,7 @@ def test_a_rough_run_goes_on_although_coordinates_shrink(form: str, monkeypatch:
     assert made.status == "finished"
     assert any(strayed)
     for segment in made.run.segments:
-        chart = list(made.assembly.equations.orientation_coordinates[0].coordinates)
+        chart = list(made.assembly.own_equations.orientation_coordinates[0].coordinates)
         assert np.allclose(np.sum(segment.coordinates[chart] ** 2, axis=0), 1.0, atol=1e-14)
 
 

@@ -141,10 +141,10 @@ def seen(scene: Scene, form: str) -> Seen:
     solver = ReactionSolver(assembly, start.time, q, u)
     values = dict(zip((one.path for one in assembly.reactions), solver.at(*at)[0][:, 0], strict=True))
     forces = [[values[f"pivot{k}.force.{axis}"] for axis in "xyz"] for k in range(4)]
-    names = [one.name for one in assembly.equations.speed_names]
+    names = [one.name for one in assembly.own_equations.speed_names]
     turning = [i for i, name in enumerate(names) if form == "reduced" and "pivot0" in name]
     own = solver.own_accelerations(*at, plan.finding)[turning, 0]
-    paths = tuple(assembly.equations.constraints[i].key[0] for i in plan.finding.redundant)
+    paths = tuple(assembly.own_equations.constraints[i].key[0] for i in plan.finding.redundant)
     return Seen(len(u) - plan.finding.rank, paths, own, np.array(forces))
 
 

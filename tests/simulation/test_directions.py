@@ -172,7 +172,7 @@ def test_a_run_goes_on_from_size_one_where_coordinates_have_strayed() -> None:
 def test_projection_finds_the_nearest_state(form: str) -> None:
     assembly, t, q, u = states("four-bar", form)
     balance = balance_of(assembly, assembly.form)
-    sizes = motion_scales(assembly.equations, 1.0)
+    sizes = motion_scales(assembly.own_equations, 1.0)
     step = 1e-4 * np.random.default_rng(7).standard_normal(len(u))
     moved = balance.kinematic_map.moved(t, q, step)
     met, speeds = balance.project(t, moved, u, sizes)

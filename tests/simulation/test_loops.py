@@ -75,7 +75,7 @@ def test_a_choice_that_cannot_be_solved_is_left() -> None:
 def test_loops_that_share_nothing_are_solved_apart() -> None:
     prepared = prepare(two_four_bars(), "reduced")
     assembly = prepared.assembly
-    program = null_space_program("two", assembly.equations, assembly.parameters, assembly.rows)
+    program = null_space_program("two", assembly.own_equations, assembly.parameters, assembly.rows)
     shape = null_space_shape(program)
     lists = choice_lists(program, prepared.plan.dependent)
     at = shape.choice
@@ -83,7 +83,7 @@ def test_loops_that_share_nothing_are_solved_apart() -> None:
     assert lists[at["starts"] : at["starts"] + 3].tolist() == [0, 2, 4]
     assert sorted(lists[at["dependent"] : at["dependent"] + 4]) == list(prepared.plan.dependent)
     # dependent coordinates of one linkage alone cannot be solved for, and are handed on to say so in numbers
-    names = [one.name for one in assembly.equations.names]
+    names = [one.name for one in assembly.own_equations.names]
     first = (*(i for i, name in enumerate(names) if "1" in name), prepared.plan.dependent[-1])
     assert len(first) == 4
     assert choice_lists(program, first)[at["blocks"]] == 1

@@ -122,7 +122,7 @@ def _forces(first: Result, second: Result, related: Related, mechanism: Mechanis
 
 def _freedom(result: Result) -> int:
     plan = result.run.segments[0].plan
-    return len(plan.assembly.equations.speeds) - plan.finding.rank
+    return len(plan.assembly.own_equations.speeds) - plan.finding.rank
 
 
 def _reversed(mechanism: Mechanism, way: Way, words: tuple[str, ...]) -> Trial:

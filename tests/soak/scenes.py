@@ -203,7 +203,7 @@ def speed_paths(oracle: Oracle) -> list[tuple[str, float]]:
 
 def _freedom(result: Result, oracle: Oracle) -> Iterator[tuple[str, float]]:
     plan = result.run.segments[0].plan
-    equations = plan.assembly.equations
+    equations = plan.assembly.own_equations
     rank, rows = plan.finding.rank, len(equations.constraints)
     yield "degrees of freedom", abs(len(equations.speeds) - rank - (oracle.size - oracle.rank))
     if result.form == "dae":

@@ -185,12 +185,12 @@ def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
     data = describe_run(result)
     asked = {**data.pop("asked"), "set": list(request.settings)}
     assembly = result.assembly
-    coordinates = [one.name for one in assembly.equations.names]
+    coordinates = [one.name for one in assembly.own_equations.names]
     return {
         **{key: data.pop(key) for key in ("scene", "form", "level")},
         "degrees_of_freedom": degrees_of_freedom(result),
         "coordinates": coordinates,
-        "speeds": [one.name for one in assembly.equations.speed_names],
+        "speeds": [one.name for one in assembly.own_equations.speed_names],
         "multipliers": multiplier_labels(result),
         "states": result.first_plan.program.size,
         "solver": data.pop("solver"),
@@ -215,7 +215,7 @@ def degrees_of_freedom(result: Result) -> int:
         The run.
     """
     plan = result.first_plan
-    return len(plan.assembly.equations.speeds) - plan.finding.rank
+    return len(plan.assembly.own_equations.speeds) - plan.finding.rank
 
 
 def multiplier_labels(result: Result) -> list[str]:
@@ -230,7 +230,7 @@ def multiplier_labels(result: Result) -> list[str]:
     plan = result.first_plan
     if assembly.form == "reduced":
         return []
-    constraints = assembly.equations.constraints
+    constraints = assembly.own_equations.constraints
     return [constraints[i].label for i in plan.finding.kept]
 
 

@@ -153,7 +153,7 @@ class Assembly:
         return self.reduced if form == "reduced" else self.regular
 
     @property
-    def equations(self) -> Equations:
+    def own_equations(self) -> Equations:
         """The equations in the form of this assembly."""
         return self.reduced if self.form == "reduced" else self.maximal
 
@@ -190,7 +190,7 @@ class Assembly:
     @cached_property
     def relations(self) -> tuple[Relation, ...]:
         """The relations of functions of time alone, whose values are the last parameters."""
-        _ = self.equations  # in which the last of them are met: those of inputs that are linked to outputs
+        _ = self.own_equations  # in which the last of them are met: those of inputs that are linked to outputs
         if self.mechanism.links:
             _ = self.regular, self.maximal
         return tuple(self.mechanism.relations.found)
@@ -375,7 +375,7 @@ class Assembly:
         speeds = None if dependent_speeds is None else tuple(dependent_speeds)
 
         def make() -> FormProgram:
-            equations = self.equations if kept is None else keep_constraints(self.equations, kept)
+            equations = self.own_equations if kept is None else keep_constraints(self.own_equations, kept)
             name = f"{self.flat.name} ({self.form})"
             if self.form == "reduced":
                 found = reduced_form(name, equations, self.parameters, self.rows, dependent, speeds)
@@ -438,12 +438,12 @@ class Assembly:
     @property
     def observables(self) -> Mapping[str, Observable]:
         """Every quantity of every component, by path, in terms of this form's coordinates."""
-        return self.shared.get("observables", lambda: self._observe(self.equations))
+        return self.shared.get("observables", lambda: self._observe(self.own_equations))
 
     @property
     def start_observables(self) -> Mapping[str, Observable]:
         """Every quantity in terms of generalized coordinates, in which the start is solved."""
-        if self.equations is self.regular:
+        if self.own_equations is self.regular:
             return self.observables
         return self.shared.get("start", lambda: self._observe(self.regular))
 
@@ -473,7 +473,7 @@ class Assembly:
     @property
     def energy_program(self) -> Program:
         """The program of (t, q, u, a, reactions) that gives kinetic and potential energy."""
-        return self.known_program("energies", "energies", lambda: energies(self.mechanism, self.equations))
+        return self.known_program("energies", "energies", lambda: energies(self.mechanism, self.own_equations))
 
     def known_program(self, key: Any, name: str, expressions: Callable[[], Sequence[Expression]]) -> Program:
         """Return a program of (t, q, u, a, reactions) that is made once for all assemblies of this structure.
@@ -491,7 +491,7 @@ class Assembly:
 
     def state_program(self, name: str, expressions: Sequence[Expression]) -> Program:
         """Return a program of (t, q, u, a, reactions) in the coordinates of this form."""
-        equations = self.equations
+        equations = self.own_equations
         groups = (
             *state_groups(equations),
             InputGroup("a", equations.accelerations),

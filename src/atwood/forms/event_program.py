@@ -40,7 +40,7 @@ def event_program(
     Program or None
         None where the values cannot be had so: reactions of redundant constraints, or of very many bodies.
     """
-    equations = assembly.equations
+    equations = assembly.own_equations
     known: dict[Expression, Expression] = {}
     symbols = [one.symbol for one in assembly.reactions if any(depends_on(value, [one.symbol]) for value in values)]
     if symbols:

@@ -88,7 +88,7 @@ def recipe(assembly: Assembly) -> tuple[Callable[..., Assembly], tuple[Shared, _
         assembly.held,
         assembly.why_new,
     )
-    return _restored, (assembly.shared, _Recipe(*parts, tuple(one.name for one in assembly.equations.names)))
+    return _restored, (assembly.shared, _Recipe(*parts, tuple(one.name for one in assembly.own_equations.names)))
 
 
 def _restored(shared: Shared, made_from: _Recipe) -> Assembly:
@@ -103,7 +103,7 @@ def _restored(shared: Shared, made_from: _Recipe) -> Assembly:
         held=made_from.held,
         why_new=made_from.why_new,
     )
-    names = tuple(one.name for one in made.equations.names)
+    names = tuple(one.name for one in made.own_equations.names)
     if names != made_from.coordinates or len(made_from.relations or made.relations) != len(made.relations):
         raise UsageError(
             "it was pickled by another version, whose equations have other unknowns",

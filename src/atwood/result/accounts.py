@@ -39,7 +39,7 @@ def account(segment: SegmentRecord, drives: DrivePower) -> Piece:
         Gives the power of constraints that move with time.
     """
     assembly, state = segment.assembly, (segment.coordinates, segment.speeds)
-    mechanism, equations = assembly.mechanism, assembly.equations
+    mechanism, equations = assembly.mechanism, assembly.own_equations
     switching = assembly.known_program(
         "switched energy", "switched energy", lambda: [switched_energy(mechanism, equations)]
     )
@@ -62,7 +62,7 @@ def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
     """Return what moves with which velocities."""
     assembly = segment.assembly
     masses: list[MovingMass] = assembly.shared.get(
-        "moving masses", lambda: moving_masses(assembly.mechanism, assembly.equations)
+        "moving masses", lambda: moving_masses(assembly.mechanism, assembly.own_equations)
     )
     program = assembly.known_program(
         "moving masses",
@@ -82,7 +82,9 @@ def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
 def power_into(segment: SegmentRecord, drives: DrivePower) -> FloatArray | None:
     """Return the power that is put into the scene at each sample, or None if nothing can."""
     assembly = segment.assembly
-    program = assembly.known_program("power", "power", lambda: [applied_power(assembly.mechanism, assembly.equations)])
+    program = assembly.known_program(
+        "power", "power", lambda: [applied_power(assembly.mechanism, assembly.own_equations)]
+    )
     moving = any(_moves_by_itself(assembly.maximal, one) for one in assembly.maximal.constraints)
     if program.results[0].is_zero and not moving:
         return None

@@ -142,7 +142,7 @@ class Result(Trajectories):
     def immobile(self) -> Immobile | None:
         """Why nothing can move, and what would have to let go; None if something can, or is driven."""
         plan, start = self._segments[0].plan, self.start
-        freedom = len(plan.assembly.equations.speeds) - plan.finding.rank
+        freedom = len(plan.assembly.own_equations.speeds) - plan.finding.rank
         return find_immobile(self.assembly, freedom, start)
 
     @cached_property
@@ -250,7 +250,7 @@ class Result(Trajectories):
         observables = assembly.find_observables(paths)
         symbols = [one.symbol for one in assembly.reactions]
         reading = [depends_on(one.value, symbols) for one in observables]
-        accelerating = [depends_on(one.value, assembly.equations.accelerations) for one in observables]
+        accelerating = [depends_on(one.value, assembly.own_equations.accelerations) for one in observables]
         reactions = np.zeros((len(symbols), len(segment.time)))
         accelerations = np.zeros_like(segment.speeds)
         if any(reading):
@@ -389,7 +389,7 @@ class Result(Trajectories):
         times = self.time
         yield "time", f"{times[0]:g} to {times[-1]:g} s, {count_of(len(times), 'output time')}"
         yield "solver", f"{self.solver} ({count_of(self.statistics.steps, 'step')})"
-        names = [one.name for one in self.assembly.equations.names]
+        names = [one.name for one in self.assembly.own_equations.names]
         yield "coordinates", listed(names)
         told = [f"{one.message or one.part} at {one.time:.6g} s" for one in self.events]
         if told:

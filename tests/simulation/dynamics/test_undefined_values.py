@@ -154,10 +154,10 @@ class Harmless(Part):
 def state(scene: Scene, x: list[float], vx: float = 1.0, form: str = "dae"):
     """Return an assembly with states at which the bob is at some places along x, z at 0."""
     assembly = atwood.assemble(scene, form=form)
-    names = [one.name for one in assembly.equations.names]
+    names = [one.name for one in assembly.own_equations.names]
     q = np.zeros((len(names), len(x)))
     q[names.index("bob.position.x")] = x
-    u = np.zeros((len(assembly.equations.speeds), len(x)))
+    u = np.zeros((len(assembly.own_equations.speeds), len(x)))
     u[names.index("bob.position.x")] = vx
     return assembly, np.arange(float(len(x))), q, u
 

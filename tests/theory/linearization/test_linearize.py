@@ -23,7 +23,15 @@ from atwood_library import (
     Mass1D,
     Spring,
 )
-from atwood_library.scenes import BenchmarkBicycle, FreeBody, LagrangeTop, PendulumOnCart, SliderCrank, StewartPlatform
+from atwood_library.scenes import (
+    BenchmarkBicycle,
+    FourBarRow,
+    FreeBody,
+    LagrangeTop,
+    PendulumOnCart,
+    SliderCrank,
+    StewartPlatform,
+)
 
 
 def four(model: atwood.LinearModel) -> np.ndarray:
@@ -217,6 +225,13 @@ def flow_at(point: OperatingPoint) -> Flow:
 def input_names(scene: Scene) -> list[str]:
     flat = flatten(scene)
     return [f"{path}.{name}" for path, part in flat.parts.items() for name in part.signals]
+
+
+def test_singular_positions_have_no_linear_model() -> None:
+    with pytest.raises(StartError, match="singular position"):
+        linearize(FourBarRow(windows=1), at={"crank[0].angle": math.pi})
+    beside = linearize(FourBarRow(windows=1), at={"crank[0].angle": 0.5 * math.pi})
+    assert len(beside.states) == 2
 
 
 def test_a_state_of_a_run_is_linearised_in_its_own_frame() -> None:

@@ -186,11 +186,11 @@ def _place_grounds(
 
 def _node_points(result: Result) -> dict[int, FloatArray]:
     """Return x and z of every node at the output times."""
-    nodes = sorted(result.assembly.equations.kinematics.placements.positions)
+    nodes = sorted(result.assembly.own_equations.kinematics.placements.positions)
 
     def places(assembly: Assembly) -> Iterator[Scalar]:
         for node in nodes:
-            position = assembly.equations.kinematics.placements.positions[node]
+            position = assembly.own_equations.kinematics.placements.positions[node]
             where = assembly.mechanism.space.vector(tuple(position))
             yield from (where.x, where.z)
 
@@ -204,7 +204,7 @@ def _node_angles(result: Result, nodes: Sequence[int]) -> dict[int, FloatArray]:
         return {}
 
     def angles(assembly: Assembly) -> Iterator[Scalar]:
-        mechanism, known = assembly.mechanism, assembly.equations.kinematics.placements.angles
+        mechanism, known = assembly.mechanism, assembly.own_equations.kinematics.placements.angles
         for node in nodes:
             body = mechanism.bodies.bodies[mechanism.bodies.body_of[node]]
             own = known.get(body.index)

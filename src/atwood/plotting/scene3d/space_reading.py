@@ -79,7 +79,7 @@ def _poses(result: Result) -> dict[int, Pose]:
     pieces: list[dict[int, FloatArray]] = []
     for segment in result.run.segments:
         assembly, mechanism = segment.assembly, segment.assembly.mechanism
-        placements, graph = assembly.equations.kinematics.placements, mechanism.table.graph
+        placements, graph = assembly.own_equations.kinematics.placements, mechanism.table.graph
         expressions = []
         for body in mechanism.bodies.bodies:
             expressions += [graph.convert(c) for c in placements.positions[body.root]]

@@ -32,13 +32,13 @@ def check_read_reactions(assembly: Assembly, t: float, q: FloatArray, u: FloatAr
     UnsupportedError
         If there are; with the reaction's constraint, and the constraints that follow from the others.
     """
-    if not assembly.equations.read:
+    if not assembly.own_equations.read:
         return
     maximal = assembly.maximal
     big_q, _ = maximal_state(assembly, np.array([t]), q[:, None], u[:, None])
     finding = find_rank(balance_of(assembly, "dae"), t, big_q[:, 0], motion_scales(maximal, length))
     if finding.redundant:
-        read = next(iter(assembly.equations.read)).name.removeprefix("lambda:")
+        read = next(iter(assembly.own_equations.read)).name.removeprefix("lambda:")
         follow = ", ".join(maximal.constraints[i].label for i in finding.redundant)
         raise UnsupportedError(
             f"a force reads the reaction of {read}, and constraints of the scene are redundant ({follow} follow from "

@@ -68,7 +68,7 @@ def numerical_failure(assembly: Assembly, t: float, q: FloatArray, u: FloatArray
             where=missing.part,
             advice="A law is evaluated where it has no value: look at its formula, and at what the scene does before.",
         )
-    equations = assembly.equations
+    equations = assembly.own_equations
     balance, sizes = balance_of(assembly, assembly.form), motion_scales(equations, scene_length(assembly))
     with np.errstate(all="ignore"):
         contradicts = _most_missed(equations, balance, t, q, sizes)

@@ -127,7 +127,7 @@ def total_mass(assembly: Assembly) -> float:
     """Return the mass of all that moves, at the start, kg."""
 
     def make() -> Program:
-        masses, graph = assembly.equations.masses, assembly.mechanism.table.graph
+        masses, graph = assembly.own_equations.masses, assembly.mechanism.table.graph
         found = [graph.convert(one.mass) for one in masses.bodies.values()]
         found += [graph.convert(m) for one in masses.coupled for row in one.masses for m in row]
         found += [graph.convert(one.mass) for _, one in masses.varying]

@@ -118,7 +118,7 @@ def undefined_value_at(assembly: Assembly, t: float, q: FloatArray, u: FloatArra
 
 def _law_values(assembly: Assembly) -> tuple[list[_Quantity], Program]:
     """Return every law and input of every component as a program of (t, q, u)."""
-    equations, mechanism = assembly.equations, assembly.mechanism
+    equations, mechanism = assembly.own_equations, assembly.mechanism
     # Laws that read reactions are looked at by themselves first, with any value of these.
     some = dict.fromkeys(equations.read, equations.graph.one)
     signals = resolve_signals(mechanism, equations.site, equations.kinematics, some)

@@ -78,8 +78,8 @@ def find_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
     return assembly.shared.get(
         "event_functions",
         lambda: (
-            *list_event_functions(assembly.mechanism, assembly.equations, assembly.reactions, assembly.modes),
-            *switch_functions(assembly.equations),  # last: of what happens at the same time, the others come first
+            *list_event_functions(assembly.mechanism, assembly.own_equations, assembly.reactions, assembly.modes),
+            *switch_functions(assembly.own_equations),  # last: of what happens at the same time, the others come first
         ),
     )
 
@@ -93,7 +93,7 @@ class _Needs:
 
 
 def _find_needs(assembly: Assembly, event_functions: Sequence[EventFunction]) -> _Needs:
-    symbols, accelerations = [one.symbol for one in assembly.reactions], assembly.equations.accelerations
+    symbols, accelerations = [one.symbol for one in assembly.reactions], assembly.own_equations.accelerations
     return _Needs(
         any(depends_on(one.value, symbols) for one in event_functions),
         any(depends_on(one.value, accelerations) for one in event_functions),
@@ -189,7 +189,7 @@ class EventProbe:
         for_ida
             Whether SUNDIALS is to call it.
         """
-        if not self.event_functions or not len(self.assembly.equations.coordinates):
+        if not self.event_functions or not len(self.assembly.own_equations.coordinates):
             return None
         kept, maximal = self.plan.finding.kept, () if self.reactions is None else self.reactions.finding.kept
 
@@ -210,7 +210,7 @@ class EventProbe:
         """Return the events as a function of the solver's vector; None if nothing is watched."""
         if not self.event_functions:
             return None
-        n, m = len(self.assembly.equations.coordinates), len(self.assembly.equations.speeds)
+        n, m = len(self.assembly.own_equations.coordinates), len(self.assembly.own_equations.speeds)
         return lambda t, y, yp: self.values(t, y[:n], y[n : n + m])
 
     def broken_at_start(self, t: float) -> EventRecord | None:

@@ -190,7 +190,7 @@ def _reading_of(assembly: Assembly) -> _Reading:
 
 
 def _make_reading(assembly: Assembly) -> _Reading:
-    mechanism, equations, graph = assembly.mechanism, assembly.equations, assembly.equations.graph
+    mechanism, equations, graph = assembly.mechanism, assembly.own_equations, assembly.own_equations.graph
     signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
     places, expressions = [], []
     for path, local in mechanism.locals_.items():

@@ -80,9 +80,9 @@ def _sizes_of_inertia(mass: Matrix, sizes: FloatArray) -> FloatArray:
 
 
 def _massless_directions(assembly: Assembly, moving: FloatArray) -> StartError:
-    every = motion_names(assembly.equations)
+    every = motion_names(assembly.own_equations)
     names = [name for name, size in zip(every, moving, strict=True) if size > 0.1 * np.max(moving)]
-    units = dict(zip(every, (one.unit for one in assembly.equations.speed_names), strict=True))
+    units = dict(zip(every, (one.unit for one in assembly.own_equations.speed_names), strict=True))
     turns = all(units[name] == "rad/s" for name in names)
     where = _part_of(assembly, names[0])
     acting = _acting_on(assembly, where)

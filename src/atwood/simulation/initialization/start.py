@@ -147,8 +147,8 @@ def _solved(assembly: Assembly) -> Start:
 
 def _without_value(assembly: Assembly, t: float, error: KernelEvaluationError) -> AtwoodError:
     """Return the error that names the law that has no value where bodies are placed if nothing is said of them."""
-    at_rest = reference_coordinates(assembly.equations)
-    found = undefined_value_at(assembly, t, at_rest, np.zeros(len(assembly.equations.speeds)))
+    at_rest = reference_coordinates(assembly.own_equations)
+    found = undefined_value_at(assembly, t, at_rest, np.zeros(len(assembly.own_equations.speeds)))
     if found is None:
         return error
     why = f" ({found.reason})" if found.reason else ""
@@ -161,7 +161,7 @@ def _without_value(assembly: Assembly, t: float, error: KernelEvaluationError) -
 
 def _unworkable(assembly: Assembly, t: float, error: Exception) -> StartError:
     """Return the error of a start whose numbers could not be worked with."""
-    at_rest, still = reference_coordinates(assembly.equations), np.zeros(len(assembly.equations.speeds))
+    at_rest, still = reference_coordinates(assembly.own_equations), np.zeros(len(assembly.own_equations.speeds))
     found = numerical_failure(assembly, t, at_rest, still, error)
     return StartError(found.message, where=found.where, advice=found.advice)
 

@@ -184,7 +184,7 @@ class Plan:
                 f"at t = {t:.6g} the constraints cannot all be satisfied: the error of this one is "
                 f"{misses[worst]:.3g} of the scene's "
                 "size",
-                where=self.assembly.equations.constraints[worst].label,
+                where=self.assembly.own_equations.constraints[worst].label,
                 advice="Drives or lengths contradict each other here, or the mechanism is locked.",
             )
 
@@ -294,7 +294,7 @@ class Plan:
     @property
     def angles(self) -> tuple[int, ...]:
         """Unknowns that are angles, whose size does not say how accurate they must be."""
-        return tuple(i for i, one in enumerate(self.assembly.equations.names) if one.unit == "rad")
+        return tuple(i for i, one in enumerate(self.assembly.own_equations.names) if one.unit == "rad")
 
     def tolerances(self, relative: float) -> FloatArray:
         """Return the absolute tolerance of each unknown; multipliers are kept out of the error test."""
@@ -323,7 +323,7 @@ def _restored(
 def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceProgram:
     from atwood.forms.null_space import null_space_program
 
-    equations = keep_constraints(assembly.equations, kept)
+    equations = keep_constraints(assembly.own_equations, kept)
     return null_space_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)
 
 
@@ -361,7 +361,7 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
 
 
 def _make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
-    equations = assembly.equations
+    equations = assembly.own_equations
     balance = balance_of(assembly, assembly.form)
     sizes, coordinate_sizes = motion_scales(equations, length), coordinate_scales(equations, length)
     finding = find_rank(balance, t, q, sizes)
@@ -404,7 +404,7 @@ def _dependent(
 
 
 def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
-    constraints = assembly.equations.constraints
+    constraints = assembly.own_equations.constraints
     lost = [constraints[i].label for i in finding.lost_at_start]
     return StartError(
         "the start is a singular position, from which the mechanism has more than one possible motion: "

@@ -331,9 +331,9 @@ class _Walk:
         plan = self.plan
         if plan is None:
             plan = self._plan()
-            has_states = bool(plan.assembly.equations.states or self.sampler.updates)
+            has_states = bool(plan.assembly.own_equations.states or self.sampler.updates)
             if not self.segments and not options.structure and not has_states:
-                refuse_immobile(self.assembly, len(plan.assembly.equations.speeds) - plan.finding.rank, self.start)
+                refuse_immobile(self.assembly, len(plan.assembly.own_equations.speeds) - plan.finding.rank, self.start)
             self._plans, self.probe = {}, None
             self.choice = choose(plan, options, t, q, u)
         self._plans.setdefault(self._piece, plan)
@@ -487,11 +487,11 @@ def _as_asked(segments: Sequence[SegmentRecord], outputs: int | FloatArray) -> t
 
 def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
     """Refuse motions that are prescribed for what is held, or twice over, where they contradict each other."""
-    prescribed = assembly.equations.prescribed
+    prescribed = assembly.own_equations.prescribed
     if not prescribed:
         return
     program = assembly.known_program("prescribed", "prescribed", lambda: [value for _, value in prescribed])
-    n, m = len(assembly.equations.coordinates), len(assembly.equations.speeds)
+    n, m = len(assembly.own_equations.coordinates), len(assembly.own_equations.speeds)
     idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
     misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])
     if float(np.max(misses)) > tolerances.CLOSED * scene_length(assembly):

@@ -178,5 +178,5 @@ def open_explicit_session(
         series = taylor_problem(assembly, request.end, has_events=bool(probe.directions))
         return open_taylor(problem, series, request.settings(t, LOOSEST), t, y, request.budget)
     session = open_explicit(problem, request.settings(t, LOOSEST), t, y, request.budget, leave=leave, end=request.end)
-    session.limit_steps(longest_step(assembly.equations, request.plan.program.split(y)[1]))
+    session.limit_steps(longest_step(assembly.own_equations, request.plan.program.split(y)[1]))
     return session

@@ -24,7 +24,7 @@ def explain_stuck(plan: Plan, failed: StepResult) -> SolveError | None:
     failed
         How it ended.
     """
-    equations = plan.assembly.equations
+    equations = plan.assembly.own_equations
     _, speeds = plan.program.split(failed.y)
     _, rates = plan.program.split(failed.yp)
     sizes = motion_scales(equations, plan.scales.length)

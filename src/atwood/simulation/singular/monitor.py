@@ -378,11 +378,11 @@ class SingularityMonitor:
         if self.trouble is None:
             return None
         t, lost = self.trouble
-        return stuck_at(self.plan.assembly.equations.constraints[lost], t, message)
+        return stuck_at(self.plan.assembly.own_equations.constraints[lost], t, message)
 
     def _said(self, constraints: tuple[int, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the labels of constraints, and the parts that they belong to."""
-        every = [self.plan.assembly.equations.constraints[i] for i in constraints]
+        every = [self.plan.assembly.own_equations.constraints[i] for i in constraints]
         return tuple(one.label for one in every), tuple(dict.fromkeys(one.key[0] for one in every))
 
     def _begin(self, near: float, reach: float) -> tuple[float, FloatArray, FloatArray] | None:

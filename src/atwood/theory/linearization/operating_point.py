@@ -14,15 +14,18 @@ from atwood.arrays import FloatArray
 from atwood.errors import ParameterError, StartError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
+from atwood.linalg.matrices import to_array
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.laws import variation_names
 from atwood.pipeline import assemble, assemble_flat
 from atwood.result.result import Result
+from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.initialization.targets import find_level
+from atwood.tolerances import tolerances
 
 __all__ = [
     "AT",
@@ -154,7 +157,7 @@ def _point(
 ) -> OperatingPoint:
     linear = _linear_scene(assembly, inputs)
     finding = linear.rank(t, q)
-    _refuse_singular(assembly, finding)
+    _refuse_singular(linear, finding, t, q)
     return OperatingPoint(assembly, linear, t, q, u, finding, inputs, is_from_result)
 
 
@@ -213,13 +216,27 @@ def _linear_scene(assembly: Assembly, inputs: Sequence[InputPath]) -> LinearScen
     return LinearScene(assembly, "reduced", varied)
 
 
-def _refuse_singular(assembly: Assembly, finding: RankFinding) -> None:
-    if finding.starts_singular:
-        labels = [assembly.regular.constraints[i].label for i in finding.lost_at_start]
+def _refuse_singular(linear: LinearScene, finding: RankFinding, t: float, q: FloatArray) -> None:
+    """Refuse a position at which, or all but at which, constraints follow from the others and nowhere else."""
+    constraints = linear.equations.constraints
+    lost = list(finding.lost_at_start)
+    if finding.kept and not lost:
+        slopes = balance_of(linear.assembly, "reduced").constraints_at(t, q, np.zeros_like(linear.sizes)).jacobian
+        rows = to_array(slopes)[list(finding.kept)] * linear.sizes
+        largest: dict[tuple[str, str], float] = {}
+        laws = [constraints[i].key[:2] for i in finding.kept]
+        for law, row in zip(laws, rows, strict=True):  # components of one vector are measured by the largest of them
+            largest[law] = max(largest.get(law, 1e-300), float(np.max(np.abs(row))))
+        rows = rows / np.array([largest[law] for law in laws])[:, None]
+        vectors, sizes, _ = np.linalg.svd(rows)
+        if sizes[-1] < tolerances.SINGULAR:
+            lost = [finding.kept[int(np.argmax(np.abs(vectors[:, -1])))]]
+    if lost:
+        labels = [constraints[i].label for i in lost]
         raise StartError(
-            f"this is a singular position: {', '.join(labels)} follow from the other constraints here and nowhere "
-            "else, so that no linear model tells the motions that begin here apart",
-            where=assembly.flat.name,
+            f"this is a singular position: here {', '.join(labels)} all but follows from the other constraints, and "
+            "nowhere else, so that no linear model tells the motions that begin here apart",
+            where=linear.assembly.flat.name,
             advice="Look at a position beside it.",
         )
 
