@@ -289,7 +289,7 @@ def test_only_mechanisms_with_loops_are_looked_at() -> None:
 def test_what_is_said_of_constraints_names_each_part_once() -> None:
     one = given([1.0])
     made = [SimpleNamespace(label=f"c{k}", key=(part, "pin", k)) for k, part in enumerate(("a", "a", "b"))]
-    one.plan.assembly = SimpleNamespace(equations=SimpleNamespace(constraints=made))
+    one.plan.assembly = SimpleNamespace(own_equations=SimpleNamespace(constraints=made))
     assert one._said((2, 0, 1)) == (("c2", "c0", "c1"), ("b", "a"))
 
 
@@ -297,7 +297,7 @@ def test_a_failure_is_explained_only_where_it_was_at_a_singular_position() -> No
     one = given([1.0])
     assert one.explain("no step") is None
     constraint = SimpleNamespace(label="loop.pin", key=("loop", "pin", 0))
-    one.plan.assembly = SimpleNamespace(equations=SimpleNamespace(constraints=[None, constraint]))
+    one.plan.assembly = SimpleNamespace(own_equations=SimpleNamespace(constraints=[None, constraint]))
     one.trouble = (1.5, 1)
     error = one.explain("no step")
     assert error is not None
