@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from atwood.errors import UsageError
 
-__all__ = ["check_directory", "check_readable", "write_atomically"]
+__all__ = ["check_directory", "check_readable", "read_checked", "write_atomically"]
+
+T = TypeVar("T")
 
 
 def check_directory(target: Path) -> None:
@@ -53,6 +56,38 @@ def check_readable(source: Path) -> None:
             raise UsageError("there is no such file", where=str(source), advice="Look at its name and directory.")
     except (OSError, ValueError) as error:
         raise UsageError(f"it cannot be read ({_reason(error)})", where=str(source), advice=_ANOTHER) from None
+
+
+def read_checked(source: Path, read: Callable[[Path], T], what: str, advice: str) -> T:
+    """Read a file that Atwood saved.
+
+    Parameters
+    ----------
+    source
+        The file.
+    read
+        Reads it; of a damaged file it may raise anything.
+    what
+        What the file is to hold, in a word.
+    advice
+        What to do about a damaged one.
+
+    Raises
+    ------
+    UsageError
+        If there is no such file, or it holds something else.
+    """
+    check_readable(source)
+    try:
+        return read(source)
+    except UsageError:
+        raise
+    except Exception as error:  # of a damaged file, its readers raise whatever comes
+        raise UsageError(
+            f"this is no {what} that Atwood saved, or it is damaged ({type(error).__name__}: {error})",
+            where=str(source),
+            advice=advice,
+        ) from error
 
 
 def write_atomically(target: Path, write: Callable[[Path], object]) -> None:

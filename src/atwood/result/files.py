@@ -27,7 +27,7 @@ import numpy as np
 from atwood.arguments import FILE, instance, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.files import check_directory, check_readable, write_atomically
+from atwood.files import check_directory, read_checked, write_atomically
 from atwood.late import dataclass
 from atwood.model.declare.quantities import PATHS, Quantity
 from atwood.result.about import describe_run
@@ -162,17 +162,7 @@ def load_result(file: str | os.PathLike[str]) -> SavedResult:
     """
     source = Path(file)
     _, read = _format_of(source)
-    check_readable(source)
-    try:
-        return read(source)
-    except UsageError:
-        raise
-    except Exception as error:  # of a damaged file, its readers raise whatever comes
-        raise UsageError(
-            f"this is no result that Atwood saved, or it is damaged ({type(error).__name__}: {error})",
-            where=str(source),
-            advice="Save the run again.",
-        ) from error
+    return read_checked(source, read, "result", "Save the run again.")
 
 
 def check_target(file: str | os.PathLike[str]) -> None:

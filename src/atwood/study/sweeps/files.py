@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from atwood.arguments import FILE, instance, takes
 from atwood.errors import UsageError
-from atwood.files import check_directory, check_readable, write_atomically
+from atwood.files import check_directory, read_checked, write_atomically
 from atwood.result.formats.dataset import Dataset, Variable
 from atwood.result.formats.matlab import read_matlab, write_matlab
 from atwood.result.formats.netcdf import read_netcdf, write_netcdf
@@ -76,17 +76,7 @@ def load_sweep(file: str | os.PathLike[str]) -> Sweep:
     """
     source = Path(file)
     _, read = _format_of(source)
-    check_readable(source)
-    try:
-        return read(source)
-    except UsageError:
-        raise
-    except Exception as error:  # of a damaged file, its readers raise whatever comes
-        raise UsageError(
-            f"this is no sweep that Atwood saved, or it is damaged ({type(error).__name__}: {error})",
-            where=str(source),
-            advice="Save the sweep again.",
-        ) from error
+    return read_checked(source, read, "sweep", "Save the sweep again.")
 
 
 def check_sweep_target(file: str | os.PathLike[str]) -> None:
