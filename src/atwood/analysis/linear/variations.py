@@ -20,12 +20,11 @@ from atwood.analysis.linear.tangents import Tangents, find_tangents
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.codegen.rounding import ROUGHNESS
-from atwood.errors import SolveError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, SparseMatrix, jacobian
 from atwood.forms.assembly import Assembly, FormName
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.simulation.dynamics.balance import balance_of
+from atwood.simulation.dynamics.balance import balance_of, solve_determined
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
 from atwood.simulation.dynamics.scales import motion_scales, scene_length
 
@@ -287,12 +286,12 @@ class LinearScene:
         if m:
             matrix[:n, n:] = still.by["force", "multipliers"][:, kept]
             matrix[n:, :n] = still.by["second", "a"][kept]
-        solved = _solve(matrix, -np.concatenate([still.values["force"], still.values["second"][kept]]), t)
+        solved = solve_determined(matrix, -np.concatenate([still.values["force"], still.values["second"][kept]]), t)
         a, held = solved[:n], zero_held.copy()
         held[kept] = solved[n:]
         now = self.variation(t, q, u, a, held)
         force, second = (np.hstack(now.along(name)) for name in ("force", "second"))
-        moved = _solve(matrix, -np.concatenate([force, second[kept]]), t)
+        moved = solve_determined(matrix, -np.concatenate([force, second[kept]]), t)
         multiplier = np.zeros((len(zero_held), force.shape[1]))
         multiplier[kept] = moved[n:]
         return Flow(now, self._shift(now), moved[:n], multiplier)
@@ -309,22 +308,3 @@ class LinearScene:
             found[:, : len(self.tangents)] -= turned
         shifted: FloatArray = inverse @ found
         return shifted
-
-
-def _solve(matrix: FloatArray, right: FloatArray, t: float) -> FloatArray:
-    """Solve a linear system after scaling rows and columns to like size."""
-    if not len(matrix):
-        return np.zeros(right.shape)
-    size = np.sqrt(np.maximum(np.max(np.abs(matrix), axis=1), np.max(np.abs(matrix), axis=0)))
-    size[size == 0.0] = 1.0
-    scale = size if right.ndim == 1 else size[:, None]
-    try:
-        found: FloatArray = np.linalg.solve(matrix / size[:, None] / size, right / scale) / scale
-    except np.linalg.LinAlgError:
-        found = np.full(right.shape, np.nan)
-    if not np.all(np.isfinite(found)):
-        raise SolveError(
-            f"at t = {t:.6g} the forces do not determine the accelerations",
-            advice="Something without mass is free to move here, or the mechanism is in a singular position.",
-        )
-    return found

@@ -32,6 +32,7 @@ __all__ = [
     "BalanceValues",
     "balance_of",
     "solve_balance",
+    "solve_determined",
 ]
 
 
@@ -244,17 +245,39 @@ def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -
     matrix[:n, :n] = now.mass
     matrix[:n, n:] = -jacobian.T
     matrix[n:, :n] = jacobian
-    right = np.concatenate([-now.bias, -gamma])
-    # Scaling to rows and columns of like size, so that singular means singular.
-    size = np.sqrt(np.maximum(np.max(np.abs(matrix), axis=1), np.max(np.abs(matrix), axis=0))) if n + m else right
+    solution = solve_determined(matrix, np.concatenate([-now.bias, -gamma]), t)
+    return solution[:n], solution[n:]
+
+
+def solve_determined(matrix: FloatArray, right: FloatArray, t: float) -> FloatArray:
+    """Solve a balance of forces, scaled to rows and columns of like size so that singular means singular.
+
+    Parameters
+    ----------
+    matrix
+        The balance, square.
+    right
+        One right-hand side, or several as columns.
+    t
+        The time, for the error.
+
+    Raises
+    ------
+    SolveError
+        If there is no solution, or more than one.
+    """
+    if not len(matrix):
+        return np.zeros(right.shape)
+    size = np.sqrt(np.maximum(np.max(np.abs(matrix), axis=1), np.max(np.abs(matrix), axis=0)))
     size[size == 0.0] = 1.0
+    scale = size if right.ndim == 1 else size[:, None]
     try:
-        solution = np.linalg.solve(matrix / size[:, None] / size, right / size) / size
+        solution: FloatArray = np.linalg.solve(matrix / size[:, None] / size, right / scale) / scale
     except np.linalg.LinAlgError:
         raise _undetermined(t) from None
     if not np.all(np.isfinite(solution)):
         raise _undetermined(t)
-    return solution[:n], solution[n:]
+    return solution
 
 
 def _undetermined(t: float) -> SolveError:
