@@ -1,0 +1,108 @@
+"""Examples of the Modelica Standard Library 4.1.0 from library parts, against its published reference trajectories.
+
+The figures are those of Dymola at a tolerance of 1e-6 or less (modelica/MAP-LIB_ReferenceResults, branch v4.1.0): some
+times, with the range of each signal over the whole run. `docs/modelica.md` has the largest differences over all times.
+
+All of them, in both forms: ``python -m pytest tests/library/test_modelica.py --all``.
+"""
+
+from __future__ import annotations
+
+import json
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from atwood import Result, simulate
+
+from ..references.modelica.building import Example
+
+ROOT = Path(__file__).parents[2]
+DOMAINS = ("translational", "rotational")
+EXAMPLES: dict[str, Example] = {}
+REFERENCE: dict[str, Any] = {}
+for domain in DOMAINS:
+    found = import_module(f"..references.modelica.{domain}", __package__).EXAMPLES
+    EXAMPLES |= {f"{domain}.{name}": example for name, example in found.items()}
+    text = (ROOT / "tests" / "references" / "modelica" / f"{domain}.json").read_text()
+    REFERENCE |= {f"{domain}.{name}": figures for name, figures in json.loads(text).items()}
+
+SAME = 1e-4
+"""Of the range of a signal: what is within it is the same."""
+
+
+def run(name: str, form: str, rtol: float) -> Result:
+    """Return the run of an example, with the times of the reference among its own."""
+    example, figures = EXAMPLES[name], REFERENCE[name]
+    return simulate(
+        example.make(), t_end=figures["end"], form=form, rtol=rtol, outputs=figures["times"], **example.options
+    )
+
+
+def differences(name: str, result: Result) -> dict[str, np.ndarray]:
+    """Return, for each signal, by how much it differs at the times of the reference, over its range."""
+    figures = REFERENCE[name]
+    at = np.searchsorted(result.time, figures["times"])
+    assert result.time[at] == pytest.approx(figures["times"], abs=1e-12)
+    return {
+        path: np.abs(EXAMPLES[name].signal(path).read(result)[at] - known["values"]) / known["range"]
+        for path, known in figures["signals"].items()
+    }
+
+
+@pytest.mark.sample(16)
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_trajectories_meet_those_of_modelica(name: str, form: str) -> None:
+    early = np.array(REFERENCE[name]["times"]) <= 0.2 * REFERENCE[name]["end"]
+    for path, off in differences(name, run(name, form, 1e-9)).items():
+        assert max(off[early] if path in EXAMPLES[name].reference_errs else off) < SAME, path
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("name", [name for name, example in EXAMPLES.items() if example.reference_errs])
+def test_where_they_differ_later_the_reference_errs(name: str) -> None:
+    """What they differ by is many times what a tolerance a thousand times smaller changes here."""
+    coarse, fine = (run(name, "reduced", rtol) for rtol in (1e-8, 1e-11))
+    off, times = differences(name, fine), REFERENCE[name]["times"]
+    for path in EXAMPLES[name].reference_errs:
+        a, b = (EXAMPLES[name].signal(path).read(r)[np.searchsorted(r.time, times)] for r in (coarse, fine))
+        assert max(abs(a - b)) / REFERENCE[name]["signals"][path]["range"] < 0.25 * max(off[path])
+
+
+def driven(stiffness: np.ndarray, damping: np.ndarray, push: np.ndarray, frequency: float, end: float) -> np.ndarray:
+    """Return places and speeds from rest, pushed by ``push sin(frequency t)``: the exponential of a matrix."""
+    n = len(push)
+    linear = np.zeros((2 * n + 2, 2 * n + 2))
+    linear[:n, n : 2 * n] = np.eye(n)
+    linear[n : 2 * n, :n], linear[n : 2 * n, n : 2 * n], linear[n : 2 * n, 2 * n] = -stiffness, -damping, push
+    linear[2 * n, 2 * n + 1], linear[2 * n + 1, 2 * n] = frequency, -frequency
+    state: np.ndarray = expm(linear * end)[:, -1]
+    return state[: 2 * n]
+
+
+def test_where_they_differ_most_the_exact_solution_is_met() -> None:
+    """Two linear examples, in which the reference is off by more than 1e-4 before a fifth of the run, too."""
+    for example, frame, pair in (("translational", "mass", "displacement"), ("rotational", "inertia", "angle")):
+        rate = {"displacement": "speed", "angle": "angular_velocity"}[pair]
+        result = run(f"{example}.GenerationOfFMUs", "reduced", 1e-11)
+        spring = np.array([[1e4 / 1.1, -1e4 / 1.1], [-1e4 / 2.2, 1e4 / 2.2]])
+        exact = driven(spring, 0.0 * spring, np.array([10.0 / 1.1, 0.0]), 4.0 * np.pi, result.time[-1])
+        found = [result[f"{frame}3{side}.{what}"][-1] for what in (pair, rate) for side in "ab"]
+        assert found == pytest.approx(exact, abs=1e-9)
+    result, frequency = run("translational.Oscillator", "reduced", 1e-11), 2.0 * np.pi * 15.9155
+    for mass, damping in (("mass1", 0.0), ("mass2", 10.0)):
+        place, speed = driven(np.full((1, 1), 1e4), np.full((1, 1), damping), np.ones(1), frequency, result.time[-1])
+        assert result[f"{mass}.displacement"][-1] == pytest.approx(place - 0.5, abs=1e-10)
+        assert result[f"{mass}.speed"][-1] == pytest.approx(speed, abs=1e-8)
+
+
+def test_each_example_has_figures() -> None:
+    assert EXAMPLES.keys() == REFERENCE.keys()
+    for name, example in EXAMPLES.items():
+        assert REFERENCE[name]["signals"].keys() <= example.signals.keys()
+        assert set(example.reference_errs) <= REFERENCE[name]["signals"].keys()
