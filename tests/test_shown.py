@@ -87,6 +87,7 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "sweep": atwood.sweep(scene, start=angles, t_end=0.1, outputs=30),
         "check": atwood.check(Rod),
         "equations": (atwood.equations(DoublePendulum()), atwood.equations(DoublePendulum()).terms("bob1")),
+        "hamiltonian": atwood.hamiltonian(DoublePendulum()),
         "linear": atwood.linearize(scene, at=hanging, inputs=[], outputs=["bob[0].position.x"]),
         "dynamics": atwood.dynamics(scene),
         "modes": atwood.normal_modes(scene, at=hanging),

@@ -128,6 +128,7 @@ if TYPE_CHECKING:
     from atwood.study.sweeps.sweep import Sweep, sweep
     from atwood.theory.dynamics import Dynamics, dynamics
     from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
+    from atwood.theory.hamiltonian import Hamiltonian, hamiltonian
     from atwood.theory.linearization import (
         BranchPoint,
         Equilibria,
@@ -189,6 +190,7 @@ __all__ += [
     "Equilibrium",
     "EquilibriumBranch",
     "EquilibriumBranches",
+    "Hamiltonian",
     "LinearModel",
     "NormalModes",
     "PartOfEquations",
@@ -198,6 +200,7 @@ __all__ += [
     "equations",
     "equilibria",
     "equilibrium_branches",
+    "hamiltonian",
     "linearize",
     "normal_modes",
     "root_locus",
@@ -299,6 +302,7 @@ _LATER = {
     "EquilibriumBranch": "atwood.theory.linearization",
     "EquilibriumBranches": "atwood.theory.linearization",
     "Formula": "atwood.expr.formulas.formula",
+    "Hamiltonian": "atwood.theory.hamiltonian",
     "LinearModel": "atwood.theory.linearization",
     "MechanismReport": "atwood.reporting",
     "NormalModes": "atwood.theory.linearization",
@@ -318,6 +322,7 @@ _LATER = {
     "equilibrium_branches": "atwood.theory.linearization",
     "formula": "atwood.expr.formulas.formula",
     "from_data": "atwood.model.compose.serialization",
+    "hamiltonian": "atwood.theory.hamiltonian",
     "linearize": "atwood.theory.linearization",
     "load_result": "atwood.result.files",
     "load_scene": "atwood.model.compose.serialization",

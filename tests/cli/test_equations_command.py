@@ -48,3 +48,10 @@ def test_what_does_not_go_together_is_refused() -> None:
     outcome = CliRunner().invoke(main, ["equations", "simple-pendulum", "--latex", "--json"])
     assert outcome.exit_code != 0
     assert "do not go together" in outcome.output
+
+
+def test_the_hamiltonian() -> None:
+    assert "H = ½ p_θ² / (m l²) - m g l cos θ" in run("simple-pendulum", "--hamiltonian")
+    assert json.loads(run("simple-pendulum", "--hamiltonian", "--json"))["is_conserved"] is True
+    outcome = CliRunner().invoke(main, ["equations", "simple-pendulum", "--hamiltonian", "--python"])
+    assert "is not written in Python" in outcome.output

@@ -198,6 +198,7 @@ def run_command(scene: str, as_json: bool, **options: Any) -> None:
 @click.option("--latex", is_flag=True, help="Write the equations of motion in LaTeX.")
 @click.option("--markdown", is_flag=True, help="Write a page: symbols, energies, momenta, equations, matrices.")
 @click.option("--python", is_flag=True, help="Write a module of Python that computes them.")
+@click.option("--hamiltonian", is_flag=True, help="Write the Hamiltonian and the momenta instead.")
 @reporting_errors
 def equations_command(scene: str, as_json: bool, **options: Any) -> None:
     """Write the equations of motion of SCENE: Lagrange's equations, with symbols as in a textbook.

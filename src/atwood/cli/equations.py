@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +11,11 @@ from atwood.cli.output import print_json
 from atwood.cli.scenes import prepare
 from atwood.errors import UsageError
 from atwood.late import dataclass
+
+if TYPE_CHECKING:
+    from atwood.analysis.equation_formulas import Parameters
+    from atwood.analysis.equations import EquationsOfMotion
+    from atwood.analysis.hamiltonian import Hamiltonian
 
 __all__ = ["EquationsRequest", "show_equations"]
 
@@ -28,6 +34,7 @@ class EquationsRequest:
     latex: bool
     markdown: bool
     python: bool
+    hamiltonian: bool
 
 
 def show_equations(request: EquationsRequest) -> None:
@@ -41,7 +48,16 @@ def show_equations(request: EquationsRequest) -> None:
         raise UsageError(f"{names} do not go together", advice="Give one of them.")
     scene, name = prepare(request.scene, request.settings, request.starts)
     assembly = assemble(scene, form=request.form, orientation=request.orientation, name=name)
-    found = read_equations(assembly, "values" if request.values else "symbolic")
+    parameters: Parameters = "values" if request.values else "symbolic"
+    found: EquationsOfMotion | Hamiltonian
+    if request.hamiltonian:
+        if request.python:
+            raise UsageError("--hamiltonian is not written in Python", advice="Give --latex, --markdown or --json.")
+        from atwood.analysis.hamiltonian import read_hamiltonian
+
+        found = read_hamiltonian(assembly, parameters)
+    else:
+        found = read_equations(assembly, parameters)
     if request.as_json:
         print_json(found.to_dict())
         return

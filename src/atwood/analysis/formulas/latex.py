@@ -40,6 +40,8 @@ def _joined(terms: Sequence[tuple[str, str]]) -> str:
 
 def letter(symbol: Symbol, dots: int = 0) -> str:
     """Return a symbol in LaTeX, with dots for derivatives by time."""
+    if symbol.kind == "momentum":  # it has the letter of its coordinate below
+        return f"p_{{{letter(Symbol(symbol.subscripts[0], symbol.subscripts[1:]))}}}"
     base = symbol.letter
     if base in GREEK:
         base = f"\\{base}"

@@ -35,6 +35,8 @@ def formula(node: Node) -> str:
 
 def letter(symbol: Symbol, dots: int = 0) -> str:
     """Return a symbol with dots for derivatives by time."""
+    if symbol.kind == "momentum":  # it has the letter of its coordinate below
+        return f"p_{letter(Symbol(symbol.subscripts[0], symbol.subscripts[1:]))}"
     base = _LETTERS.get(symbol.letter, symbol.letter) + _DOTS[dots]
     figures = [one for one in symbol.subscripts if one.isdigit()]
     if len(figures) == len(symbol.subscripts):

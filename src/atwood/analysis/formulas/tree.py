@@ -44,7 +44,8 @@ class Symbol:
     value
         Of a parameter; None for what moves.
     kind
-        ``"coordinate"``, ``"angular velocity"``, ``"parameter"``, ``"multiplier"``, ``"time"`` or ``"shared"``.
+        ``"coordinate"``, ``"momentum"``, ``"angular velocity"``, ``"parameter"``, ``"multiplier"``, ``"time"`` or
+        ``"shared"``.
     order
         Where it stands among symbols of its kind.
     """
@@ -66,7 +67,7 @@ class Symbol:
     @property
     def moves(self) -> bool:
         """Whether it is a function of time."""
-        return self.kind in ("coordinate", "angular velocity", "multiplier")
+        return self.kind in ("coordinate", "momentum", "angular velocity", "multiplier")
 
 
 @dataclass(frozen=True)
