@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from atwood_library.blocks.sample_delay import SampleDelay as SampleDelay
     from atwood_library.blocks.sampled_feedback import SampledFeedback as SampledFeedback
     from atwood_library.blocks.second_order import SecondOrder as SecondOrder
+    from atwood_library.blocks.servo_controller import ServoController as ServoController
     from atwood_library.blocks.state_space import StateSpace as StateSpace
     from atwood_library.blocks.transfer_function import TransferFunction as TransferFunction
     from atwood_library.drives.inertia import Inertia as Inertia
@@ -118,6 +119,7 @@ if TYPE_CHECKING:
     from atwood_library.sources.sine import Sine as Sine
     from atwood_library.sources.step import Step as Step
     from atwood_library.sources.table import Table as Table
+    from atwood_library.sources.time_function import TimeFunction as TimeFunction
 
 _MODULES = {
     "Add": "blocks.add",
@@ -203,6 +205,7 @@ _MODULES = {
     "SampledFeedback": "blocks.sampled_feedback",
     "Screw": "joints.screw",
     "SecondOrder": "blocks.second_order",
+    "ServoController": "blocks.servo_controller",
     "Sine": "sources.sine",
     "SlideGear": "joints.slide_gear",
     "Slider": "joints.slider",
@@ -212,6 +215,7 @@ _MODULES = {
     "StateSpace": "blocks.state_space",
     "Step": "sources.step",
     "Table": "sources.table",
+    "TimeFunction": "sources.time_function",
     "Torque": "forces.torque",
     "TorsionDamper": "forces.torsion_damper",
     "TorsionSpring": "forces.torsion_spring",

@@ -66,6 +66,7 @@ SIZES = {
     "rattleback": (6, 3, 0, 3),
     "ball-in-shell": (7, 6, 3, 3),
     "double-cardan-twice": (7, 7, 8, 1),
+    "six-axis-arm": (12, 6, 0, 6),
 }
 
 

@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from atwood_library.scenes.rotating_hoop_free import RotatingHoopFree as RotatingHoopFree
     from atwood_library.scenes.scott_russell_lift import ScottRussellLift as ScottRussellLift
     from atwood_library.scenes.simple_pendulum import SimplePendulum as SimplePendulum
+    from atwood_library.scenes.six_axis_arm import SixAxisArm as SixAxisArm
     from atwood_library.scenes.slider_crank import SliderCrank as SliderCrank
     from atwood_library.scenes.spatial_slider_crank import SpatialSliderCrank as SpatialSliderCrank
     from atwood_library.scenes.spherical_pendulum import SphericalPendulum as SphericalPendulum
@@ -128,6 +129,7 @@ _CLASSES = {
     "double-cardan-twice": "DoubleCardanTwice",
     "scott-russell-lift": "ScottRussellLift",
     "strandbeest": "Strandbeest",
+    "six-axis-arm": "SixAxisArm",
     "cart-pole": "CartPole",
     "quarter-car": "QuarterCar",
     "furuta-pendulum": "FurutaPendulum",
