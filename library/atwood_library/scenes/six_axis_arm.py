@@ -42,7 +42,9 @@ class SixAxisArm(Scene):
     ratio: float = parameter(100.0, above=0.0, doc="Turns of a motor for one of its axis.")
     rotor: float = parameter(2e-3, unit="kg*m^2", above=0.0, doc="Moment of inertia of a motor.")
     position_gain: float = parameter(20.0, unit="1/s", above=0.0, doc="Gain of the controllers of positions.")
-    gain: float = parameter(60.0, unit="N*m*s/rad", above=0.0, doc="Torque of a motor for an axis that lags by 1 rad/s.")
+    gain: float = parameter(
+        60.0, unit="N*m*s/rad", above=0.0, doc="Torque of a motor for an axis that lags by 1 rad/s."
+    )
     drives: str = parameter("controlled", choices=("controlled", "ideal"), doc="What turns the axes.")
     space = "space"
     t_end = 2.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-
 from collections.abc import Callable
 
 from atwood import Scalar, Scene, cos, maximum, minimum, parameter, sin, sqrt
@@ -105,9 +104,7 @@ class StewartPlatform(Scene):
         self.guess[f"universal{leg}.angle_a"], self.guess[f"universal{leg}.angle_b"] = first, second
         self.guess[f"leg{leg}.displacement"] = 0.5 * length
 
-    def _wanted(
-        self, foot: tuple[float, float], ball: tuple[float, float], upper: float
-    ) -> Callable[[Scalar], Scalar]:
+    def _wanted(self, foot: tuple[float, float], ball: tuple[float, float], upper: float) -> Callable[[Scalar], Scalar]:
         """Return by how much a leg stretches on the lap, m, as a function of time."""
 
         def stretched(t: Scalar) -> Scalar:
