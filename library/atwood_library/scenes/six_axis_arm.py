@@ -28,8 +28,8 @@ class SixAxisArm(Scene):
     """An arm of six bodies on hinges follows a trajectory: each axis has a motor with inertia, a gear and a controller.
 
     Each angle goes its `travel` from rest to rest with least jerk, all in one time. A controller is a spring of
-    stiffness ``ratio gain position_gain`` about its axis that is more than critically damped by the motor's share of the
-    inertia, so that an error stays below the largest torque that the trajectory asks for, over that stiffness
+    stiffness ``ratio gain position_gain`` about its axis that is more than critically damped. So the errors, taken as
+    one vector, stay below the largest vector of torques that the trajectory asks for, over that stiffness
     (`stiffness`). ``drives="ideal"`` prescribes the angles instead, and gives these torques (Siciliano et al.,
     Robotics, sections 7.2 and 8.3).
     """
@@ -42,9 +42,7 @@ class SixAxisArm(Scene):
     ratio: float = parameter(100.0, above=0.0, doc="Turns of a motor for one of its axis.")
     rotor: float = parameter(2e-3, unit="kg*m^2", above=0.0, doc="Moment of inertia of a motor.")
     position_gain: float = parameter(20.0, unit="1/s", above=0.0, doc="Gain of the controllers of positions.")
-    gain: float = parameter(
-        60.0, unit="N*m*s/rad", above=0.0, doc="Torque of a motor for an axis that lags by 1 rad/s."
-    )
+    gain: float = parameter(60.0, unit="N*m*s/rad", above=0.0, doc="Torque of a motor if its axis lags by 1 rad/s.")
     drives: str = parameter("controlled", choices=("controlled", "ideal"), doc="What turns the axes.")
     space = "space"
     t_end = 2.0

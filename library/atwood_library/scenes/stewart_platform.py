@@ -24,8 +24,8 @@ class StewartPlatform(Scene):
     freedom, five loops. With ``legs="controlled"`` each leg has an actuator and a controller of its length, and the
     platform follows a lap: its centre goes once round a circle of radius `aside`, from rest to rest with least jerk,
     while it turns by `yaw` and back. The controllers are springs of stiffness `leg_stiffness` that are more than
-    critically damped, so that the errors of the lengths stay below the largest forces that the lap asks for, over that
-    stiffness. ``legs="ideal"`` prescribes the lengths instead, and gives these forces.
+    critically damped, so that the errors of the lengths, taken as one vector, stay below the largest vector of forces
+    that the lap asks for, over that stiffness. ``legs="ideal"`` prescribes the lengths instead, and gives these forces.
     """
 
     base_radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius of the circle of the feet.")
