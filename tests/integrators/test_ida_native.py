@@ -79,6 +79,7 @@ def pendulum() -> ImplicitProblem:
     return ImplicitProblem(6, residual, jacobian, dense_pattern(6), algebraic=(4, 5))
 
 
+OSCILLATOR_START = np.array([1.0, 0]), np.array([0, -1.0])
 PENDULUM_START = np.array([1.0, 0, 0, 0, 0, 0]), np.array([0, 0, 0, -GRAVITY, 0, 0])
 
 
@@ -423,6 +424,55 @@ class TestCompiled:
         reference = ida_sundae.open_session(oscillator(), TIGHT, 0.0, np.array([1.0, 0]), np.array([0, -1.0]))
         assert_allclose(end.y, reference.advance(5.0).y, rtol=1e-12)
         assert session.statistics.steps == reference.statistics.steps
+
+    @pytest.mark.parametrize("polled", [False, True])
+    @pytest.mark.parametrize("compiled", [False, True])
+    @pytest.mark.parametrize("watched", [False, True])
+    def test_what_is_read_from_a_step_is_what_single_advances_give(
+        self, polled: bool, compiled: bool, watched: bool
+    ) -> None:
+        """Many outputs lie in one step: they are read at once, up to what may stop the run between them."""
+        events = {"events": lambda t, y, yp: (y[0], y[1] - 0.9), "event_count": 2, "event_directions": (0, 1)}
+        plain = oscillator(**(events if watched else {}))
+        problem = with_c_functions(plain, Record()) if compiled else plain
+        times, found, advances = np.linspace(0.0, 9.0, 2001).tolist(), [], []
+        for reads in (False, True):
+            session = ida_native.open_session(problem, TIGHT, 0.0, np.array([1.0, 0]), np.array([0, -1.0]))
+            session.budget = Budget(poll=lambda t: None) if polled else Budget()
+            states, done, asked = [], 0, 0
+            while done < len(times):
+                end, asked = session.advance(times[done]), asked + 1
+                states.append((end.t, end.events if end.status is Status.EVENT else (), *end.y))
+                if end.status is Status.EVENT:
+                    session.reinitialize(end.t, end.y, end.yp)
+                    continue
+                done += 1
+                rows = session.read_on(times, done, len(times)) if reads else []
+                states += [(t, (), *row) for t, row in zip(times[done:], rows, strict=False)]
+                done += len(rows)
+            found.append(states)
+            advances.append(asked)
+            assert session.read_on(times, len(times), len(times)).shape == (0, 2)
+        assert found[0] == found[1]
+        assert len(found[0]) == 2001 + watched * 4
+        assert advances[0] == len(found[0])
+        assert advances[1] < 0.5 * advances[0]
+
+    def test_what_is_read_changes_nothing_of_what_follows(self) -> None:
+        """A state that is handed in after some have been read is taken up, and a closed session reads nothing."""
+        sessions = [ida_native.open_session(oscillator(), TIGHT, 0.0, *OSCILLATOR_START) for _ in range(2)]
+        for session in sessions:
+            end = session.advance(1.0)
+            session.reinitialize(end.t, 2.0 * end.y, 2.0 * end.yp)
+            session.advance(1.2)
+        times = np.linspace(1.2, 1.3, 1001).tolist()
+        assert 0 < len(sessions[1].read_on(times, 1, 1001)) < 1000
+        assert_array_equal(*(one.advance(2.0).y for one in sessions))
+        assert sessions[0].statistics.steps == sessions[1].statistics.steps
+        with sessions[1], pytest.raises(UsageError, match="cannot advance"):
+            sessions[1].advance(1.5)
+        with pytest.raises(UsageError, match="closed"):
+            sessions[1].read_on([3.0], 0, 1)
 
     @pytest.mark.parametrize("polled", [False, True])
     @pytest.mark.parametrize("outputs", [2, 7, 200])

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from enum import Enum
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -31,6 +31,7 @@ __all__ = [
     "Lookout",
     "NativeCallbacks",
     "OpenSession",
+    "ReadingSession",
     "Session",
     "SolverOptions",
     "Statistics",
@@ -374,6 +375,30 @@ class Session(Protocol):
     @property
     def statistics(self) -> Statistics:
         """What the session has cost so far, over all its restarts."""
+        ...
+
+
+@runtime_checkable
+class ReadingSession(Session, Protocol):
+    """A run in progress that reads what it knows already without being sent on."""
+
+    def read_on(self, times: Sequence[float], first: int, past: int) -> FloatArray:
+        """Return the solution at times that lie within the last step, as far as nothing can stop the run before them.
+
+        It is what single advances would give, without their looks at what cannot have changed.
+
+        Parameters
+        ----------
+        times
+            Rising.
+        first, past
+            Which of them: from the first number to before the second.
+
+        Returns
+        -------
+        ndarray
+            Of shape (times, unknowns): the values at as many of them as could be read, perhaps none.
+        """
         ...
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import c_double, c_int, c_long, c_void_p
 from typing import Any
 
@@ -227,6 +227,16 @@ class IdaMemory:
         """Put the solution at a time inside the last step into `y` and `yp`; return IDA's flag."""
         flag: int = self.library.IDAGetDky(self._ida, t, 0, self._y)
         return flag or int(self.library.IDAGetDky(self._ida, t, 1, self._yp))
+
+    def interpolate_each(self, times: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+        """Return the solution at times inside the last step, one row each, and its derivative at the last of them."""
+        rows = np.empty((len(times), self.size))
+        read, ida, into, y = self.library.IDAGetDky, self._ida, self._y, self.y
+        for row, t in zip(rows, times, strict=True):
+            flag = read(ida, t, 0, into)
+            row[:] = y if flag == 0 else np.nan
+        flag = read(ida, times[-1], 1, self._yp)
+        return rows, self.yp.copy() if flag == 0 else np.full(self.size, np.nan)
 
     def time(self) -> float:
         """Return the time at the end of the last step."""

@@ -11,6 +11,8 @@ interpolant and never change the steps.
 from __future__ import annotations
 
 import time
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from math import inf
@@ -306,6 +308,24 @@ class NativeSession:
         if self._newest is None:
             self._newest = self._interpolate(self._reached)
         return self._newest
+
+    def read_on(self, times: Sequence[float], first: int, past: int) -> FloatArray:
+        """See `~atwood.integrators.protocol.ReadingSession`."""
+        self._check_open()
+        known = self._reached if self._locator is None else min(self._searched, self._reached)
+        root = None if self._root is None else self._root.state
+        limit = min(self._due(), *(one[0] for one in (self._newest, root) if one is not None), inf)
+        past = min(bisect_right(times, known, first, past), bisect_left(times, limit, first, past))
+        if past <= first or self._stale:
+            return np.empty((0, self._problem.size))
+        began = time.perf_counter()
+        rows, yp = self._memory.interpolate_each(times[first:past])
+        if not is_finite(rows.ravel(), yp):  # an advance says so
+            rows = rows[:0]
+        else:
+            self._here = times[past - 1], rows[-1].copy(), yp
+        self._seconds += time.perf_counter() - began
+        return rows
 
     def _steps(self) -> int:
         return self._earlier.steps + self._memory.steps()

@@ -160,12 +160,17 @@ class Plan:
             self.dependent, self.dependent_speeds = _dependent(self.balance, finding, constraint_jacobian, self.sizes)
         self.program = self.assembly.form_program(finding.kept, self.dependent, self.dependent_speeds)
 
-    def review_output(self, t: float, q: FloatArray) -> bool:
-        """Do the same at an output, unless compiled functions tell by themselves when it is time to.
+    @property
+    def reviews_outputs(self) -> bool:
+        """Whether dependent coordinates are reviewed at outputs.
 
-        These look at the speeds alone.
+        Compiled functions tell by themselves when it is time to, from the speeds alone.
         """
-        return (self._null_space is None or self.dependent != self.dependent_speeds) and self.review_partitioning(t, q)
+        return bool(self.dependent_speeds) and (self._null_space is None or self.dependent != self.dependent_speeds)
+
+    def review_output(self, t: float, q: FloatArray) -> bool:
+        """Do the same at an output, where it is to be done there."""
+        return self.reviews_outputs and self.review_partitioning(t, q)
 
     def check_held(self, t: float, q: FloatArray, u: FloatArray) -> None:
         """Refuse a state that misses constraints even after it has been projected onto them: they contradict.

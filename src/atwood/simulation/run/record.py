@@ -133,6 +133,13 @@ class Recorder:
         if len(pending) >= _PENDING:
             self.settle()
 
+    def take_all(self, t: Sequence[float], y: FloatArray, shown: Sequence[bool]) -> None:
+        """Record states of the solver after the last sample, one row each, to be projected with those that wait."""
+        pending = self._samples[1]
+        pending.extend(zip(t, y, shown, strict=True))
+        if len(pending) >= _PENDING:
+            self.settle()
+
     def take_many(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_]) -> None:
         """Record states of the solver after the last sample, one row each."""
         if len(t):

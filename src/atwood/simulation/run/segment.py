@@ -6,14 +6,14 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import AtwoodError, SolveError
 from atwood.integrators.explicit_session import ExplicitSession
-from atwood.integrators.protocol import Budget, FloatArray, Session, Statistics, Status, StepResult
+from atwood.integrators.protocol import Budget, FloatArray, ReadingSession, Session, Statistics, Status, StepResult
 from atwood.late import dataclass
 from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
@@ -360,7 +360,7 @@ class _Runner:
         segment, recorder, progress = self.segment, self.recorder, self.segment.options.progress
         samples = segment.samples
         times, shown, extra = (x.tolist() for x in (samples.times, samples.shown, samples.between))
-        plan, told = segment.plan, -np.inf
+        plan, told, reads = segment.plan, -np.inf, isinstance(session, ReadingSession)
         looks = plan.is_projected or bool(plan.dependent_speeds) or not plan.balance.kinematic_map.is_plain
         while done < len(times):
             moment, monitor = times[done], self.monitor
@@ -392,14 +392,32 @@ class _Runner:
             if between:
                 continue
             recorder.take(step_result.t, step_result.y, shown[done])
-            done += 1
-            if looks and not extra[done - 1]:
+            first, done = done, done + 1
+            if looks and not extra[first]:
                 plan.review_output(step_result.t, step_result.y[: plan.program.coordinates])
                 self._repair(session, step_result)
-            if progress is not None and moment > told:
-                told = moment
-                progress(moment)
+            if reads and self._reads_on():  # up to the last, at which a monitor looks
+                rows = cast("ReadingSession", session).read_on(times, done, len(times) - 1)
+                recorder.take_all(times[done : done + len(rows)], rows, shown[done : done + len(rows)])
+                done += len(rows)
+            if progress is not None:
+                for moment in times[first:done]:
+                    if moment > told:
+                        told = moment
+                        progress(moment)
         return done, None
+
+    def _reads_on(self) -> bool:
+        """Return whether nothing is looked at, or put right, from one output to the next within a step."""
+        plan, monitor = self.segment.plan, self.monitor
+        looks = plan.finding.redundant if monitor is None else monitor.next < np.inf
+        return not (looks or plan.reviews_outputs or self._repairs)
+
+    @property
+    def _repairs(self) -> bool:
+        """Whether the state may have to be put right at an output."""
+        plan = self.segment.plan
+        return plan.program.level == "index1-projected" or plan.balance.kinematic_map.has_homogeneous
 
     def _pass_over(self, session: Session, crossing: SingularCrossing) -> tuple[int, StepResult | None]:
         """Take a singular crossing into the record and go on behind it, unless something happens on its way."""
