@@ -12,8 +12,8 @@ from typing import Any
 
 from atwood import Model
 from atwood.expr import Expression, OutputGroup, Program, atan2, cos, sin, substitute
-from atwood.forms.assembly import Assembly
-from atwood.forms.places import to_maximal
+from atwood.forms.assembly import MAXIMAL, REDUCED, Assembly
+from atwood.forms.places import TO_MAXIMAL, to_maximal
 from atwood.forms.program import state_groups
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.pipeline import assemble
@@ -115,6 +115,6 @@ def turn_directed(assembly: Assembly) -> Assembly:
         turned += [cos(place), sin(place)] if one.unit == "rad" else [place]
     outputs = (OutputGroup("q", tuple(turned)), OutputGroup("u", tuple(speeds)))
     program = Program(placing.name, state_groups(reduced), placing.parameters, outputs)
-    made = {"reduced": reduced, "maximal": directions_of(maximal)[0], "to maximal": program}
+    made = {REDUCED: reduced, MAXIMAL: directions_of(maximal)[0], (TO_MAXIMAL, True): program}
     assembly.shared._made.update(made)
     return assembly

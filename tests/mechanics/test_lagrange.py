@@ -7,6 +7,7 @@ import pytest
 
 from atwood.arrays import FloatArray
 from atwood.mechanics.outputs.power import applied_power
+from atwood.result.accounts import POWER
 from atwood.simulation.dynamics.reactions import accelerations_and_multipliers, maximal_state
 from atwood_library.scenes import SCENES
 
@@ -98,9 +99,7 @@ def test_power_balance_at_any_state(name: str, form: str) -> None:
         power = -multipliers @ now.explicit_rate[kept] if balance.constraints else 0.0
         if dampers(prepared):
             assembly = prepared.assembly
-            program = assembly.known_program(
-                "power", "power", lambda a=assembly: [applied_power(a.mechanism, a.own_equations)]
-            )
+            program = assembly.known_program(POWER, lambda a=assembly: [applied_power(a.mechanism, a.own_equations)])
             power += assembly.kernel(program)([t], q, u, a, [0.0] * len(assembly.reactions))[0][0]
         if name == "foucault-pendulum":
             continue  # its drive works, and nothing says how much

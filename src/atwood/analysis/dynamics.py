@@ -17,6 +17,7 @@ from atwood.errors import SolveError, UnsupportedError, UsageError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.derivative import is_too_long
+from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.forms.program import state_groups
 from atwood.late import dataclass
@@ -28,6 +29,8 @@ from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start
 
 __all__ = ["Dynamics"]
+
+_PROGRAM: Key[Program] = Key("program of a function of the state")
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,7 +261,7 @@ class Dynamics:
             outputs = (OutputGroup(name, tuple(expressions())),)
             return Program(f"{self._name} {name}", chosen, self.assembly.parameters, outputs)
 
-        program = self.assembly.shared.get(("dynamics", self.assembly.form, name), make)
+        program = self.assembly.shared.get(_PROGRAM, make, self.assembly.form, name)
         return Function(self.assembly, program, shape)
 
     @cached_property

@@ -8,14 +8,17 @@ from typing import Any
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen import compile_native, compile_program
+from atwood.codegen import NativeProgram, compile_native, compile_program
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.expr import Program
 from atwood.expr.core.relations import values_just_after
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.simulation.problem.not_compilable import find_not_compilable
 
 __all__ = ["Function", "Numbers", "at_time"]
+
+_NATIVE: Key[NativeProgram] = Key("machine code for one state")
 
 Numbers = Any
 """An array of floats, or what NumPy makes one of."""
@@ -110,9 +113,8 @@ class Function:
         if find_not_compilable(self.assembly, self.program):
             self._compiled = compile_program(self.program)
         else:
-            self._compiled = self.assembly.shared.get(
-                ("native", id(self.program)), lambda: (self.program, compile_native(self.program))
-            )[1]
+            program = self.program
+            self._compiled = self.assembly.shared.get(_NATIVE, lambda: compile_native(program), program)
         self._kernel = self._compiled.bind(self.assembly.parameter_values)
 
     def _bound(self, t: float | None) -> Any:

@@ -30,6 +30,7 @@ from atwood.expr import (
 )
 from atwood.expr.simplify.collect import cost
 from atwood.forms.derived import derive_once
+from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.late import dataclass
@@ -48,7 +49,9 @@ from atwood.mechanics.dynamics.equations import Equations
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = ["AccelerationProgram", "Method", "acceleration_program"]
+__all__ = ["AccelerationProgram", "Method", "acceleration_program", "accelerations_of"]
+
+_ACCELERATIONS: Key[AccelerationProgram | None] = Key("accelerations")
 
 Method = Literal["mass matrix", "joint forces", "leaves to root", "numeric"]
 
@@ -86,6 +89,11 @@ class AccelerationProgram:
 
     program: Program
     method: Method
+
+
+def accelerations_of(assembly: Assembly) -> AccelerationProgram | None:
+    """Return the accelerations of a scene as what costs least, made once for all assemblies of its structure."""
+    return assembly.shared.get(_ACCELERATIONS, lambda: acceleration_program(assembly))
 
 
 def acceleration_program(assembly: Assembly, method: Method | None = None) -> AccelerationProgram | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
@@ -18,7 +18,7 @@ from atwood.expr.core.relations import Relation, values_just_after
 from atwood.expr.simplify.collect import collect
 from atwood.forms.dae import dae_form, keep_constraints
 from atwood.forms.derived import derive_once
-from atwood.forms.kept import Kept
+from atwood.forms.kept import Kept, Key
 from atwood.forms.places import with_reactions
 from atwood.forms.program import (
     BalanceProgram,
@@ -47,19 +47,34 @@ from atwood.topology.orientation_coordinates import Orientation
 from atwood.topology.spanning_forest import grow_spanning_forest
 
 if TYPE_CHECKING:
-    from atwood.codegen.llvm.columns import ColumnKernel
+    from atwood.codegen.llvm.columns import ColumnKernel, ColumnProgram
 
-__all__ = ["Assembly", "FormName"]
+__all__ = ["MAXIMAL", "REDUCED", "Assembly", "FormName"]
 
 FormName = Literal["reduced", "dae"]
 Coordinates = Literal["reduced", "regular", "dae"]
 """Those of the reduced form, the same with quaternions for orientations, and those of the dae form."""
 
-_BOUND = 64
-"""So many kernels with other parameters are kept ready."""
-
 _BY_HAND = 12
 """Up to so many coordinates the equations are rewritten; beyond, the recursion is shorter than any closed form."""
+
+# What all assemblies of one structure share.
+REDUCED: Key[Equations] = Key("equations in generalized coordinates")
+_REGULAR: Key[Equations] = Key("the same with quaternions")
+MAXIMAL: Key[Equations] = Key("equations in maximal coordinates")
+_ROWS: Key[tuple[Expression, ...]] = Key("equations of motion as by hand")
+_DISCRETE_STATES: Key[tuple[DiscreteState, ...]] = Key("discrete states")
+_OTHER_MODE: Key[Assembly] = Key("the scene in another mode")
+_FORM: Key[FormProgram] = Key("programs of the form")
+_BALANCE: Key[BalanceProgram] = Key("balance of forces")
+_RATES: Key[RatesProgram] = Key("rates of the coordinates")
+_CODE: Key[CompiledProgram] = Key("Python code")
+_COLUMNS: Key[ColumnProgram] = Key("machine code for many states")
+_REACTIONS: Key[tuple[Reaction, ...]] = Key("reactions")
+_OBSERVABLES: Key[Mapping[str, Observable]] = Key("quantities")
+_START_OBSERVABLES: Key[Mapping[str, Observable]] = Key("quantities of the start")
+_OBSERVER: Key[Program] = Key("quantities")
+_ENERGIES: Key[Program] = Key("energies")
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +124,8 @@ class Assembly:
     held: tuple[float, ...] | None = None
     given_values: FloatArray | None = None
     kept: Kept = field(default_factory=Kept, init=False, repr=False)
-    _kernels: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
+    _kernels: dict[tuple[Program, bool], BoundKernel] = field(default_factory=dict, init=False, repr=False)
+    _columns: dict[Program, ColumnKernel] = field(default_factory=dict, init=False, repr=False)
 
     def __copy__(self) -> Assembly:
         return self
@@ -132,19 +148,19 @@ class Assembly:
     @property
     def reduced(self) -> Equations:
         """The equations in generalized coordinates."""
-        return self.shared.get("reduced", lambda: self._equations("reduced", self.orientation))
+        return self.shared.get(REDUCED, lambda: self._equations("reduced", self.orientation))
 
     @property
     def regular(self) -> Equations:
         """The same with quaternions for orientations, which are regular everywhere: here starts are found."""
         if self.orientation == Orientation():
             return self.reduced
-        return self.shared.get("regular", lambda: self._equations("reduced", Orientation()))
+        return self.shared.get(_REGULAR, lambda: self._equations("reduced", Orientation()))
 
     @property
     def maximal(self) -> Equations:
         """The equations in maximal coordinates, with every joint a constraint; orientations are quaternions."""
-        return self.shared.get("maximal", lambda: self._equations("dae", Orientation()))
+        return self.shared.get(MAXIMAL, lambda: self._equations("dae", Orientation()))
 
     def in_coordinates(self, form: Coordinates) -> Equations:
         """Return the equations in one kind of coordinates."""
@@ -172,7 +188,7 @@ class Assembly:
         reduced = self.reduced
         if reduced.read:  # what reactions are solved for with is nothing that one writes by hand
             return reduced.rows
-        return self.shared.get("rows", lambda: tuple(self._tidy(reduced, reduced.rows)))
+        return self.shared.get(_ROWS, lambda: tuple(self._tidy(reduced, reduced.rows)))
 
     def _tidy(self, equations: Equations, rows: Sequence[Expression]) -> list[Expression]:
         """Write rows as an expert would by hand, for scenes of the size that one would do by hand."""
@@ -215,7 +231,7 @@ class Assembly:
     @property
     def discrete_states(self) -> tuple[DiscreteState, ...]:
         """The states of its parts that change at moments only, whose values are among the parameters."""
-        return self.shared.get("discrete states", lambda: discrete_states_of(self.mechanism))
+        return self.shared.get(_DISCRETE_STATES, lambda: discrete_states_of(self.mechanism))
 
     @property
     def held_at_start(self) -> tuple[float, ...]:
@@ -346,8 +362,8 @@ class Assembly:
             made = source.assemble(self.flat, self, modes, line_signs)
             return replace(made, source=source, shared=Shared(self.shared.family), orientation=orientation_coordinates)
 
-        key = ("mode", tuple(sorted(modes.items())), tuple(sorted(line_signs.items())), orientation_coordinates)
-        known = self.shared.family.get(key, make)
+        about = tuple(sorted(modes.items())), tuple(sorted(line_signs.items())), orientation_coordinates
+        known = self.shared.family.get(_OTHER_MODE, make, *about)
         mechanism, _ = moved_to(known, self.flat)
         if mechanism is None:
             return make()
@@ -383,69 +399,56 @@ class Assembly:
                 found = dae_form(name, equations, self.parameters, self.level, partial(self._tidy, equations))
             return found.with_lock(self.shared.lock)
 
-        return self.shared.get(("form", None if kept is None else tuple(kept), tuple(dependent), speeds), make)
+        return self.shared.get(_FORM, make, None if kept is None else tuple(kept), tuple(dependent), speeds)
 
     def balance(self, form: FormName) -> BalanceProgram:
         """Return the balance of forces in the coordinates of either form."""
         parts = f"{self.flat.name} ({form})", self.in_coordinates(form), self.parameters
-        return self.shared.get(("balance", form), lambda: balance_program(*parts))
+        return self.shared.get(_BALANCE, lambda: balance_program(*parts), form)
 
     def rates(self, form: Coordinates) -> RatesProgram:
         """Return how the coordinates move with their speeds."""
         parts = f"{self.flat.name} ({form})", self.in_coordinates(form), self.parameters
-        return self.shared.get(("rates", form), lambda: rates_program(*parts))
+        return self.shared.get(_RATES, lambda: rates_program(*parts), form)
 
     def kernel(self, program: Program, vectorized: bool = False) -> BoundKernel:
         """Return a program with the parameters of this scene, ready to run."""
         key = (program, vectorized)
         if key not in self._kernels:
             self._kernels[key] = self.compiled(program, vectorized).bind(self.parameter_values)
-        found: BoundKernel = self._kernels[key]
-        return found
+        return self._kernels[key]
 
     def columns(self, program: Program) -> ColumnKernel:
         """Return a program for many states as machine code with the parameters of this scene, ready to run."""
         from atwood.codegen.llvm.columns import compile_columns
 
-        key = (program, "columns")
-        if key not in self._kernels:
-            made = self.shared.get(("columns", program), lambda: compile_columns(program))
-            self._kernels[key] = made.bind(self.parameter_values)
-        found: ColumnKernel = self._kernels[key]
-        return found
-
-    def known_kernel(self, program: Program, values: FloatArray) -> BoundKernel:
-        """Return a program whose parameters are others than those of this scene, with their values, ready to run."""
-        key = (program, values.tobytes())
-        known: dict[Any, BoundKernel] = self.shared.get("bound kernels", dict)
-        if key not in known:
-            if len(known) >= _BOUND:
-                known.clear()
-            known[key] = self.compiled(program).bind(values)
-        return known[key]
+        if program not in self._columns:
+            made = self.shared.get(_COLUMNS, lambda: compile_columns(program), program)
+            self._columns[program] = made.bind(self.parameter_values)
+        return self._columns[program]
 
     def compiled(self, program: Program, vectorized: bool = False) -> CompiledProgram:
         """Return a program as Python code, for any parameter values of this structure."""
-        return self.shared.get(("code", program, vectorized), lambda: compile_program(program, vectorized=vectorized))
+        return self.shared.get(_CODE, lambda: compile_program(program, vectorized=vectorized), program, vectorized)
 
     # -- what can be read -----------------------------------------------------------------------------------------
 
     @property
     def reactions(self) -> tuple[Reaction, ...]:
         """Every reaction that the components report."""
-        return self.shared.get("reactions", lambda: list_reactions(self.mechanism))
+        return self.shared.get(_REACTIONS, lambda: list_reactions(self.mechanism))
 
     @property
     def observables(self) -> Mapping[str, Observable]:
         """Every quantity of every component, by path, in terms of this form's coordinates."""
-        return self.shared.get("observables", lambda: self._observe(self.own_equations))
+        return self.shared.get(_OBSERVABLES, lambda: self._observe(self.own_equations))
 
     @property
     def start_observables(self) -> Mapping[str, Observable]:
         """Every quantity in terms of generalized coordinates, in which the start is solved."""
         if self.own_equations is self.regular:
             return self.observables
-        return self.shared.get("start", lambda: self._observe(self.regular))
+        return self.shared.get(_START_OBSERVABLES, lambda: self._observe(self.regular))
 
     def _observe(self, equations: Equations) -> Mapping[str, Observable]:
         return observe(self.mechanism, equations, self.reactions, self.shared.lock)
@@ -468,26 +471,28 @@ class Assembly:
     def observer(self, paths: tuple[str, ...]) -> Program:
         """Return the program of (t, q, u, a, reactions) that gives quantities by path."""
         found = self.find_observables(paths)
-        return self.known_program(("observer", paths), "quantities", lambda: [one.value for one in found])
+        return self.known_program(_OBSERVER, lambda: [one.value for one in found], paths)
 
     @property
     def energy_program(self) -> Program:
         """The program of (t, q, u, a, reactions) that gives kinetic and potential energy."""
-        return self.known_program("energies", "energies", lambda: energies(self.mechanism, self.own_equations))
+        return self.known_program(_ENERGIES, lambda: energies(self.mechanism, self.own_equations))
 
-    def known_program(self, key: Any, name: str, expressions: Callable[[], Sequence[Expression]]) -> Program:
+    def known_program(
+        self, key: Key[Program], expressions: Callable[[], Sequence[Expression]], *about: Hashable
+    ) -> Program:
         """Return a program of (t, q, u, a, reactions) that is made once for all assemblies of this structure.
 
         Parameters
         ----------
         key
-            What it is.
-        name
-            Named in messages.
+            What it is; messages have its name.
         expressions
             Gives what to compute.
+        about
+            What it depends on besides the structure.
         """
-        return self.shared.get(("program", key), lambda: self.state_program(name, expressions()))
+        return self.shared.get(key, lambda: self.state_program(key.name, expressions()), *about)
 
     def state_program(self, name: str, expressions: Sequence[Expression]) -> Program:
         """Return a program of (t, q, u, a, reactions) in the coordinates of this form."""

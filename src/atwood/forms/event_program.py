@@ -10,10 +10,9 @@ from collections.abc import Sequence
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, solve, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.places import to_maximal
+from atwood.forms.places import internal_reactions_of, to_maximal
 from atwood.forms.program import state_groups
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.outputs.internal_reactions import internal_reaction_program
 
 __all__ = ["event_program"]
 
@@ -95,10 +94,7 @@ def _reactions(assembly: Assembly, wanted: set[Expression], kept: Sequence[int])
     n = len(maximal.speeds)
     solution = dict(zip((*maximal.accelerations, *maximal.multipliers), solved, strict=True))
     of_constraint = {one.key: i for i, one in enumerate(maximal.constraints)}
-    internal = assembly.shared.get(
-        "internal reactions",
-        lambda: internal_reaction_program(assembly.mechanism, maximal, assembly.reactions, assembly.parameters),
-    )
+    internal = internal_reactions_of(assembly)
     found: dict[Expression, Expression] = {}
     for one in assembly.reactions:
         if one.symbol not in wanted:

@@ -5,14 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from atwood.expr import Expression, OutputGroup, Program, substitute
+from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
 from atwood.mechanics.constraints.read_multipliers import with_known
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.outputs.internal_reactions import InternalReactions, internal_reaction_program
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = ["to_maximal", "with_reactions"]
+__all__ = ["TO_MAXIMAL", "internal_reactions_of", "to_maximal", "with_reactions"]
+
+_INTERNAL: Key[InternalReactions | None] = Key("reactions inside bodies")
+TO_MAXIMAL: Key[Program] = Key("maximal coordinates in terms of generalized ones")
 
 
 def to_maximal(assembly: Assembly, given: Literal["reduced", "regular"] = "reduced") -> Program:
@@ -26,8 +31,14 @@ def to_maximal(assembly: Assembly, given: Literal["reduced", "regular"] = "reduc
         Which generalized coordinates: those of the reduced form, or the same with quaternions, in which starts are.
     """
     equations = assembly.in_coordinates(given)
-    key = "to maximal" if equations is assembly.reduced else "regular to maximal"
-    return assembly.shared.get(key, lambda: _make(assembly, equations, assembly.maximal))
+    is_reduced = equations is assembly.reduced
+    return assembly.shared.get(TO_MAXIMAL, lambda: _make(assembly, equations, assembly.maximal), is_reduced)
+
+
+def internal_reactions_of(assembly: Assembly) -> InternalReactions | None:
+    """Return the program of all reactions inside bodies, in maximal coordinates; None if no component reports one."""
+    parts = assembly.mechanism, assembly.maximal, assembly.reactions, assembly.parameters
+    return assembly.shared.get(_INTERNAL, lambda: internal_reaction_program(*parts))
 
 
 def _places(reduced: Equations, maximal: Equations) -> tuple[list[Expression], list[Expression]]:

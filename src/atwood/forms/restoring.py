@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from atwood.errors import UsageError
+from atwood.forms.kept import Key
 from atwood.forms.shared import Shared
 from atwood.forms.source import Source
 from atwood.model.local.flatten import FlatScene
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
 __all__ = ["recipe"]
+
+_RESTORED: Key[Assembly] = Key("the first assembly of a pickle")
 
 Signs = Mapping[tuple[str, str, str], float]
 
@@ -93,7 +96,7 @@ def recipe(assembly: Assembly) -> tuple[Callable[..., Assembly], tuple[Shared, _
 
 def _restored(shared: Shared, made_from: _Recipe) -> Assembly:
     """Return an assembly; those of one pickle that shared their programs do so again."""
-    first = shared.get("restored", lambda: _assembled(made_from))
+    first = shared.get(_RESTORED, lambda: _assembled(made_from))
     found: Assembly | None = first
     if first.flat is not made_from.flat:
         found, _ = first.follow(made_from.flat, made_from.source)

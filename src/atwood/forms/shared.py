@@ -8,16 +8,18 @@ exact zeros, functions of time, signs of lengths on a line, and what was decided
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
 from atwood.expr import Expression
+from atwood.forms.kept import Key
 from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism, check_closures
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.laws import LocalPart, variation_names
+from atwood.model.values.vector import Vector
 from atwood.stages import stage
 from atwood.topology.line_signs import find_line_signs
 
@@ -42,29 +44,32 @@ class Shared:
 
     def __init__(self, family: Shared | None = None) -> None:
         self.family = family or self
-        self._made: dict[Any, Any] = {}
+        self._made: dict[Hashable, Any] = {}
         self.lock = threading.RLock()
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Shared, ()  # what was made belongs to the process; who shared it does so again
 
-    def get(self, key: Any, make: Callable[[], T]) -> T:
+    def get(self, key: Key[T], make: Callable[[], T], *about: Hashable) -> T:
         """Return what was made under a key, making it if it is not there.
 
         Parameters
         ----------
         key
-            What it is, and all that it depends on besides the structure.
+            What it is.
         make
-            Makes it.
+            Makes it, from the structure and from `about` alone.
+        about
+            What it depends on besides the structure.
         """
+        place = (key, *about) if about else key
         try:
-            found: T = self._made[key]
+            found: T = self._made[place]
         except KeyError:
             with self.lock, stage("equations"):
-                if key not in self._made:
-                    self._made[key] = make()
-                found = self._made[key]
+                if place not in self._made:
+                    self._made[place] = make()
+                found = self._made[place]
         return found
 
 
@@ -124,6 +129,10 @@ class _Shape:
     fixed: tuple[Slot, ...]
 
 
+_SHAPE: Key[_Shape | None] = Key("which values are arguments")
+_OFFSETS: Key[dict[int, Mapping[int, Vector]]] = Key("offsets of nodes in their bodies")
+
+
 def _varied(flat: FlatScene) -> set[str]:
     """Return the names of the parameters that stand for variations of inputs, and are always zero."""
     return {name for part, signal in flat.varied for name in variation_names(f"{part}.{signal}")}
@@ -166,7 +175,7 @@ def with_values_of(
         If rigid parts contradict each other with these values.
     """
     reason = _changed_parts(flat, other)
-    shape = shared.get("shape", lambda: _find_shape(flat, mechanism))
+    shape = shared.get(_SHAPE, lambda: _find_shape(flat, mechanism))
     if reason or shape is None:
         return None, reason or "not every number can be traced to its place"
     for slot in shape.fixed:
@@ -244,5 +253,5 @@ def _local(local: LocalPart, now: Part) -> LocalPart:
 
 def _line_signs(mechanism: Mechanism, flat: FlatScene, shared: Shared) -> Mapping[tuple[str, str, str], float]:
     bodies, space = mechanism.bodies, mechanism.space
-    offsets = shared.get("offsets", lambda: {body.index: body_offsets(body, space)[0] for body in bodies.bodies})
+    offsets = shared.get(_OFFSETS, lambda: {body.index: body_offsets(body, space)[0] for body in bodies.bodies})
     return find_line_signs(flat, mechanism.graph, bodies, mechanism.locals_, offsets, mechanism.table.values, space)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from atwood.expr import Expression
+from atwood.forms.kept import Key
 from atwood.forms.shared import DECIDED, Shared, decided_alike, with_values_of
 from atwood.mechanics.kinematics.mechanism import Mechanism, started_at
 from atwood.model.local.flatten import FlatScene
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
 __all__ = ["moved_to", "starting", "with_places"]
+
+_Decisions = list[tuple[Callable[[Mechanism], object], object]]
+_STARTING: Key[tuple[Shared, _Decisions]] = Key("the scene as its start is found")
 
 
 def starting(assembly: Assembly) -> Assembly:
@@ -29,7 +33,7 @@ def starting(assembly: Assembly) -> Assembly:
     if mechanism.places is None:
         return assembly
     decisions: list[tuple[Callable[[Mechanism], object], object]] = []
-    shared, decisions = assembly.shared.get("starting", lambda: (_beside(assembly.shared), decisions))
+    shared, decisions = assembly.shared.get(_STARTING, lambda: (_beside(assembly.shared), decisions))
     values = {symbol: value for symbol, value in mechanism.table.values.items() if symbol not in mechanism.constants}
     table = replace(mechanism.table, values=values)
     before = replace(mechanism, table=table, places=None, constants={}, decisions=decisions)
@@ -47,7 +51,7 @@ def with_places(assembly: Assembly, places: Mapping[str, Mapping[Expression, flo
         See `atwood.mechanics.kinematics.mechanism.Mechanism`.
     """
     shared, decisions = _beside(assembly.shared), assembly.mechanism.decisions
-    shared.get("starting", lambda: (assembly.shared, decisions))
+    shared.get(_STARTING, lambda: (assembly.shared, decisions))
     # Constants of integration are further parameters.
     table = replace(assembly.mechanism.table, values=dict(assembly.mechanism.table.values))
     mechanism = replace(assembly.mechanism, table=table, places=places, constants={}, decisions=[])

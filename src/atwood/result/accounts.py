@@ -9,13 +9,19 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import Program, depends_on, substitute
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.outputs.moving_inertia import MovingMass, moving_masses
 from atwood.mechanics.outputs.power import applied_power, switched_energy
 from atwood.result.energy import Motion, Piece
 from atwood.simulation.run.record import SegmentRecord
 
-__all__ = ["DrivePower", "account", "power_into"]
+__all__ = ["POWER", "DrivePower", "account", "power_into"]
+
+POWER: Key[Program] = Key("power")
+_SWITCHED: Key[Program] = Key("switched energy")
+_MASSES: Key[list[MovingMass]] = Key("moving masses")
+_VELOCITIES: Key[Program] = Key("velocities")
 
 
 DrivePower = Callable[[SegmentRecord], FloatArray]
@@ -40,9 +46,7 @@ def account(segment: SegmentRecord, drives: DrivePower) -> Piece:
     """
     assembly, state = segment.assembly, (segment.coordinates, segment.speeds)
     mechanism, equations = assembly.mechanism, assembly.own_equations
-    switching = assembly.known_program(
-        "switched energy", "switched energy", lambda: [switched_energy(mechanism, equations)]
-    )
+    switching = assembly.known_program(_SWITCHED, lambda: [switched_energy(mechanism, equations)])
     kinetic, potential = _values(assembly, assembly.energy_program, segment.time, *state)
     is_fixed = switching.results[0].is_zero
     return Piece(
@@ -61,13 +65,9 @@ def account(segment: SegmentRecord, drives: DrivePower) -> Piece:
 def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
     """Return what moves with which velocities."""
     assembly = segment.assembly
-    masses: list[MovingMass] = assembly.shared.get(
-        "moving masses", lambda: moving_masses(assembly.mechanism, assembly.own_equations)
-    )
+    masses = assembly.shared.get(_MASSES, lambda: moving_masses(assembly.mechanism, assembly.own_equations))
     program = assembly.known_program(
-        "moving masses",
-        "velocities",
-        lambda: [x for one in masses for row in (one.velocities, *one.masses) for x in row],
+        _VELOCITIES, lambda: [x for one in masses for row in (one.velocities, *one.masses) for x in row]
     )
     values = _values(assembly, program, segment.time, segment.coordinates, segment.speeds)
     found, done = [], 0
@@ -82,9 +82,7 @@ def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
 def power_into(segment: SegmentRecord, drives: DrivePower) -> FloatArray | None:
     """Return the power that is put into the scene at each sample, or None if nothing can."""
     assembly = segment.assembly
-    program = assembly.known_program(
-        "power", "power", lambda: [applied_power(assembly.mechanism, assembly.own_equations)]
-    )
+    program = assembly.known_program(POWER, lambda: [applied_power(assembly.mechanism, assembly.own_equations)])
     moving = any(_moves_by_itself(assembly.maximal, one) for one in assembly.maximal.constraints)
     if program.results[0].is_zero and not moving:
         return None

@@ -22,6 +22,7 @@ from atwood.codegen import BoundKernel
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, SparseMatrix, jacobian
 from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.kept import Key
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.balance import balance_of, solve_determined
@@ -29,6 +30,8 @@ from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
 from atwood.simulation.dynamics.scales import motion_scales, scene_length
 
 __all__ = ["Flow", "LinearScene", "Variation"]
+
+_VARIATIONS: Key[tuple[list[_Part], Program]] = Key("derivatives of the equations")
 
 
 @dataclass(frozen=True)
@@ -162,8 +165,8 @@ class LinearScene:
             parts = [self.differentiated(name, found) for name, found in self._expressions.items()]
             return parts, self.program("variations", self._expressions, parts)
 
-        key = ("variations", self.form, tuple(symbol.name for symbol in self.inputs))
-        return self.assembly.shared.get(key, make)
+        about = self.form, tuple(symbol.name for symbol in self.inputs)
+        return self.assembly.shared.get(_VARIATIONS, make, *about)
 
     @property
     def _parts(self) -> list[_Part]:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from atwood.arrays import FloatArray
+from atwood.expr import Program
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 
 __all__ = ["actual_line_signs", "line_signs_differ"]
+
+_POSITIONS: Key[Program] = Key("positions of nodes on the line")
 
 LineSigns = dict[tuple[str, str, str], float]
 
@@ -28,8 +32,9 @@ def actual_line_signs(assembly: Assembly, t: float, q: FloatArray, u: FloatArray
     positions = equations.kinematics.placements.positions
     nodes = list(positions)
     program = assembly.shared.get(
-        ("places", form),
+        _POSITIONS,
         lambda: assembly.coordinate_program("places", equations, [positions[node][0] for node in nodes]),
+        form,
     )
     places = dict(zip(nodes, assembly.kernel(program)([t], q, u)[0], strict=True))
     found: LineSigns = {}

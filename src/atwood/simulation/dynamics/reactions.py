@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError
-from atwood.forms.accelerations import acceleration_program
+from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly, FormName
-from atwood.forms.places import to_maximal
+from atwood.forms.kept import Key
+from atwood.forms.places import internal_reactions_of, to_maximal
 from atwood.forms.program import BalanceProgram
 from atwood.linalg.matrices import is_best_full
-from atwood.mechanics.outputs.internal_reactions import internal_reaction_program
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.columns import masses_at
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
@@ -86,9 +86,12 @@ def accelerations_at(
     return _solved(assembly, form, (t, q, u), kept, values)[0]
 
 
+_STATES: Key[States] = Key("balance of forces at many states")
+
+
 def _states(assembly: Assembly, form: FormName, kept: NDArray[np.intp]) -> States:
     chosen = tuple(kept.tolist())
-    return assembly.shared.get(("states", form, chosen), lambda: States(assembly.balance(form), chosen))
+    return assembly.shared.get(_STATES, lambda: States(assembly.balance(form), chosen), form, chosen)
 
 
 def _is_full(program: BalanceProgram) -> bool:
@@ -184,12 +187,7 @@ class ReactionSolver:
         sizes = motion_scales(assembly.maximal, self._length)
         self.finding = find_rank(balance_of(assembly, "dae"), t, big_q[:, 0], sizes)
         self._of_constraint = {one.key: i for i, one in enumerate(assembly.maximal.constraints)}
-        self._internal_reactions = assembly.shared.get(
-            "internal reactions",
-            lambda: internal_reaction_program(
-                assembly.mechanism, assembly.maximal, assembly.reactions, assembly.parameters
-            ),
-        )
+        self._internal_reactions = internal_reactions_of(assembly)
 
     def for_rows(self, rows: FloatArray) -> ReactionSolver:
         """Return the same for states that have parameters of their own, where no constraint is redundant.
@@ -239,7 +237,7 @@ class ReactionSolver:
     def own_accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, finding: RankFinding) -> FloatArray:
         """Return the accelerations of the form's coordinates, with what is known of its constraints."""
         if self.assembly.form == "reduced" and self.assembly.balance("reduced").mass_product is not None:
-            rates = self.assembly.shared.get("accelerations", lambda: acceleration_program(self.assembly))
+            rates = accelerations_of(self.assembly)
             if rates is not None:
                 found: FloatArray = self.assembly.kernel(rates.program, vectorized=True)(t[None, :], q, u)[-1]
                 return found

@@ -16,10 +16,13 @@ from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.simulation.dynamics.kinematic_map import KinematicMap
 from atwood.tolerances import tolerances
 
 __all__ = ["RowErrors"]
+
+_ROUGH: Key[RoughProgram] = Key("program in rough arithmetic")
 
 
 _GROWN = 10.0
@@ -139,7 +142,7 @@ class RowErrors:
 
     def _rough(self, t: float, q: FloatArray, scales: FloatArray, off: float) -> tuple[FloatArray, FloatArray]:
         """Return values and entries, each in as many ways, with coordinates off by so many roundings."""
-        rough, count = self._assembly.shared.get(("rough", self._program), self._made), len(self._laws)
+        rough, count = self._assembly.shared.get(_ROUGH, self._made, self._program), len(self._laws)
         speeds = np.zeros(len(self._program.inputs[2].symbols))
         places = q[:, None] * roughly(len(q))
         steps = off * scales[:, None] * (roughly(len(scales), len(q)) - 1.0)

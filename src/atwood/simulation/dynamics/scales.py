@@ -7,6 +7,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import InputGroup, OutputGroup, Program
 from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.kept import Key
 from atwood.late import dataclass
 from atwood.mechanics.build import extent
 from atwood.mechanics.dynamics.equations import Equations
@@ -123,6 +124,9 @@ def find_scales(
     return Scales(length, time, (total_mass(assembly) or 1.0) * length / time**2)
 
 
+_MASSES: Key[Program] = Key("masses")
+
+
 def total_mass(assembly: Assembly) -> float:
     """Return the mass of all that moves, at the start, kg."""
 
@@ -134,4 +138,4 @@ def total_mass(assembly: Assembly) -> float:
         time = InputGroup("t", (assembly.mechanism.time,))
         return Program("masses", (time,), assembly.parameters, (OutputGroup("masses", tuple(found)),))
 
-    return float(sum(assembly.kernel(assembly.shared.get("masses", make))([assembly.flat.t_start])[0]))
+    return float(sum(assembly.kernel(assembly.shared.get(_MASSES, make))([assembly.flat.t_start])[0]))

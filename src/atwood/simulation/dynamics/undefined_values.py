@@ -13,6 +13,7 @@ import numpy as np
 
 from atwood.expr import Expression, OutputGroup, Program, evaluate, live, substitute, vjp
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
@@ -96,7 +97,7 @@ def find_undefined_value(assembly: Assembly, t: FloatArray, q: FloatArray, u: Fl
     t, q, u
         States in the coordinates of the form, shape (states,) and (number, states).
     """
-    quantities, program = assembly.shared.get("law values", lambda: _law_values(assembly))
+    quantities, program = assembly.shared.get(_LAW_VALUES, lambda: _law_values(assembly))
     if not quantities:
         return None
     with np.errstate(all="ignore"):
@@ -114,6 +115,9 @@ def find_undefined_value(assembly: Assembly, t: FloatArray, q: FloatArray, u: Fl
 def undefined_value_at(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> UndefinedValue | None:
     """Return the same for one state."""
     return find_undefined_value(assembly, np.array([t]), q[:, None], u[:, None])
+
+
+_LAW_VALUES: Key[tuple[list[_Quantity], Program]] = Key("values of laws")
 
 
 def _law_values(assembly: Assembly) -> tuple[list[_Quantity], Program]:

@@ -13,6 +13,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
@@ -22,6 +23,8 @@ from atwood.simulation.events.modes import EventRecord, generalized_speeds, plas
 from atwood.tolerances import tolerances
 
 __all__ = ["pass_time_event"]
+
+_MOTION_SWITCHES: Key[bool] = Key("whether prescribed motion switches")
 
 
 _SAME_SPEED = 1e-9
@@ -50,7 +53,7 @@ def pass_time_event(
     SolveError
         If a prescribed position jumps, or prescribed velocities are infinite or contradict each other after the event.
     """
-    if not after.shared.get("motion switches", lambda: bool(_switching(after))):
+    if not after.shared.get(_MOTION_SWITCHES, lambda: bool(_switching(after))):
         return q, u, ()
     big_q, big_u = (x[:, 0] for x in maximal_state(before, np.array([t]), q[:, None], u[:, None]))
     sizes = motion_scales(after.maximal, length)

@@ -15,6 +15,7 @@ from atwood.errors import SolveError
 from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import event_program
+from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.integrators.protocol import StepResult
 from atwood.late import dataclass
@@ -41,6 +42,14 @@ if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode, EventData
 
 __all__ = ["EventProbe", "EventRecord", "enter_mode", "find_event_functions", "generalized_speeds", "plastic_impact"]
+
+_EVENT_FUNCTIONS: Key[tuple[EventFunction, ...]] = Key("event functions")
+_NEEDS: Key[_Needs] = Key("what event functions read")
+_EVENTS: Key[Program] = Key("events")
+_EVENT_CODE: Key[EventCode | None] = Key("machine code of events")
+_IS_THERE: Key[Program] = Key("whether an event is there")
+_REACTION_EVENTS: Key[tuple[EventFunction, ...]] = Key("event functions that read reactions")
+_MAXIMAL: Key[tuple[Program, tuple[int, ...], tuple[int, ...]]] = Key("maximal coordinates and their Jacobian")
 
 
 @dataclass(frozen=True)
@@ -76,7 +85,7 @@ class EventRecord:
 def find_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
     """Return what is watched in the modes of an assembly."""
     return assembly.shared.get(
-        "event_functions",
+        _EVENT_FUNCTIONS,
         lambda: (
             *list_event_functions(assembly.mechanism, assembly.own_equations, assembly.reactions, assembly.modes),
             *switch_functions(assembly.own_equations),  # last: of what happens at the same time, the others come first
@@ -128,15 +137,11 @@ class EventProbe:
         self.plan, self._conditions = plan, conditions
         self.assembly = assembly = plan.assembly
         self.event_functions = (*condition_functions(assembly, conditions), *find_event_functions(assembly))
-        self.needs = assembly.shared.get(
-            ("watched needs", conditions), lambda: _find_needs(assembly, self.event_functions)
-        )
+        self.needs = assembly.shared.get(_NEEDS, lambda: _find_needs(assembly, self.event_functions), conditions)
         self.reactions = ReactionSolver(assembly, t, q, u) if self.needs.reactions else None
         self.kernel = (
             assembly.kernel(
-                assembly.known_program(
-                    ("events", conditions), "events", lambda: [one.value for one in self.event_functions]
-                )
+                assembly.known_program(_EVENTS, lambda: [one.value for one in self.event_functions], conditions)
             )
             if self.event_functions
             else None
@@ -203,7 +208,7 @@ class EventProbe:
                 return None
             return compile_events(program, for_ida)
 
-        code = self.assembly.shared.get(("event code", kept, maximal, for_ida, self._conditions), make)
+        code = self.assembly.shared.get(_EVENT_CODE, make, kept, maximal, for_ida, self._conditions)
         return None if code is None else code.bind(self.assembly.parameter_values, self._shift)
 
     def function(self) -> Callable[[float, FloatArray, FloatArray], FloatArray] | None:
@@ -255,8 +260,8 @@ class EventProbe:
     def _is_there(self, step: StepResult, one: EventFunction) -> bool:
         assembly, expression = self.assembly, one.is_there
         assert expression is not None
-        key = ("is there", one.law, self._conditions)
-        kernel = assembly.kernel(assembly.known_program(key, "whether an event is there", lambda: [expression]))
+        program = assembly.known_program(_IS_THERE, lambda: [expression], one.law, self._conditions)
+        kernel = assembly.kernel(program)
         q, u = self.plan.program.split(step.y)
         return bool(kernel([step.t], q, u, np.zeros_like(u), [0.0] * len(assembly.reactions))[0][0] > 0.0)
 
@@ -394,7 +399,7 @@ def _reaction_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
         every = list_event_functions(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.modes)
         return tuple(one for one in every if depends_on(one.value, symbols))
 
-    return assembly.shared.get("watches of reactions", make)
+    return assembly.shared.get(_REACTION_EVENTS, make)
 
 
 def _solve_impact(
@@ -431,7 +436,7 @@ def _to_reduced(
     """Find the generalized coordinates, with quaternions, that give the same maximal coordinates and speeds."""
     equations = after.regular
     reduced_map, maximal_map = kinematic_map_of(after, "regular"), kinematic_map_of(after, "dae")
-    program, rows, columns = after.shared.get("change of mode", lambda: _maximal_places(after))
+    program, rows, columns = _maximal_places(after)
     kernel = after.kernel(program)
     names = tuple(c.name for c in equations.names)
     known = [name for name in names if name in before.observables]
@@ -473,7 +478,7 @@ def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatAr
     speeds, sizes
         Speeds in maximal coordinates, and the size of a displacement along each.
     """
-    program, rows, columns = after.shared.get("change of mode", lambda: _maximal_places(after))
+    program, rows, columns = _maximal_places(after)
     still = np.zeros(len(after.regular.speeds))
     matrix = np.zeros((len(sizes), len(still)))
     _, explicit_rate, matrix[rows, columns] = after.kernel(program)([t], q, still)
@@ -485,9 +490,12 @@ def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[in
 
     Speeds of bodies change with generalized speeds as their places do with displacements along these.
     """
-    equations = after.regular
-    placing = to_maximal(after, "regular")
-    slope = jacobian(list(placing.outputs[1].expressions), list(equations.speeds))
-    outputs = (*placing.outputs, OutputGroup("jacobian", tuple(slope.entries)))
-    program = Program(f"{after.flat.name} change of mode", placing.inputs, after.parameters, outputs)
-    return program, slope.rows, slope.columns
+
+    def make() -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
+        placing = to_maximal(after, "regular")
+        derivative = jacobian(list(placing.outputs[1].expressions), list(after.regular.speeds))
+        outputs = (*placing.outputs, OutputGroup("jacobian", tuple(derivative.entries)))
+        program = Program(f"{after.flat.name} change of mode", placing.inputs, after.parameters, outputs)
+        return program, derivative.rows, derivative.columns
+
+    return after.shared.get(_MAXIMAL, make)

@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.codegen import BoundKernel
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, SolveError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
@@ -25,8 +27,13 @@ from atwood.model.declare.laws import Law
 
 __all__ = ["Sampler", "Updated", "find_sampler"]
 
+_BOUND_KERNELS: Key[dict[bytes, BoundKernel]] = Key("what updates read, with parameters")
+
 _ROUNDING = 16.0
 """Times that are so many units of rounding apart are one moment."""
+
+_MOST_KERNELS = 64
+"""So many programs with other parameters are kept ready."""
 
 _MOST = 10_000_000
 """More sample times than these are no run."""
@@ -169,24 +176,31 @@ class _Reading:
         self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray, held: Sequence[float]
     ) -> dict[str, dict[str, Any]]:
         """Return what the laws of parts read: inputs by part and name, and states by path under an empty name."""
-        kernel = assembly.known_kernel(self.program, self._known(assembly))
-        (results,) = kernel([t], q, u, held)
+        (results,) = self._kernel(assembly)([t], q, u, held)
         found: dict[str, dict[str, Any]] = {"": {path: float(q[i]) for path, i in self.states.items()}}
         found[""] |= {path: held[i] for path, i in self.held.items()}
         for (part, name), value in zip(self.inputs, results, strict=True):
             found.setdefault(part, {})[name] = float(value)
         return found
 
-    @staticmethod
-    def _known(assembly: Assembly) -> FloatArray:
-        """Return the values of all parameters but the discrete states."""
+    def _kernel(self, assembly: Assembly) -> BoundKernel:
+        """Return the program with the values of all parameters but the discrete states, which are arguments here."""
         first = len(assembly.mechanism.table.values)
         values = assembly.parameter_values
-        return np.concatenate([values[:first], values[first + len(assembly.discrete_states) :]])
+        others = np.concatenate([values[:first], values[first + len(assembly.discrete_states) :]])
+        known, about = assembly.shared.get(_BOUND_KERNELS, dict), others.tobytes()
+        if about not in known:
+            if len(known) >= _MOST_KERNELS:
+                known.clear()
+            known[about] = assembly.compiled(self.program).bind(others)
+        return known[about]
+
+
+_READING: Key[_Reading] = Key("what updates read")
 
 
 def _reading_of(assembly: Assembly) -> _Reading:
-    return assembly.shared.get("update inputs", lambda: _make_reading(assembly))
+    return assembly.shared.get(_READING, lambda: _make_reading(assembly))
 
 
 def _make_reading(assembly: Assembly) -> _Reading:

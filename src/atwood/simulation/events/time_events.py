@@ -19,9 +19,13 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp, live
 from atwood.expr.core.intervals import Bounds, bounds
 from atwood.expr.core.relations import relation_value
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.late import dataclass
 
 __all__ = ["Schedule", "find_schedule"]
+
+_RELATION: Key[Program] = Key("relation of functions of time")
+_RATE_OF_RELATION: Key[list[Expression]] = Key("its derivative")
 
 
 _ROUNDING = 16.0
@@ -193,7 +197,7 @@ class _Search:
             outputs = (OutputGroup("difference", (self._difference, relations[number].difference)),)
             return Program(f"{assembly.flat.name} time", groups, assembly.parameters[:count], outputs)
 
-        program = assembly.shared.get(("relation", number), make)
+        program = assembly.shared.get(_RELATION, make, number)
         self._kernel = assembly.compiled(program, vectorized=True).bind(assembly.parameter_values[:count])
 
     def function(self, times: FloatArray, owner: IndexArray) -> FloatArray:
@@ -230,8 +234,9 @@ class _Search:
 
     def _isolated(self, boxes: _Boxes) -> _Boxes:
         """Return intervals in which the function may change its sign, once at most as far as rounding tells."""
-        key = ("rate of relation", self._number)
-        (derivative,) = self._assembly.shared.get(key, lambda: jvp([self._difference], {self._time: 1.0}))
+        (derivative,) = self._assembly.shared.get(
+            _RATE_OF_RELATION, lambda: jvp([self._difference], {self._time: 1.0}), self._number
+        )
         found: list[_Boxes] = []
         doubtful: list[_Boxes] = []
         while len(boxes.low):

@@ -12,6 +12,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.expr import Expression, Program, Scalar, substitute
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.mechanics.kinematics.orientation import node_axes
@@ -34,7 +35,7 @@ def wrongly_turned(assembly: Assembly, equations: Equations, t: float, q: FloatA
     """
     if assembly.mechanism.space.name != "space" or not equations.forest.loop_joints:
         return []
-    parts, program = assembly.shared.get("facing", lambda: _branch_tests(assembly, equations))
+    parts, program = assembly.shared.get(_BRANCH_TESTS, lambda: _branch_tests(assembly, equations))
     if not parts:
         return []
     try:
@@ -43,6 +44,9 @@ def wrongly_turned(assembly: Assembly, equations: Equations, t: float, q: FloatA
         return []
     # The trace of the rotation between the two is 1 + 2 cos; what is wrong at all is wrong by half a turn.
     return [part for part, trace in zip(parts, traces, strict=True) if trace < 2.0]
+
+
+_BRANCH_TESTS: Key[tuple[tuple[str, ...], Program]] = Key("tests of the assembly branch")
 
 
 def _branch_tests(assembly: Assembly, equations: Equations) -> tuple[tuple[str, ...], Program]:

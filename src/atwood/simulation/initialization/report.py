@@ -17,6 +17,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, OutputGroup, Program, jacobian
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
@@ -35,6 +36,10 @@ __all__ = ["GuessMet", "InitializationReport", "MovedBody", "report_initializati
 
 _SHARE = 0.2
 """What moves a body by less than this share of what the first one does is not named."""
+
+_Entries = tuple[Any, Any, tuple[int, int]]
+_GUESSES: Key[Program] = Key("guessed quantities")
+_BODIES: Key[tuple[Program, Program, _Entries]] = Key("places of bodies")
 
 
 @dataclass(frozen=True)
@@ -180,8 +185,9 @@ def _guesses(assembly: Assembly, equations: Equations, start: Start) -> tuple[Gu
         return ()
     observables = [assembly.start_observables[path] for path in given]
     program = assembly.shared.get(
-        ("guessed", tuple(given)),
+        _GUESSES,
         lambda: assembly.coordinate_program("guesses", equations, [one.value for one in observables]),
+        tuple(given),
     )
     values = assembly.kernel(program)([start.time], start.coordinates, start.speeds)[0]
     found = []
@@ -203,7 +209,7 @@ class _Bodies:
         self.indices, self.names = [one.index for one in every], [one.name for one in every]
         placements = equations.kinematics.placements
         self.turns = [i in placements.angles or i in placements.axes for i in self.indices]
-        self.places, self.jacobian_program, self.entries = assembly.shared.get("bodies", self._programs)
+        self.places, self.jacobian_program, self.entries = assembly.shared.get(_BODIES, self._programs)
 
     def _programs(self) -> tuple[Program, Program, tuple[Any, Any, tuple[int, int]]]:
         kinematics, placements = self.equations.kinematics, self.equations.kinematics.placements

@@ -13,7 +13,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, KernelEvaluationError, StartError
-from atwood.expr import evaluate, jacobian
+from atwood.expr import SparseMatrix, evaluate, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
@@ -65,6 +65,7 @@ class Start:
 
 
 _START: Key[Start] = Key("start")
+_INTEGRAL_GRADIENTS: Key[list[SparseMatrix]] = Key("gradients of integrals")
 
 
 def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
@@ -180,7 +181,7 @@ def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
     place = {**assembly.mechanism.table.values, **assembly.known_relations, before.time: start.time, **q}
     sizes = np.maximum(coordinate_scales(before, start.length), np.abs(start.coordinates))
     integral_gradients = assembly.shared.get(
-        "gradients of integrals", lambda: [jacobian([one.value], before.coordinates) for one in after.integrals]
+        _INTEGRAL_GRADIENTS, lambda: [jacobian([one.value], before.coordinates) for one in after.integrals]
     )
     for one, slopes in zip(after.integrals, integral_gradients, strict=True):
         (missed,) = evaluate([one.value], place)

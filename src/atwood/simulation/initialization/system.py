@@ -9,6 +9,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, OutputGroup, Program, jacobian
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.linalg.matrices import (
@@ -36,6 +37,9 @@ class Conditions:
     rows: tuple[int, ...]
     columns: tuple[int, ...]
     shape: tuple[int, int]
+
+
+_CONDITIONS: Key[Conditions] = Key("conditions of a start")
 
 
 def start_conditions(
@@ -72,7 +76,7 @@ def start_conditions(
         places = (tuple(entries.rows), tuple(entries.columns)) if entries else ((), ())
         return Conditions(program, *places, (len(expressions), len(unknowns)))
 
-    return assembly.shared.get(("start", tuple(one.path for one in targets), constrained, of_speeds), make)
+    return assembly.shared.get(_CONDITIONS, make, tuple(one.path for one in targets), constrained, of_speeds)
 
 
 class System:

@@ -9,6 +9,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import StartError
 from atwood.expr import Expression, depends_on, jvp, live
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.forms.source import no_start_quantity
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
@@ -61,7 +62,7 @@ def sort_targets(assembly: Assembly, equations: Equations) -> tuple[Level, Level
     for is_fixed, given in ((True, assembly.flat.start), (False, assembly.flat.guess)):
         restated, origins = _restated(assembly, given)
         for path, value in restated.items():
-            number = assembly.shared.get(("start level", path), partial(find_level, assembly, equations, path))
+            number = assembly.shared.get(_LEVEL, partial(find_level, assembly, equations, path), path)
             level = levels[number]
             target = Target(path, value, assembly.start_observables[path], origins.get(path, ()))
             (level.fixed if is_fixed else level.guessed).append(target)
@@ -102,6 +103,10 @@ def _restated(assembly: Assembly, given: Mapping[str, float]) -> tuple[dict[str,
     return found, origins
 
 
+_LEVEL: Key[int] = Key("level of a start value")
+_LATER_SYMBOLS: Key[tuple[frozenset[Expression], frozenset[Expression]]] = Key("what starts do not give, and speeds")
+
+
 def find_level(assembly: Assembly, equations: Equations, path: str) -> int:
     """Return whether a start value is of positions (0) or of speeds (1)."""
     observables = assembly.start_observables
@@ -109,7 +114,7 @@ def find_level(assembly: Assembly, equations: Equations, path: str) -> int:
         raise no_start_quantity(path, observables)
     one = observables[path]
     reads = {node for node in live([one.value]) if node.is_symbol}
-    late, speeds = assembly.shared.get("start symbols", lambda: _later_symbols(assembly, equations))
+    late, speeds = assembly.shared.get(_LATER_SYMBOLS, lambda: _later_symbols(assembly, equations))
     if not late.isdisjoint(reads):
         raise StartError(
             "the quantity follows from positions and speeds and cannot be prescribed at the start",

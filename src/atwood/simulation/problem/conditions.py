@@ -9,11 +9,14 @@ from typing import Any
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion, suggestion_in_parts
 from atwood.expr import Expression, cos, sin
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.late import dataclass
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.model.values.units import parse_quantity, parse_unit
 
 __all__ = ["Condition", "Quantities", "condition_functions"]
+
+_CONDITIONS: Key[tuple[EventFunction, ...]] = Key("event functions of conditions")
 
 _DIRECTIONS = {"crosses": 0, "rises above": 1, "falls below": -1}
 """What a quantity can do with a value."""
@@ -96,7 +99,7 @@ def condition_functions(assembly: Assembly, conditions: Sequence[Condition]) -> 
     """
     if not conditions:
         return ()
-    return assembly.shared.get(("conditions", tuple(conditions)), lambda: tuple(_functions(assembly, conditions)))
+    return assembly.shared.get(_CONDITIONS, lambda: tuple(_functions(assembly, conditions)), tuple(conditions))
 
 
 def _functions(assembly: Assembly, conditions: Sequence[Condition]) -> Iterator[EventFunction]:

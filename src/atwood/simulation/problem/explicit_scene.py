@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING
 
-from atwood.forms.accelerations import AccelerationProgram, acceleration_program
+from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.integrators.explicit_problem import CompiledRates, ExplicitProblem
 from atwood.integrators.protocol import FloatArray, Values
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from atwood.integrators.dop853.native import CompiledAccelerations
 
 __all__ = ["compiled_rates", "explicit_problem"]
+
+_COMPILED: Key[CompiledAccelerations] = Key("machine code of accelerations")
 
 
 def explicit_problem(
@@ -39,7 +42,7 @@ def explicit_problem(
     ExplicitProblem or None
         None if the scene has no coordinates, or constraints are left among them.
     """
-    program = found or assembly.shared.get("accelerations", lambda: acceleration_program(assembly))
+    program = found or accelerations_of(assembly)
     n, m = len(assembly.reduced.coordinates), len(assembly.reduced.speeds)
     if program is None or n == 0:
         return None
@@ -63,7 +66,7 @@ def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAc
     """Return the accelerations of a scene as machine code, for any parameter values."""
     from atwood.integrators.dop853.native import CompiledAccelerations
 
-    return assembly.shared.get(("rates", found), lambda: CompiledAccelerations(found.program))
+    return assembly.shared.get(_COMPILED, lambda: CompiledAccelerations(found.program), found)
 
 
 def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], CompiledRates] | None:

@@ -14,11 +14,14 @@ from typing import Any
 from atwood.expr import Expression, live
 from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.model.declare.component import bind
 from atwood.model.local.laws import LocalPart
 from atwood.model.values.vector import Vector
 
 __all__ = ["announce", "find_not_compilable"]
+
+_NOT_COMPILABLE: Key[str] = Key("what cannot be compiled")
 
 _PLAIN = ("potential", "dissipation", "force", "inertia", "lagrangian", "derivative")
 
@@ -33,7 +36,7 @@ def find_not_compilable(assembly: Assembly, program: Program) -> str:
     program
         One of its programs.
     """
-    return assembly.shared.get(("not compilable", program), lambda: _describe(assembly, program))
+    return assembly.shared.get(_NOT_COMPILABLE, lambda: _describe(assembly, program), program)
 
 
 def announce(assembly: Assembly, not_compilable: str) -> None:

@@ -31,11 +31,17 @@ from atwood.simulation.problem.not_compilable import announce, find_not_compilab
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
+    from atwood.codegen import IdaCallbacks
+    from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks
     from atwood.expr import Program
     from atwood.forms.null_space import NullSpaceProgram
     from atwood.simulation.problem.native_null_space import CompiledNullSpace
 
 __all__ = ["Plan", "make_plan", "pack_state"]
+
+_IDA: Key[IdaCallbacks] = Key("machine code for IDA")
+_NULL_SPACE: Key[NullSpaceProgram] = Key("program of the null space")
+_NULL_SPACE_CODE: Key[NullSpaceCallbacks] = Key("machine code of the null space")
 
 
 _LARGEST_COLUMNS = 20_000
@@ -257,10 +263,10 @@ class Plan:
 
         shared, kept = self.assembly.shared, self.finding.kept
         if self._null_space is None:
-            program = shared.get(("loops", kept), lambda: _null_space_program(self.assembly, kept))
+            program = shared.get(_NULL_SPACE, lambda: _null_space_program(self.assembly, kept), kept)
             self._null_space = CompiledNullSpace(program, self.assembly.parameter_values, self.sizes)
         made = self._null_space.program
-        code = shared.get(("loops", kept, linear_solver), lambda: compile_null_space(made, linear_solver))
+        code = shared.get(_NULL_SPACE_CODE, lambda: compile_null_space(made, linear_solver), kept, linear_solver)
         coordinates = self.program.coordinates
 
         def review(t: float, y: FloatArray) -> bool:
@@ -274,7 +280,7 @@ class Plan:
 
         program = self.program
         code = self.assembly.shared.get(
-            ("ida", program, linear_solver),
+            _IDA,
             lambda: compile_ida_callbacks(
                 program.residual,
                 program.jacobian,
@@ -284,6 +290,8 @@ class Plan:
                 sparse=linear_solver == "sparse",
                 by_columns=program.derivative.by_columns,
             ),
+            program,
+            linear_solver,
         )
         data = code.bind(self.assembly.parameter_values)
         return NativeCallbacks(

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.forms.kept import Key
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.linalg.matrices import is_best_full
@@ -33,6 +34,8 @@ __all__ = [
     "project_states",
 ]
 
+
+_NORMAL: Key[Normal] = Key("normal equations of the constraints")
 
 _LEAST = 1e-17
 """What is less is less than rounding, although it may go on to shrink."""
@@ -217,7 +220,7 @@ def _normal(plan: Plan) -> Normal | None:
         pattern = Pattern(program.jacobian_rows, program.jacobian_columns, (program.constraints, program.speeds))
         return Normal(pattern, plan.finding.kept)
 
-    return plan.assembly.shared.get(("normal equations", plan.assembly.form, plan.finding.kept), make)
+    return plan.assembly.shared.get(_NORMAL, make, plan.assembly.form, plan.finding.kept)
 
 
 def _largest(now: ConstraintsAt, speeds: FloatArray) -> FloatArray:

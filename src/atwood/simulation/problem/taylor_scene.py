@@ -12,8 +12,9 @@ import numpy as np
 from atwood.errors import UsageError
 from atwood.expr import Expression, live, substitute
 from atwood.expr.series.taylor import TaylorPrograms, taylor_programs
-from atwood.forms.accelerations import AccelerationProgram, acceleration_program
+from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.integrators.explicit_problem import ExplicitProblem, Stepper
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.protocol import Budget, FloatArray, SolverOptions
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from atwood.integrators.taylor.native import CompiledRecurrences
 
 __all__ = ["open_taylor", "recurrences", "taylor_problem"]
+
+_BRANCHES: Key[bool] = Key("whether a branch could be without a value")
+_RECURRENCES: Key[TaylorPrograms] = Key("recurrences")
+_COMPILED: Key[CompiledRecurrences] = Key("machine code of recurrences")
 
 _LANES = 8
 
@@ -37,17 +42,16 @@ def recurrences(assembly: Assembly) -> TaylorPrograms:
     UnsupportedError
         If a law switches with the motion, or calls a function that the graph does not look into.
     """
-    found = assembly.shared.get("accelerations", lambda: acceleration_program(assembly))
+    found = accelerations_of(assembly)
     if found is None or not len(assembly.reduced.coordinates):
         raise UsageError(
             "the Taylor-series method needs a scene without closed loops in which something can move",
             where=assembly.flat.name,
             advice="Use the solver 'ida'.",
         )
-    is_partial = assembly.shared.get(("partial", found), lambda: _has_partial_branch(assembly, found))
+    is_partial = assembly.shared.get(_BRANCHES, lambda: _has_partial_branch(assembly, found), found)
     chosen = assembly.known_relations if is_partial else {}
-    key = ("recurrences", found, tuple(chosen.values()))
-    return assembly.shared.get(key, lambda: _make(found, chosen))
+    return assembly.shared.get(_RECURRENCES, lambda: _make(found, chosen), found, tuple(chosen.values()))
 
 
 _PARTIAL = frozenset({"sqrt", "log", "pow", "asin", "acos", "tan", "atan2", "div"})
@@ -112,7 +116,7 @@ def _compiled(
 
     @cache
     def bound() -> tuple[CompiledRecurrences, FloatArray]:
-        code = assembly.shared.get(("compiled recurrences", programs), lambda: CompiledRecurrences(programs))
+        code = assembly.shared.get(_COMPILED, lambda: CompiledRecurrences(programs), programs)
         return code, code.bind(assembly.parameter_values)
 
     return bound

@@ -14,6 +14,7 @@ import numpy as np
 
 from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.simulation.problem.explicit_scene import explicit_problem
@@ -130,6 +131,9 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
     return Choice(t, "explicit", "its coordinates are independent, and the problem is not stiff")
 
 
+_HAS_SERIES: Key[bool] = Key("whether accelerations have Taylor series")
+
+
 def _has_series(assembly: Assembly) -> bool:
     """Return whether the accelerations of a scene have Taylor series: nothing switches, nothing is called in Python."""
     from atwood.simulation.problem.taylor_scene import recurrences
@@ -141,7 +145,7 @@ def _has_series(assembly: Assembly) -> bool:
             return False
         return True
 
-    return assembly.shared.get("has series", find)
+    return assembly.shared.get(_HAS_SERIES, find)
 
 
 def turned_stiff(t: float, found: Stiffness) -> Choice:

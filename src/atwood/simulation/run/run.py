@@ -12,7 +12,9 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError, SolveError, StartError, TopologyError, UnsupportedError
+from atwood.expr import Program
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
 from atwood.late import dataclass
@@ -46,6 +48,8 @@ from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import Orientation
 
 __all__ = ["Run", "run", "run_out_of_time"]
+
+_PRESCRIBED: Key[Program] = Key("prescribed")
 
 
 _CHATTER = 50
@@ -222,7 +226,7 @@ class _Walk:
     ) -> None:
         self.start, self.options, self._other = start, options, reassemble
         self.samples, self.again = samples, again
-        self._schedules: dict[int, tuple[Shared, Schedule]] = {}
+        self._schedules: dict[Shared, Schedule] = {}
         self._plans: dict[tuple[tuple[float, ...], tuple[float, ...] | None], Plan] = {}
         self._piece_start = start.time
         self.segments: list[SegmentRecord] = []
@@ -361,12 +365,11 @@ class _Walk:
 
     def _schedule(self, assembly: Assembly) -> Schedule:
         """Return the time events of a scene in one mode."""
-        key = id(assembly.shared)
-        if key not in self._schedules:
+        if assembly.shared not in self._schedules:
             moments = np.union1d(self.samples.own, self.sampler.times) if len(self.sampler.times) else self.samples.own
             schedule = find_schedule(assembly, self.start.time, self.options.t_end).at_samples(moments)
-            self._schedules[key] = assembly.shared, schedule  # kept, so that its identity stays its own
-        return self._schedules[key][1]
+            self._schedules[assembly.shared] = schedule
+        return self._schedules[assembly.shared]
 
     def _in_piece(self, assembly: Assembly) -> Assembly:
         """Return a scene with the relations of functions of time that hold in the present piece of the run."""
@@ -490,7 +493,7 @@ def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
     prescribed = assembly.own_equations.prescribed
     if not prescribed:
         return
-    program = assembly.known_program("prescribed", "prescribed", lambda: [value for _, value in prescribed])
+    program = assembly.known_program(_PRESCRIBED, lambda: [value for _, value in prescribed])
     n, m = len(assembly.own_equations.coordinates), len(assembly.own_equations.speeds)
     idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
     misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])

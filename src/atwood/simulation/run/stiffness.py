@@ -18,6 +18,7 @@ import numpy as np
 from atwood.errors import KernelEvaluationError
 from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.integrators.protocol import FloatArray, Values
 from atwood.late import dataclass
 
@@ -54,6 +55,9 @@ class Stiffness:
         return self.ratio > self.limit
 
 
+_CAN_BE_STIFF: Key[bool] = Key("whether anything can be stiff")
+
+
 def can_be_stiff(assembly: Assembly) -> bool:
     """Return whether anything can make motions die away: a Rayleigh function, or a load that reads velocities."""
 
@@ -72,7 +76,7 @@ def can_be_stiff(assembly: Assembly) -> bool:
                     return True
         return False
 
-    return assembly.shared.get("can be stiff", find)
+    return assembly.shared.get(_CAN_BE_STIFF, find)
 
 
 def find_stiffness(

@@ -9,14 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from atwood.forms.kept import Key
 from atwood.integrators.protocol import FloatArray, Lookout
 from atwood.simulation.problem.problem import Plan
 
 if TYPE_CHECKING:
-    from atwood.codegen.sundials.lookout import LookoutData
+    from atwood.codegen.sundials.lookout import LookoutCode, LookoutData
 from atwood.late import dataclass
 
 __all__ = ["Look", "as_lookout", "compiled_looks", "cubic", "stride_from"]
+
+_LOOKOUT: Key[LookoutCode] = Key("machine code of the singularity monitor")
 
 _MOVE = 0.3
 """Between two looks nothing moves by more of its size; an angle by so many radians."""
@@ -98,8 +101,10 @@ def compiled_looks(plan: Plan, whole: float) -> LookoutData | None:
 
     places = held.jacobian_rows, held.jacobian_columns
     code = assembly.shared.get(
-        ("lookout", assembly.form, plan.program.size),
+        _LOOKOUT,
         lambda: compile_lookout(held.constraints_alone, held.speeds, plan.program.size, places),
+        assembly.form,
+        plan.program.size,
     )
     pace = Pace(_MOVE, whole, _SHARE * whole, _LOW, _WORN if plan.finding.redundant else 0.0)
     return code.bind(assembly.parameter_values, plan.sizes, plan.finding.kept, pace)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import depends_on
-from atwood.forms.accelerations import acceleration_program
+from atwood.forms.accelerations import accelerations_of
 from atwood.integrators.explicit_problem import LOOSEST
 from atwood.integrators.protocol import SolverOptions
 from atwood.late import dataclass
@@ -133,7 +133,7 @@ class _Batches:
         self.needs_reactions = _reads(request, [one.symbol for one in assembly.reactions])
         self._own = threading.local()
         # What threads share is made before they begin.
-        found = assembly.shared.get("accelerations", lambda: acceleration_program(assembly))
+        found = accelerations_of(assembly)
         assert found is not None
         self.rates = compiled_rates(assembly, found)
         self.watched = assembly.compiled(found.program, vectorized=True)

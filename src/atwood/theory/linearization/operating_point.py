@@ -13,6 +13,7 @@ from atwood.arguments import Kind, Refused
 from atwood.arrays import FloatArray
 from atwood.errors import ParameterError, StartError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.late import dataclass
 from atwood.linalg.matrices import to_array
 from atwood.model.compose.composite import Model
@@ -272,6 +273,9 @@ def input_paths(flat: FlatScene, paths: Sequence[str]) -> tuple[InputPath, ...]:
     return tuple(found)
 
 
+_VARIED: Key[Assembly] = Key("the scene with variations of inputs")
+
+
 def _varied(base: Assembly, inputs: Sequence[InputPath]) -> Assembly:
     """Return the scene with variations of inputs; made once for all scenes of a structure."""
     if not inputs:
@@ -282,7 +286,7 @@ def _varied(base: Assembly, inputs: Sequence[InputPath]) -> Assembly:
         made = assemble_flat(replace(base.flat, varied=keys), modes=base.modes)
         return replace(made, source=base.source)
 
-    made: Assembly = base.shared.get(("varied", keys), make)
+    made = base.shared.get(_VARIED, make, keys)
     followed, _ = made.follow(replace(base.flat, varied=keys), base.source)
     return make() if followed is None else followed
 
