@@ -18,8 +18,11 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, vjp
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 
 __all__ = ["LegendreTransform"]
+
+_PROGRAM: Key[Program] = Key("program of the Legendre transformation")
 
 _NEWTON, _CONVERGED = 50, 1e-13
 """So many steps at most, and the change relative to the size of the velocities at which they end."""
@@ -147,13 +150,13 @@ class LegendreTransform:
             InputGroup("q", found.coordinates),
             InputGroup("v", self.velocity_symbols),
         )
-        key = ("legendre", self.assembly.orientation.kind, name)
 
         def make() -> Program:
             outputs = (OutputGroup(name, tuple(expressions())),)
             return Program(f"{self.assembly.flat.name} {name}", inputs, self.assembly.parameters, outputs)
 
-        return Function(self.assembly, self.assembly.shared.get(key, make), shape)
+        program = self.assembly.shared.get(_PROGRAM, make, self.assembly.orientation.kind, name)
+        return Function(self.assembly, program, shape)
 
     @cached_property
     def _momenta(self) -> Function:

@@ -24,8 +24,9 @@ from atwood.analysis.lagrangian import Lagrangian, lagrangian_of
 from atwood.analysis.number_functions import Numbers
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, StartError, UnsupportedError
-from atwood.expr import Expression, depends_on, jacobian, substitute
+from atwood.expr import Expression, Program, depends_on, jacobian, substitute
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.late import dataclass
 from atwood.showing import count_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
@@ -33,6 +34,8 @@ from atwood.simulation.initialization.start import find_start
 from atwood.topology.orientation_coordinates import Orientation
 
 __all__ = ["Hamiltonian", "read_hamiltonian"]
+
+_VELOCITIES: Key[Program] = Key("velocities")
 
 _LARGEST_BLOCK = 3
 """Mass matrices are inverted in symbols block by block, where no block has more rows."""
@@ -180,7 +183,7 @@ class Hamiltonian:
     def _velocities_of(self, q: FloatArray, u: FloatArray, t: float) -> FloatArray:
         """Return the derivatives of the coordinates, from speeds that may be angular velocities."""
         equations = self.assembly.reduced
-        program = self.assembly.known_program("velocities", "velocities", lambda: list(equations.rates))
+        program = self.assembly.known_program(_VELOCITIES, lambda: list(equations.rates))
         idle = np.zeros(len(equations.speeds)), np.zeros(len(self.assembly.reactions))
         try:
             return np.asarray(self.assembly.kernel(program)([t], q, u, *idle)[0], dtype=float)
