@@ -70,12 +70,14 @@ MOST_FILES = 20
 
 LONG_FILES = {
     "analysis/dynamics.py",
+    "analysis/hamiltonian.py",
     "analysis/lagrangian.py",
     "forms/accelerations.py",
     "forms/assembly.py",
     "forms/program.py",
     "integrators/explicit_session.py",
     "integrators/ida/native.py",
+    "integrators/protocol.py",
     "model/compose/composite.py",
     "model/compose/serialization.py",
     "model/declare/component.py",
