@@ -72,6 +72,7 @@ LONG_FILES = {
     "analysis/dynamics.py",
     "analysis/hamiltonian.py",
     "analysis/lagrangian.py",
+    "forms/lagrangian.py",
     "forms/accelerations.py",
     "forms/assembly.py",
     "forms/program.py",

@@ -12,13 +12,13 @@ from functools import cached_property
 
 import numpy as np
 
-from atwood.analysis.lagrangian import Lagrangian
 from atwood.analysis.number_functions import Function, Numbers
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
+from atwood.forms.lagrangian import Lagrangian
 
 __all__ = ["LegendreTransform"]
 

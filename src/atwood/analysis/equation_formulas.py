@@ -9,13 +9,13 @@ from typing import Literal
 from atwood.analysis.formulas.book import Book, TooLargeError
 from atwood.analysis.formulas.notation import Notation
 from atwood.analysis.formulas.tree import Name, Sum, Symbol
-from atwood.analysis.lagrangian import Lagrangian
 from atwood.analysis.structure import Structure, structure_of
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, SparseMatrix, count_operations, substitute
 from atwood.expr.core import algebra
 from atwood.expr.core.relations import Relation
 from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import Lagrangian
 from atwood.late import dataclass
 
 __all__ = ["EquationFormulas", "Parameters", "Written"]

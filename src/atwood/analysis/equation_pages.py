@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from atwood.analysis.formulas import code, latex, page, text
 from atwood.analysis.formulas.page import Line, Matrix, Section
 from atwood.analysis.formulas.tree import Sum, Symbol, names_in
-from atwood.analysis.lagrangian import rows_by_part
+from atwood.forms.lagrangian import rows_by_part
 
 if TYPE_CHECKING:
     from atwood.analysis.equations import EquationsOfMotion

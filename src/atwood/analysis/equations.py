@@ -15,10 +15,10 @@ from atwood.analysis.formulas.notation import notation_of
 from atwood.analysis.formulas.objects import Sympy
 from atwood.analysis.formulas.page import Section
 from atwood.analysis.formulas.tree import Sum
-from atwood.analysis.lagrangian import lagrangian_of, rows_by_part
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import lagrangian_of, rows_by_part
 from atwood.late import dataclass
 
 __all__ = ["EquationsOfMotion", "PartOfEquations", "read_equations"]

@@ -20,13 +20,13 @@ from atwood.analysis.formulas.order import in_brackets, in_order
 from atwood.analysis.formulas.page import Line, Section
 from atwood.analysis.formulas.tree import Sum, Symbol, Term, cost, names_in, product
 from atwood.analysis.hamiltonian_checks import changes_in_time, check_mass, is_energy, refuse_without_hamiltonian
-from atwood.analysis.lagrangian import Lagrangian, lagrangian_of
 from atwood.analysis.number_functions import Numbers
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, StartError, UnsupportedError
 from atwood.expr import Expression, Program, depends_on, jacobian, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
+from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.late import dataclass
 from atwood.showing import count_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.lagrangian import Lagrangian
 from atwood.arrays import BoolArray
 from atwood.expr import dependencies
 from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import Lagrangian
 from atwood.late import dataclass
 from atwood.showing import count_of
 

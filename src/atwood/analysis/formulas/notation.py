@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from atwood.analysis.formulas.tree import Symbol
-from atwood.analysis.lagrangian import Lagrangian
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import Lagrangian
 from atwood.late import dataclass
 
 __all__ = ["GREEK", "Notation", "notation_of"]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from atwood import Component, Frame, Scalar, Scene, UsageError, assemble, connector, dissipation, signal
-from atwood.analysis.lagrangian import Lagrangian, lagrangian_of
 from atwood.expr import Expression, evaluate, jvp, substitute, vjp
 from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.model.compose.composite import Model
 from atwood_library import Damper, Force, Ground, Link, Pivot, PointMass, RigidBody, Rod, Slider, Spherical, Spring
 from atwood_library.scenes import SCENES
