@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from atwood.analysis.canonical import LegendreTransform
+from atwood.analysis.canonical.legendre import LegendreTransform
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, KernelEvaluationError, UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
