@@ -70,7 +70,6 @@ MOST_FILES = 20
 
 LONG_FILES = {
     "analysis/dynamics.py",
-    "analysis/lagrangian.py",
     "forms/lagrangian.py",
     "forms/accelerations.py",
     "forms/assembly.py",
