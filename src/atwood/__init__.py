@@ -128,6 +128,14 @@ if TYPE_CHECKING:
     from atwood.study.sweeps.sweep import Sweep, sweep
     from atwood.theory.dynamics import Dynamics, dynamics
     from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
+    from atwood.theory.flow import (
+        LyapunovExponents,
+        PoincareSection,
+        TangentFlow,
+        lyapunov_exponents,
+        poincare_section,
+        tangent_flow,
+    )
     from atwood.theory.hamiltonian import Hamiltonian, hamiltonian
     from atwood.theory.linearization import (
         BranchPoint,
@@ -192,9 +200,12 @@ __all__ += [
     "EquilibriumBranches",
     "Hamiltonian",
     "LinearModel",
+    "LyapunovExponents",
     "NormalModes",
     "PartOfEquations",
+    "PoincareSection",
     "RootLocus",
+    "TangentFlow",
     "Trim",
     "dynamics",
     "equations",
@@ -202,8 +213,11 @@ __all__ += [
     "equilibrium_branches",
     "hamiltonian",
     "linearize",
+    "lyapunov_exponents",
     "normal_modes",
+    "poincare_section",
     "root_locus",
+    "tangent_flow",
     "trim",
 ]
 
@@ -304,13 +318,16 @@ _LATER = {
     "Formula": "atwood.expr.formulas.formula",
     "Hamiltonian": "atwood.theory.hamiltonian",
     "LinearModel": "atwood.theory.linearization",
+    "LyapunovExponents": "atwood.theory.flow",
     "MechanismReport": "atwood.reporting",
     "NormalModes": "atwood.theory.linearization",
     "PartOfEquations": "atwood.theory.equations",
+    "PoincareSection": "atwood.theory.flow",
     "Result": "atwood.result.result",
     "RootLocus": "atwood.theory.linearization",
     "SavedResult": "atwood.result.files",
     "Sweep": "atwood.study",
+    "TangentFlow": "atwood.theory.flow",
     "Trim": "atwood.theory.linearization",
     "animate": "atwood.plotting",
     "assemble": "atwood.pipeline",
@@ -327,6 +344,7 @@ _LATER = {
     "load_result": "atwood.result.files",
     "load_scene": "atwood.model.compose.serialization",
     "load_sweep": "atwood.study",
+    "lyapunov_exponents": "atwood.theory.flow",
     "normal_modes": "atwood.theory.linearization",
     "plot": "atwood.plotting",
     "plot_bode": "atwood.plotting.plots.linear",
@@ -337,12 +355,14 @@ _LATER = {
     "plot_nyquist": "atwood.plotting.plots.linear",
     "plot_root_locus": "atwood.plotting.plots.linear",
     "plot_sweep": "atwood.plotting",
+    "poincare_section": "atwood.theory.flow",
     "report": "atwood.reporting",
     "root_locus": "atwood.theory.linearization",
     "save_result": "atwood.result.files",
     "save_scene": "atwood.model.compose.serialization",
     "simulate": "atwood.pipeline",
     "sweep": "atwood.study",
+    "tangent_flow": "atwood.theory.flow",
     "to_data": "atwood.model.compose.serialization",
     "trim": "atwood.theory.linearization",
 }

@@ -42,23 +42,25 @@ class Tangents:
         return len(self.names)
 
     def basis(self, q: FloatArray) -> FloatArray:
-        """Return N(q), shape (coordinates, displacements)."""
-        found = np.zeros((self.coordinates, len(self)))
+        """Return N(q), shape (..., coordinates, displacements) for coordinates of shape (..., coordinates)."""
+        found = np.zeros((*q.shape[:-1], self.coordinates, len(self)))
         for i, k in self.plain:
-            found[i, k] = 1.0
+            found[..., i, k] = 1.0
         for orientation, numbers in self.orientation_coordinates:
-            found[np.ix_(orientation.coordinates, numbers)] = _block(q[list(orientation.coordinates)])
+            rows, columns = np.ix_(orientation.coordinates, numbers)
+            found[..., rows, columns] = _block(q[..., list(orientation.coordinates)])
         return found
 
     def inverse(self, q: FloatArray) -> FloatArray:
-        """Return the left inverse of N(q), shape (displacements, coordinates)."""
-        found = np.zeros((len(self), self.coordinates))
+        """Return the left inverse of N(q), shape (..., displacements, coordinates)."""
+        found = np.zeros((*q.shape[:-1], len(self), self.coordinates))
         for i, k in self.plain:
-            found[k, i] = 1.0
+            found[..., k, i] = 1.0
         for orientation, numbers in self.orientation_coordinates:
-            own = q[list(orientation.coordinates)]
-            scale = (4.0 if len(own) == 4 else 1.0) / float(own @ own)
-            found[np.ix_(numbers, orientation.coordinates)] = scale * _block(own).T
+            own = q[..., list(orientation.coordinates)]
+            scale = (4.0 if own.shape[-1] == 4 else 1.0) / np.sum(own * own, axis=-1)
+            rows, columns = np.ix_(numbers, orientation.coordinates)
+            found[..., rows, columns] = scale[..., None, None] * np.swapaxes(_block(own), -1, -2)
         return found
 
     def moved(self, q: FloatArray, displacement: FloatArray) -> FloatArray:
@@ -77,10 +79,12 @@ class Tangents:
 
 def _block(own: FloatArray) -> FloatArray:
     """Return the derivative of the coordinates of an orientation by a small rotation in the body's axes."""
-    if len(own) == 2:  # cosine and sine
-        return np.array([[-own[1]], [own[0]]])
-    w, x, y, z = own
-    return 0.5 * np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
+    parts = np.moveaxis(own, -1, 0)
+    if len(parts) == 2:  # cosine and sine
+        return np.stack([-parts[1], parts[0]], axis=-1)[..., None]
+    w, x, y, z = parts
+    rows = [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]]
+    return 0.5 * np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def find_tangents(equations: Equations) -> Tangents:

@@ -29,13 +29,13 @@ from atwood.simulation.dynamics.balance import balance_of, solve_determined
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
 from atwood.simulation.dynamics.scales import motion_scales, scene_length
 
-__all__ = ["Flow", "LinearScene", "Variation"]
+__all__ = ["Differentiated", "Flow", "LinearScene", "Variation"]
 
 _VARIATIONS: Key[tuple[list[_Part], Program]] = Key("derivatives of the equations")
 
 
 @dataclass(frozen=True)
-class _Part:
+class Differentiated:
     """One group of expressions with its derivatives by some groups of symbols."""
 
     name: str
@@ -158,10 +158,10 @@ class LinearScene:
         }
 
     @cached_property
-    def _made(self) -> tuple[list[_Part], Program]:
+    def _made(self) -> tuple[list[Differentiated], Program]:
         """The derivatives and their program, made once for all scenes of a structure."""
 
-        def make() -> tuple[list[_Part], Program]:
+        def make() -> tuple[list[Differentiated], Program]:
             parts = [self.differentiated(name, found) for name, found in self._expressions.items()]
             return parts, self.program("variations", self._expressions, parts)
 
@@ -169,10 +169,11 @@ class LinearScene:
         return self.assembly.shared.get(_VARIATIONS, make, *about)
 
     @property
-    def _parts(self) -> list[_Part]:
+    def parts(self) -> list[Differentiated]:
+        """Where the derivatives of each group of expressions stand."""
         return self._made[0]
 
-    def differentiated(self, name: str, found: Sequence[Expression]) -> _Part:
+    def differentiated(self, name: str, found: Sequence[Expression]) -> Differentiated:
         """Return where the derivatives of some expressions stand, with the expressions of the entries."""
         e = self.equations
         symbols = {
@@ -184,9 +185,11 @@ class LinearScene:
             "w": self.inputs,
         }
         places = {one: jacobian(list(found), list(by)) for one, by in symbols.items() if by and found}
-        return _Part(name, len(found), {one: len(by) for one, by in symbols.items()}, places)
+        return Differentiated(name, len(found), {one: len(by) for one, by in symbols.items()}, places)
 
-    def program(self, name: str, expressions: Mapping[str, Sequence[Expression]], parts: Sequence[_Part]) -> Program:
+    def program(
+        self, name: str, expressions: Mapping[str, Sequence[Expression]], parts: Sequence[Differentiated]
+    ) -> Program:
         """Return the program of a state that gives expressions and the entries of their derivatives."""
         outputs = [OutputGroup(group, tuple(found)) for group, found in expressions.items()]
         for part in parts:
@@ -196,12 +199,13 @@ class LinearScene:
         return Program(f"{self.assembly.flat.name} {name}", self.groups, self.assembly.parameters, tuple(outputs))
 
     @property
-    def _program(self) -> Program:
+    def derivatives(self) -> Program:
+        """The program of the expressions and the entries of their derivatives at a state."""
         return self._made[1]
 
     @cached_property
     def _kernel(self) -> BoundKernel:
-        return self.assembly.kernel(self._program)
+        return self.assembly.kernel(self.derivatives)
 
     def with_inputs(self, values: Mapping[str, float]) -> LinearScene:
         """Return the same with inputs that have other values than zero, by the name of their symbol."""
@@ -210,20 +214,20 @@ class LinearScene:
         place = {symbol.name: i for i, symbol in enumerate(self.assembly.parameters)}
         for name, value in values.items():
             numbers[place[name]] = value
-        found.__dict__["_kernel"] = self.assembly.compiled(self._program).bind(numbers)
+        found.__dict__["_kernel"] = self.assembly.compiled(self.derivatives).bind(numbers)
         return found
 
     @property
     def depends_on_time(self) -> bool:
         """Whether time appears in the equations."""
-        return any(len(part.places["t"].entries) > 0 for part in self._parts if "t" in part.places)
+        return any(len(part.places["t"].entries) > 0 for part in self.parts if "t" in part.places)
 
     def disturbed(self, random: np.random.Generator) -> LinearScene:
         """Return the same with parameters that are off by a little more than rounding."""
         found = copy(self)
         values = self.assembly.parameter_values
         near = values * (1.0 + ROUGHNESS * random.uniform(-1.0, 1.0, values.shape))
-        found.__dict__["_kernel"] = self.assembly.compiled(self._program).bind(near)
+        found.__dict__["_kernel"] = self.assembly.compiled(self.derivatives).bind(near)
         return found
 
     # -- numbers --------------------------------------------------------------------------------------------------
@@ -232,7 +236,7 @@ class LinearScene:
         """Return which constraints are independent; `find_rank` asks places near by as well."""
         return find_rank(balance_of(self.assembly, "dae" if self.form == "dae" else "reduced"), t, q, self.sizes)
 
-    def matrices(self, part: _Part, values: Mapping[str, FloatArray]) -> dict[tuple[str, str], FloatArray]:
+    def matrices(self, part: Differentiated, values: Mapping[str, FloatArray]) -> dict[tuple[str, str], FloatArray]:
         """Return the derivatives of a group as matrices."""
         found: dict[tuple[str, str], FloatArray] = {}
         for by, count in part.columns.items():
@@ -258,9 +262,9 @@ class LinearScene:
         a, held
             Accelerations and multipliers.
         """
-        values = self.evaluate(self._kernel, self._program, (np.array([t]), q, u, a, held))
+        values = self.evaluate(self._kernel, self.derivatives, (np.array([t]), q, u, a, held))
         by: dict[tuple[str, str], FloatArray] = {}
-        for part in self._parts:
+        for part in self.parts:
             by |= self.matrices(part, values)
         basis, inverse = self.tangents.basis(q), self.tangents.inverse(q)
         return Variation(t, q, u, a, held, basis, inverse @ values["rates"], values, by)
@@ -297,17 +301,28 @@ class LinearScene:
         moved = solve_determined(matrix, -np.concatenate([force, second[kept]]), t)
         multiplier = np.zeros((len(zero_held), force.shape[1]))
         multiplier[kept] = moved[n:]
-        return Flow(now, self._shift(now), moved[:n], multiplier)
+        shift = self.shift(q, now.basis, now.displacement_rates, np.hstack(now.along("rates")))
+        return Flow(now, shift, moved[:n], multiplier)
 
-    def _shift(self, now: Variation) -> FloatArray:
-        """Return how displacements of neighbours change: ``ds' = N^+ (R_q N - N') ds + N^+ R_u du + ...``."""
-        inverse = self.tangents.inverse(now.q)
-        found = np.hstack(now.along("rates"))
+    def shift(self, q: FloatArray, basis: FloatArray, moving: FloatArray, rates: FloatArray) -> FloatArray:
+        """Return how displacements of neighbours change: ``ds' = N^+ (R_q N - N') ds + N^+ R_u du + ...``.
+
+        Parameters
+        ----------
+        q, basis
+            Coordinates and N(q); of one state, or of several along the first axis.
+        moving
+            The rates of the displacements, shape (..., displacements).
+        rates
+            The derivatives of the coordinates' rates along displacements, speeds and what else there is, as columns.
+        """
+        found = rates
         if self.tangents.orientation_coordinates:
             # N is linear in q; coordinates that move by themselves have a constant part of it, which does not change.
-            turned = self.tangents.basis(now.basis @ now.displacement_rates)
+            turned = self.tangents.basis((basis @ moving[..., None])[..., 0])
             for i, k in self.tangents.plain:
-                turned[i, k] = 0.0
-            found[:, : len(self.tangents)] -= turned
-        shifted: FloatArray = inverse @ found
+                turned[..., i, k] = 0.0
+            found = rates.copy()
+            found[..., : len(self.tangents)] -= turned
+        shifted: FloatArray = self.tangents.inverse(q) @ found
         return shifted

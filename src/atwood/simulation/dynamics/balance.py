@@ -255,9 +255,9 @@ def solve_determined(matrix: FloatArray, right: FloatArray, t: float) -> FloatAr
     Parameters
     ----------
     matrix
-        The balance, square.
+        The balance, square; or one of each of several states, shape (states, n, n).
     right
-        One right-hand side, or several as columns.
+        One right-hand side for each, or several as columns.
     t
         The time, for the error.
 
@@ -266,13 +266,14 @@ def solve_determined(matrix: FloatArray, right: FloatArray, t: float) -> FloatAr
     SolveError
         If there is no solution, or more than one.
     """
-    if not len(matrix):
+    if not matrix.size:
         return np.zeros(right.shape)
-    size = np.sqrt(np.maximum(np.max(np.abs(matrix), axis=1), np.max(np.abs(matrix), axis=0)))
+    size = np.sqrt(np.maximum(np.max(np.abs(matrix), axis=-1), np.max(np.abs(matrix), axis=-2)))
     size[size == 0.0] = 1.0
-    scale = size if right.ndim == 1 else size[:, None]
+    columns = right if right.ndim == matrix.ndim else right[..., None]
     try:
-        solution: FloatArray = np.linalg.solve(matrix / size[:, None] / size, right / scale) / scale
+        scaled = np.linalg.solve(matrix / size[..., :, None] / size[..., None, :], columns / size[..., None])
+        solution: FloatArray = (scaled / size[..., None]).reshape(right.shape)
     except np.linalg.LinAlgError:
         raise _undetermined(t) from None
     if not np.all(np.isfinite(solution)):

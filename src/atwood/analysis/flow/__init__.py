@@ -1,0 +1,1 @@
+"""How neighbouring motions move: the variational equations along a motion, and what they do to volumes."""

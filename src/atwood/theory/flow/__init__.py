@@ -1,0 +1,14 @@
+"""How neighbouring motions move: tangent flow, Lyapunov exponents, Poincare sections."""
+
+from atwood.theory.flow.lyapunov import LyapunovExponents, lyapunov_exponents
+from atwood.theory.flow.section import PoincareSection, poincare_section
+from atwood.theory.flow.tangent_flow import TangentFlow, tangent_flow
+
+__all__ = [
+    "LyapunovExponents",
+    "PoincareSection",
+    "TangentFlow",
+    "lyapunov_exponents",
+    "poincare_section",
+    "tangent_flow",
+]
