@@ -31,7 +31,7 @@ from atwood.simulation.dynamics.scales import motion_scales, scene_length
 
 __all__ = ["Differentiated", "Flow", "LinearScene", "Variation"]
 
-_VARIATIONS: Key[tuple[list[_Part], Program]] = Key("derivatives of the equations")
+_VARIATIONS: Key[tuple[list[Differentiated], Program]] = Key("derivatives of the equations")
 
 
 @dataclass(frozen=True)
