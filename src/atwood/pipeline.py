@@ -22,6 +22,7 @@ from atwood.errors import StartError, UsageError
 from atwood.expr import Expression, Graph
 from atwood.expr.core.relations import TimeRelations
 from atwood.forms.assembly import Assembly
+from atwood.forms.dae import check_level
 from atwood.forms.places import to_maximal
 from atwood.forms.source import Kind, Source
 from atwood.forms.starting import with_places
@@ -66,7 +67,7 @@ from atwood.topology.graph import MechanismGraph, build_graph
 from atwood.topology.line_signs import find_line_signs
 from atwood.topology.orientation_coordinates import Orientation, check_orientation
 
-__all__ = ["Assembly", "assemble", "assemble_flat", "simulate"]
+__all__ = ["Assembly", "assemble", "assemble_flat", "assembly_of", "simulate"]
 
 LineSigns = Mapping[tuple[str, str, str], float]
 """On a line, the sign of each length: of (part, one connector, the other)."""
@@ -93,7 +94,7 @@ def assemble(
         ``"reduced"``: constraints are eliminated, the unknowns are generalized coordinates. ``"dae"``: constraints
         stay, with Lagrange multipliers.
     level
-        Of the dae form: ``"ggl"``, ``"index1-projected"`` or ``"index1"``.
+        Of the dae form: ``"ggl"``, ``"index1-projected"`` or ``"index1"``. The reduced form has no levels.
     orientation
         In which coordinates the reduced form has orientations in space: ``"quaternion"``, or Euler angles
         such as ``"euler-zyz"``, in any of the twelve conventions, as turns about axes of the frame that the turns
@@ -140,7 +141,8 @@ def assemble_flat(
     line_signs
         On a line, the sign of lengths; as far as start values tell if not given.
     """
-    check_orientation(orientation, form)
+    check_orientation(orientation, form, flat.space)
+    check_level(level, form)
     all_modes = {
         path: str(part.values.get(part.component.mode_parameter, part.component.modes[0]))
         for path, part in flat.parts.items()
@@ -263,6 +265,30 @@ def _find_line_signs(flat: FlatScene, ground: _Ground, found: _Reading) -> LineS
     return find_line_signs(flat, network, bodies, locals_, offsets, ground.table.values, ground.space)
 
 
+def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str | None) -> Assembly:
+    """Return an assembly as it is, or assemble a scene as was asked for.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it.
+    name
+        What to call the scene.
+    **asked
+        `form`, `level` and `orientation`; see `assemble`. None is what an assembly has, or as usual.
+
+    Raises
+    ------
+    UsageError
+        If what was asked for contradicts the assembly.
+    """
+    given = {key: value for key, value in asked.items() if value is not None}
+    if not isinstance(scene, Assembly):
+        return assemble(scene, name=name, **given)
+    _refuse_contradictions(scene, given)
+    return scene
+
+
 @takes(
     scene=SCENE,
     form=optional(FORM),
@@ -362,12 +388,8 @@ def simulate(
         If the solver fails.
     """
     clock = Clock(max_seconds)
-    asked = {"form": form, "level": level, "orientation": orientation}
-    given = {name: value for name, value in asked.items() if value is not None}
     with watching() as stopwatch:
-        if isinstance(scene, Assembly):
-            _refuse_contradictions(scene, given)
-        assembly = scene if isinstance(scene, Assembly) else assemble(scene, **given)
+        assembly = assembly_of(scene, form=form, level=level, orientation=orientation)
         flat = assembly.flat
         end = flat.t_end if t_end is None else float(t_end)
         with told(progress, flat.name, partial(_share, flat.t_start, end)) as watch:

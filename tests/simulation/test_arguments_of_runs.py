@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from atwood import Scene, UsageError, assemble, connect, simulate
+from atwood import Scene, UsageError, assemble, connect, dynamics, equations, report, simulate, sweep
 from atwood_library import Ground, PointMass, Rope
-from atwood_library.scenes import DoublePendulum, DoublePendulum3D, FourBar
+from atwood_library.scenes import Atwood, DoublePendulum, DoublePendulum3D, FourBar
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,22 @@ def test_arguments_that_contradict_the_assembly_are_refused(made, asked):
     (name,) = asked
     with pytest.raises(UsageError, match=f"{name}=.* contradicts the assembly"):
         simulate(assembly, t_end=0.1, **asked)
+
+
+@pytest.mark.parametrize("solve", [sweep, dynamics, equations, report])
+def test_whatever_takes_an_assembly_refuses_what_contradicts_it(solve):
+    with pytest.raises(UsageError, match="orientation=.* contradicts the assembly" if solve is not sweep else "form="):
+        solve(assemble(DoublePendulum()), **({"form": "dae"} if solve is sweep else {"orientation": "euler-zyz"}))
+
+
+def test_what_would_change_nothing_is_refused():
+    with pytest.raises(UsageError, match="the reduced form has no levels") as no_level:
+        simulate(DoublePendulum(), level="index1", t_end=0.1)
+    assert "form='dae'" in str(no_level.value)
+    with pytest.raises(UsageError, match="no orientations in a plane"):
+        report(DoublePendulum(), orientation="euler-zyz")
+    with pytest.raises(UsageError, match="no orientations in a line"):
+        simulate(Atwood(), orientation="euler-zyz")
 
 
 def test_arguments_that_agree_with_the_assembly_are_taken():

@@ -23,7 +23,7 @@ from .workers import Done, make_trials
 @click.option("--seed", type=int, help="The first seed; from the clock if not given.")
 @click.option("--only", type=int, help="Make the one trial of this seed, here, and show all that it says.")
 @click.option("--workers", default=1, show_default=True, help="Processes.")
-@click.option("--limit", default=60.0, show_default=True, help="Seconds after which a trial counts as a hang.")
+@click.option("--limit", default=60.0, show_default=True, help="Seconds of the processor for a trial; more is a hang.")
 @click.option("--json", "as_json", is_flag=True, help="Print every finding and the counts as one JSON object.")
 def main(
     kinds: tuple[str, ...], count: int, seed: int | None, only: int | None, workers: int, limit: float, as_json: bool

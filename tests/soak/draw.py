@@ -116,6 +116,8 @@ def settled(mechanism: Mechanism) -> Mechanism:
         raise Discarded("nearly singular")
     if oracle.rank >= oracle.size and not is_driven(mechanism):
         raise Discarded("immobile")
+    if oracle.starts_singular:
+        raise Discarded("singular")
     values = oracle.constraints(place, 0.0)[0]
     assert np.max(np.abs(values), initial=0.0) < 1e-9, f"the oracle's constraints do not hold at the start: {values}"
     speeds = oracle.project_speeds(place, speeds)
@@ -262,6 +264,10 @@ def _load(draft: Draft) -> None:
         mounts = (first, draft.mount_at(other, p + chance.place(0.2), r @ chance.small_turn()))
     elif gap < 0.3:
         return
+    if sort == "torsion_damper" and chance.space == "space":
+        along_a, along_b = (draft.placed(mount)[1] @ values["axis"] for mount in mounts)
+        if along_a @ along_b < -0.8:  # where they point against each other a twist has no value
+            return
     if sort == "central_gravity":
         joined = Mechanism(chance.space, 0.0, tuple(draft.bodies), tuple(draft.ties)).rigidly_joined(other)
         rods = [tie for tie in draft.ties if tie.sort == "rod" and tie.values["mass"] > 0.0]

@@ -7,10 +7,11 @@ constraints need no care; motions are integrated by DOP853 and projected at the 
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -28,6 +29,7 @@ from .oracle_parts import (
     spring_energy,
     twist_in_plane,
 )
+from .trial import Discarded
 
 STEP = 1e-30
 """The complex step; its square is nothing."""
@@ -36,6 +38,12 @@ CLEAR = 1e-7
 """Singular values of the scaled rows are zero below this, as a share of the largest; up to `POOR` they are unclear."""
 
 POOR = 2e-3
+
+AWAY = 1e-2
+"""How far away a place is that tells whether the start is singular, in units of the open directions of the speeds."""
+
+MOST_CALLS = 6_000
+"""Evaluations of a motion beyond which it is too stiff for an explicit method: some forty times the ordinary."""
 
 
 @dataclass(frozen=True)
@@ -315,6 +323,14 @@ class Oracle:
             found = np.linalg.lstsq(scaled, scale * right, rcond=1e-9)[0] * scale
         return found[:n], found[n:]
 
+    def _finite_accelerations(self, place: Place, speeds: Array, t: float) -> Array:
+        """Return accelerations, or discard the trial where a law has no value, as a twist of opposed axes."""
+        with np.errstate(divide="ignore", invalid="ignore"), contextlib.suppress(np.linalg.LinAlgError):
+            found, _ = self.accelerations(place, speeds, t)
+            if np.all(np.isfinite(found)):
+                return found
+        raise Discarded("the oracle has no value on the way")
+
     # -- rank -------------------------------------------------------------------------------------------------------
 
     def singular_values(self, place: Place, t: float = 0.0) -> Array:
@@ -336,6 +352,30 @@ class Oracle:
         """Whether the rank at the start is beyond doubt."""
         values = self.singular_values(self.start()[0])
         return not np.any((values > 1e-3 * CLEAR) & (values < POOR))
+
+    @cached_property
+    def starts_singular(self) -> bool:
+        """Whether the start is a singular position: where rows depend on others there that do not near by."""
+        place, speeds = self.start()
+        _, rows, _ = self.constraints(place, 0.0)
+        if self.rank == len(rows) or self.rank == self.size:
+            return False
+        open_ways = np.linalg.svd(rows.real)[2][self.rank :]
+        way = np.sin(np.arange(1.0, len(open_ways) + 1.0)) @ open_ways
+        nearby = self._stepped(place, AWAY * way / np.linalg.norm(way))
+        nearby, _ = self.project(nearby, speeds, 0.0)
+        values = self.singular_values(nearby)
+        missed = np.max(np.abs(self.constraints(nearby, 0.0)[0]), initial=0.0)
+        return bool(missed > 1e-10 or np.sum(values > CLEAR * values[0]) != self.rank)
+
+    def is_singular_on_the_way(self, times: Array) -> bool:
+        """Return whether the motion comes to a singular position, as far as steps at these times tell."""
+        try:
+            states = self.run(times, 1e-10)
+        except (ArithmeticError, Discarded):
+            return True
+        least = [self.singular_values(place, t)[self.rank - 1] for (place, _), t in zip(states, times, strict=True)]
+        return bool(self.rank and min(least) < 0.1 * least[0])
 
     def missed(self) -> float:
         """Return by how much the start misses a constraint at most, in position or in velocity."""
@@ -405,11 +445,15 @@ class Oracle:
         place, speeds = self.start()
         shape = place.centers.shape
 
+        calls = count()
+
         def rates(t: float, y: Array) -> Array:
+            if next(calls) > MOST_CALLS:
+                raise Discarded("too stiff for the oracle")
             here, speeds = _unpack(y, shape)
             v, w = self.velocities(speeds)
             turning = np.array([cross_matrix(spin) @ now for spin, now in zip(w, here.rotations, strict=True)])
-            a, _ = self.accelerations(here, speeds, t)
+            a = self._finite_accelerations(here, speeds, t)
             return np.concatenate([v.ravel(), turning.ravel(), a])
 
         began = dict(self._turns)

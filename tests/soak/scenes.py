@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from atwood import AtwoodError, Result, simulate
+from atwood import AtwoodError, Result, SolveError, simulate
 
 from .build import build_scene, moving_axes
 from .description import Array, Body, Mechanism, Tie, outline, rotation
 from .draw import draw
 from .oracle import Oracle, Place
-from .trial import Finding, Trial
+from .trial import Discarded, Finding, Trial
 
 T_END = 0.3
 TOLERANCE = 1e-9
@@ -64,7 +64,10 @@ def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
         try:
             result = run_scene(mechanism, way)
         except AtwoodError as error:
-            findings.append(Finding("refused", stem(error), f"{words}: {error}\n{outline(mechanism)}"))
+            if isinstance(error, SolveError) and _has_no_way_on(mechanism):
+                tried.append("comes to where the oracle has no way on")
+            else:
+                findings.append(Finding("refused", stem(error), f"{words}: {error}\n{outline(mechanism)}"))
             continue
         if result.status != "finished":
             tried.append(f"{result.status}: {stem(result.message)}")
@@ -78,7 +81,10 @@ def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
             tried.append("nearly singular where it starts")
             continue
         if known is None or not _start_alike(known[0], started):
-            known = started, started.run(result.time, 1e-10)
+            try:
+                known = started, started.run(result.time, 1e-10)
+            except Discarded as reason:
+                return Trial((*tried, f"discarded: {reason}"), tuple(findings))
         tried.append(f"compared {way.form}")
         loose = 300.0 if way.level == "index1" else 1.0
         wrong = [(what, gap) for what, gap in _differences(result, *known) if not gap <= ALLOWED * loose]
@@ -88,6 +94,11 @@ def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
             numbers = ", ".join(f"{what} {gap:.1e}" for what, gap in wrong)
             findings.append(Finding("wrong", f"{way.form}: {wrong[0][0]}", f"{words}: {numbers}\n{outline(mechanism)}"))
     return Trial(tuple(tried), tuple(findings))
+
+
+def _has_no_way_on(mechanism: Mechanism) -> bool:
+    """Return whether the motion comes to a singular position, or to where two points meet that attract each other."""
+    return Oracle(mechanism).is_singular_on_the_way(np.linspace(0.0, T_END, 31))
 
 
 def _is_error_of_steps(

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from typing import Any
 
 from .kinds import run_trial
@@ -16,6 +17,10 @@ from .trial import Finding, Trial
 
 RENEWED_AFTER = 500
 """Trials after which a worker is replaced, so that hours of trials need no more memory than minutes."""
+
+
+_PATIENCE = 10.0
+"""A trial may take so many times its limit by the clock, however little of it the processor was there for it."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,23 @@ class _Worker:
     pipe: Connection
     job: tuple[str, int] | None = None
     since: float = 0.0
+    used: float = 0.0
     count: int = 0
+
+    def spent(self) -> tuple[float, float]:
+        """Return the seconds since its job began: by the clock, and of the processor."""
+        seconds = time.monotonic() - self.since
+        used = _processor_time(self.process.pid)
+        return seconds, seconds if used is None else used - self.used
+
+
+def _processor_time(pid: int) -> float | None:
+    """Return the seconds that the processor has worked for a process, if the system tells."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return None
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _work(pipe: Connection) -> None:
@@ -71,7 +92,7 @@ def make_trials(jobs: Iterable[tuple[str, int]], workers: int, limit: float) -> 
     workers
         How many processes.
     limit
-        Seconds after which a trial counts as a hang and its process is ended.
+        Seconds of the processor after which a trial counts as a hang and its process is ended.
     """
     todo = iter(jobs)
     busy: list[_Worker] = []
@@ -84,6 +105,7 @@ def make_trials(jobs: Iterable[tuple[str, int]], workers: int, limit: float) -> 
                     _dismiss(worker)
                     worker = _hire()
                 worker.job, worker.since, worker.count = job, time.monotonic(), worker.count + 1
+                worker.used = _processor_time(worker.process.pid) or 0.0
                 worker.pipe.send(job)
                 busy.append(worker)
             if not busy:
@@ -104,7 +126,7 @@ def _look(worker: _Worker, is_ready: bool, limit: float) -> Done | None:
     """Return what a worker has done, if anything; its job stays where it must be replaced."""
     assert worker.job is not None
     kind, seed = worker.job
-    seconds = time.monotonic() - worker.since
+    seconds, used = worker.spent()
     if is_ready:
         try:
             trial, seconds = worker.pipe.recv()
@@ -115,7 +137,7 @@ def _look(worker: _Worker, is_ready: bool, limit: float) -> Done | None:
             return Done(kind, seed, trial, seconds)
         worker.job = None
         return Done(kind, seed, trial, seconds)
-    if seconds > limit:
+    if used > limit or seconds > _PATIENCE * limit:
         _dismiss(worker)
         return Done(kind, seed, Trial(("hung",), (Finding("hang", f"no end within {limit:g} s"),)), seconds)
     return None

@@ -10,9 +10,31 @@ from atwood.expr import Expression, substitute
 from atwood.forms.program import FormProgram, Level, either_sign, kinematic_rows, make_form_program
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["LEVELS", "dae_form", "keep_constraints"]
+__all__ = ["LEVELS", "check_level", "dae_form", "keep_constraints"]
 
 LEVELS: tuple[Level, ...] = ("ggl", "index1", "index1-projected")
+
+
+def check_level(level: str, form: str) -> None:
+    """Refuse a level that would change nothing.
+
+    Parameters
+    ----------
+    level
+        What was asked for.
+    form
+        ``"reduced"`` or ``"dae"``.
+
+    Raises
+    ------
+    UsageError
+        If the form has no levels.
+    """
+    if form == "reduced" and level != "ggl":
+        raise UsageError(
+            f"the reduced form has no levels, and no {level!r}: its constraints are eliminated",
+            advice="Give form='dae' with it, or leave level out.",
+        )
 
 
 def dae_form(

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from atwood.arguments import takes
+from atwood.arguments import optional, takes
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.constraints.frobenius import integrable_together
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assemble, assemble_flat
+from atwood.pipeline import SCENE, assemble_flat, assembly_of
 from atwood.reporting.offers import Offer, find_offers
 from atwood.reporting.parts import (
     BodyEntry,
@@ -216,8 +216,8 @@ def _plain(value: object) -> object:
     return list(value) if isinstance(value, tuple) else value
 
 
-@takes(scene=SCENE, name=NAME, orientation=ORIENTATION)
-def report(scene: Model | Assembly, name: str | None = None, *, orientation: str = "quaternion") -> MechanismReport:
+@takes(scene=SCENE, name=NAME, orientation=optional(ORIENTATION))
+def report(scene: Model | Assembly, name: str | None = None, *, orientation: str | None = None) -> MechanismReport:
     """Report what became of a scene: bodies, joints, degrees of freedom, constraints, and why.
 
     Parameters
@@ -227,8 +227,8 @@ def report(scene: Model | Assembly, name: str | None = None, *, orientation: str
     name
         What to call the scene.
     orientation
-        In which coordinates the reduced form has orientations in space; see `atwood.assemble`. An assembly says so
-        itself.
+        In which coordinates the reduced form has orientations in space; see `atwood.assemble`. What
+        contradicts an assembly is refused.
 
     Returns
     -------
@@ -240,7 +240,7 @@ def report(scene: Model | Assembly, name: str | None = None, *, orientation: str
     AtwoodError
         If the scene cannot be simulated; the error says why and names the part.
     """
-    given = scene if isinstance(scene, Assembly) else assemble(scene, orientation=orientation, name=name)
+    given = assembly_of(scene, name, orientation=orientation)
     reduced = assemble_flat(given.flat, form="reduced", orientation=given.orientation.kind)
     dae = assemble_flat(given.flat, form="dae", level=given.level or "ggl")
     start = find_start(reduced)

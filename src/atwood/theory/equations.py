@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from atwood.analysis.equations import EquationsOfMotion, PartOfEquations, read_equations
-from atwood.arguments import one_of, takes
+from atwood.arguments import one_of, optional, takes
 from atwood.forms.assembly import Assembly
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assemble
+from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
 
 __all__ = ["EquationsOfMotion", "PartOfEquations", "equations"]
@@ -16,13 +16,13 @@ __all__ = ["EquationsOfMotion", "PartOfEquations", "equations"]
 PARAMETERS = one_of(("symbolic", "values"))
 
 
-@takes(scene=SCENE, form=FORM, parameters=PARAMETERS, orientation=ORIENTATION)
+@takes(scene=SCENE, form=optional(FORM), parameters=PARAMETERS, orientation=optional(ORIENTATION))
 def equations(
     scene: Model | Assembly,
     *,
-    form: str = "reduced",
+    form: str | None = None,
     parameters: str = "symbolic",
-    orientation: str = "quaternion",
+    orientation: str | None = None,
 ) -> EquationsOfMotion:
     """Return the equations of motion of a scene, to be read.
 
@@ -34,10 +34,11 @@ def equations(
     Parameters
     ----------
     scene
-        The scene, or an assembly of it, which then says the form.
+        The scene, or an assembly of it; what contradicts that is refused.
     form
-        ``"reduced"``: generalized coordinates (Lagrange's equations of the second kind); constraints of closed loops
-        stay, with multipliers. ``"dae"``: every joint is a constraint with a multiplier (of the first kind).
+        ``"reduced"``, as usual: generalized coordinates (Lagrange's equations of the second kind); constraints of
+        closed loops stay, with multipliers. ``"dae"``: every joint is a constraint with a multiplier (of the first
+        kind).
     parameters
         ``"symbolic"``, or ``"values"``: then the numbers are put in.
     orientation
@@ -55,6 +56,6 @@ def equations(
     UsageError
         If orientations are in three coordinates that are no Euler angles.
     """
-    assembly = scene if isinstance(scene, Assembly) else assemble(scene, form=form, orientation=orientation)
+    assembly = assembly_of(scene, form=form, orientation=orientation)
     chosen: Any = parameters
     return read_equations(assembly, chosen)

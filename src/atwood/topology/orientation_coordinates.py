@@ -96,7 +96,7 @@ def coordinates_of(kind: str, body: str) -> list[tuple[str, str]]:
     return [(f"{body}.quaternion.{part}", "1") for part in "wxyz"]
 
 
-def check_orientation(kind: str, form: str) -> None:
+def check_orientation(kind: str, form: str, space: str) -> None:
     """Refuse coordinates that there are not.
 
     Parameters
@@ -105,17 +105,24 @@ def check_orientation(kind: str, form: str) -> None:
         What was asked for.
     form
         ``"reduced"`` or ``"dae"``.
+    space
+        Of the scene.
 
     Raises
     ------
     UsageError
-        If there are no such coordinates, or the form does not have them.
+        If there are no such coordinates, or the form or the space does not have them.
     """
     if kind not in ORIENTATIONS:
         raise UsageError(
             f"there are no coordinates of orientations {kind!r}",
             advice=suggestion(kind, ORIENTATIONS)
             or "There are quaternions ('quaternion') and Euler angles in the twelve conventions, such as 'euler-zyz'.",
+        )
+    if space != "space" and kind != "quaternion":
+        raise UsageError(
+            f"there are no orientations in a {space} for which {kind!r} would be coordinates",
+            advice="Leave orientation out; it is for scenes in space.",
         )
     if form == "dae" and kind != "quaternion":
         raise UsageError(

@@ -24,7 +24,13 @@ from atwood.model.declare.contributions import CoordinateLoad, Load
 from atwood.model.declare.laws import scalars
 from atwood.model.local.laws import LocalPart
 
-__all__ = ["UndefinedValue", "find_undefined_value", "states_ahead", "undefined_value_at"]
+__all__ = ["ADVICE_AT_START", "UndefinedValue", "find_undefined_value", "states_ahead", "undefined_value_at"]
+
+ADVICE_AT_START = (
+    "Do two points coincide that a spring, damper or rope joins, or do two axes point against each other between which "
+    "an angle is measured? Give start positions that part them; or look at the formula of the law."
+)
+"""What to do where a law has no value at the start."""
 
 _FARTHEST = 1e-4
 """So much of a run is looked ahead: where steps get too small, what stops them is near."""

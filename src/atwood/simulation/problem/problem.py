@@ -26,6 +26,7 @@ from atwood.simulation.dynamics.determined_reactions import check_read_reactions
 from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates, review_partitioning
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank, review_kept
 from atwood.simulation.dynamics.scales import Scales, coordinate_scales, find_scales, motion_scales
+from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START
 from atwood.simulation.initialization.massless import check_massless_directions
 from atwood.simulation.problem.not_compilable import announce, find_not_compilable
 from atwood.tolerances import tolerances
@@ -385,8 +386,7 @@ def _make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, lengt
         raise StartError(
             f"at the start a law has no value: {error.message}",
             where=assembly.flat.name,
-            advice="Do two points coincide that a spring, damper or rope joins? Give start positions that "
-            "separate them.",
+            advice=ADVICE_AT_START,
         ) from error
     constraint_jacobian = now.jacobian[list(finding.kept)] if finding.kept else now.jacobian[:0]
     check_massless_directions(assembly, now.mass, constraint_jacobian, sizes)

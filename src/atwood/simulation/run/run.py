@@ -28,7 +28,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     to_regular,
 )
 from atwood.simulation.dynamics.scales import scene_length
-from atwood.simulation.dynamics.undefined_values import undefined_value_at
+from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.events.impacts_in_time import pass_time_event
 from atwood.simulation.events.modes import EventProbe, EventRecord, enter_mode
 from atwood.simulation.events.sampling import Updated, find_sampler
@@ -359,8 +359,7 @@ class _Walk:
             raise StartError(
                 f"{found.describe()}, so that the run cannot start",
                 where=found.part,
-                advice="Do two points coincide that a spring, damper or rope joins? Give start positions that part "
-                "them; or look at the formula of the law.",
+                advice=ADVICE_AT_START,
             ) from error
 
     def _schedule(self, assembly: Assembly) -> Schedule:

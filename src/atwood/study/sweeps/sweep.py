@@ -16,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.declare.quantities import PATHS
-from atwood.pipeline import SCENE, assemble
+from atwood.pipeline import SCENE, assembly_of
 from atwood.progress import told
 from atwood.simulation.problem.arguments import (
     FORM,
@@ -53,8 +53,8 @@ _TRIALS = 20
     quantities=PATHS,
     t_end=T_END,
     outputs=optional(OUTPUTS),
-    form=FORM,
-    level=LEVEL,
+    form=optional(FORM),
+    level=optional(LEVEL),
     rtol=RTOL,
     solver=SOLVER,
     threads=optional(whole("a whole number of threads, 1 to 1024", 1, 1024)),
@@ -72,8 +72,8 @@ def sweep(
     quantities: Iterable[str] | None = None,
     t_end: float | str | None = None,
     outputs: Any = None,
-    form: str = "reduced",
-    level: str = "ggl",
+    form: str | None = None,
+    level: str | None = None,
     rtol: float = tolerances.RTOL,
     solver: str = "auto",
     max_steps: int | None = None,
@@ -92,7 +92,7 @@ def sweep(
     Parameters
     ----------
     scene
-        The scene, or an assembly of it, which then says the form.
+        The scene, or an assembly of it; what contradicts that is refused.
     vary
         Values of parameters by path: lists of numbers in SI units or of text with units, or arrays of one dimension
         (``numpy.linspace``, the columns of a sample of `scipy.stats.qmc`).
@@ -131,7 +131,7 @@ def sweep(
     """
     began = time.perf_counter()
     check_solver(solver)
-    assembly = scene if isinstance(scene, Assembly) else assemble(scene, form=form, level=level, name=name)
+    assembly = assembly_of(scene, name, form=form, level=level)
     source = assembly.source.scene if assembly.source is not None else None
     if source is None:
         raise UsageError("it was assembled from leaves, so that its scene is not known", where=assembly.flat.name)

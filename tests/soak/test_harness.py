@@ -1,0 +1,48 @@
+"""The soak itself: what it draws is sound, and what it calls a hang is one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from . import workers
+from .draw import draw
+from .oracle import Oracle
+from .trial import Discarded, Trial
+
+
+def test_no_start_is_singular() -> None:
+    """A rod that is in line with the pin of its body holds it as well, to first order, as if it were redundant."""
+    with pytest.raises(Discarded, match="singular"):
+        draw(201393)
+
+
+@pytest.mark.parametrize("seed", [200247, 200951])
+def test_no_damper_has_axes_that_point_against_each_other(seed: int) -> None:
+    mechanism = draw(seed)
+    assert all(tie.sort != "torsion_damper" for tie in mechanism.ties)
+    oracle = Oracle(mechanism)
+    place, speeds = oracle.start()
+    assert np.all(np.isfinite(oracle.accelerations(place, speeds, 0.0)[0]))
+
+
+def test_a_crank_that_is_driven_beyond_its_reach_comes_to_a_singular_position() -> None:
+    oracle = Oracle(draw(1159))
+    assert oracle.is_singular_on_the_way(np.linspace(0.0, 0.3, 31))
+    assert not Oracle(draw(1)).is_singular_on_the_way(np.linspace(0.0, 0.3, 4))
+
+
+def test_a_trial_that_waits_for_the_processor_is_no_hang(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Process:
+        pid = 1
+
+    worker = workers._Worker(Process(), None, ("scenes", 1), since=0.0)  # type: ignore[arg-type]
+    monkeypatch.setattr(workers.time, "monotonic", lambda: 100.0)
+    monkeypatch.setattr(workers, "_processor_time", lambda pid: 3.0)
+    assert workers._look(worker, False, 60.0) is None
+    monkeypatch.setattr(workers, "_dismiss", lambda worker: None)
+    monkeypatch.setattr(workers, "_processor_time", lambda pid: 61.0)
+    done = workers._look(worker, False, 60.0)
+    assert done is not None
+    assert isinstance(done.trial, Trial)
+    assert done.trial.findings[0].gravity == "hang"
