@@ -5,19 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 from atwood.analysis.hamiltonian import Hamiltonian, read_hamiltonian
-from atwood.arguments import takes
+from atwood.arguments import optional, takes
 from atwood.forms.assembly import Assembly
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assemble
+from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.problem.arguments import ORIENTATION
 from atwood.theory.equations import PARAMETERS
 
 __all__ = ["Hamiltonian", "hamiltonian"]
 
 
-@takes(scene=SCENE, parameters=PARAMETERS, orientation=ORIENTATION)
+@takes(scene=SCENE, parameters=PARAMETERS, orientation=optional(ORIENTATION))
 def hamiltonian(
-    scene: Model | Assembly, *, parameters: str = "symbolic", orientation: str = "euler-zxz"
+    scene: Model | Assembly, *, parameters: str = "symbolic", orientation: str | None = None
 ) -> Hamiltonian:
     """Return the Hamiltonian of a scene, ``H(q, p, t) = p q' - L`` with ``p = dL/dq'``.
 
@@ -32,7 +32,8 @@ def hamiltonian(
     parameters
         ``"symbolic"``, or ``"values"``: then the numbers are put in.
     orientation
-        Euler angles in which orientations in space are; quaternions have no momenta.
+        Euler angles in which orientations in space are; quaternions have no momenta, and ``"euler-zxz"`` takes their
+        place.
 
     Returns
     -------
@@ -47,6 +48,6 @@ def hamiltonian(
     UsageError
         If an assembly is in the dae form.
     """
-    assembly = scene if isinstance(scene, Assembly) else assemble(scene, orientation=orientation)
+    assembly = assembly_of(scene, orientation=orientation)
     chosen: Any = parameters
     return read_hamiltonian(assembly, chosen)
