@@ -8,12 +8,102 @@ from typing import Any
 
 import numpy as np
 
-from atwood import Component, Result, Scene
+from atwood import Component, Frame, Model, Result, Scene, connect, connector, parameter, solids
+from atwood_library import RigidBody, Weld
 
-__all__ = ["STANDARD_GRAVITY", "Example", "Signal", "made"]
+__all__ = [
+    "STEEL",
+    "WORLD",
+    "Body",
+    "Example",
+    "Signal",
+    "bar",
+    "box",
+    "cylinder",
+    "made",
+    "orientation",
+    "rotation",
+    "turned_weld",
+]
 
-STANDARD_GRAVITY = 9.80665
-"""Modelica.Constants.g_n, which is the gravity of its worlds, m/s^2."""
+WORLD: Mapping[str, Any] = {"space": "space", "gravity": 9.80665, "gravity_direction": (0.0, -1.0, 0.0)}
+"""Settings of a scene as of Modelica's worlds: y upwards, and gravity Modelica.Constants.g_n."""
+
+STEEL = 7700.0
+"""Density of BodyBox and BodyCylinder, kg/m^3."""
+
+
+class Body(Model):
+    """A rigid body with two frames a given way apart, as BodyShape, BodyBox and BodyCylinder are."""
+
+    way: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), unit="m", size=3, doc="From frame a to frame b.")
+    a: Frame = connector(Frame, "Its frame.")
+    b: Frame = connector(Frame, "The other end.")
+    solid: RigidBody = RigidBody()
+    end: Weld = Weld(displacement=way)
+    connections = [connect(a, solid.frame), connect(a, end.a), connect(b, end.b)]
+
+
+def bar(way: tuple[float, float, float], mass: float, center: tuple[float, float, float], *moments: float) -> Body:
+    """Return a body by its numbers, with moments of 0.001 about its centre of mass if none are given."""
+    return Body(way=way, solid=RigidBody(mass=mass, center=center, moments=moments or (1e-3, 1e-3, 1e-3)))
+
+
+def box(
+    way: tuple[float, float, float],
+    width: float | None = None,
+    height: float | None = None,
+    across: tuple[float, float, float] = (0.0, 1.0, 0.0),
+) -> Body:
+    """Return a BodyBox of steel: along the way, its width along the part of `across` that is square to it."""
+    length = float(np.linalg.norm(way))
+    wide = length / 20.0 if width is None else width
+    shape = solids.box(length, wide, wide if height is None else height, density=STEEL)
+    return _placed(way, shape, across)
+
+
+def cylinder(way: tuple[float, float, float], diameter: float | None = None) -> Body:
+    """Return a BodyCylinder of steel along the way."""
+    length = float(np.linalg.norm(way))
+    radius = length / 40.0 if diameter is None else diameter / 2.0
+    across = (0.0, 1.0, 0.0) if way[0] or way[2] else (1.0, 0.0, 0.0)
+    return _placed(way, solids.cylinder(radius, length, density=STEEL, axis="x"), across)
+
+
+def _placed(way: tuple[float, float, float], shape: solids.MassProperties, across: Any) -> Body:
+    """Return a shape along x with its middle half the way on."""
+    along = np.array(way) / np.linalg.norm(way)
+    up = np.cross(along, across)
+    up /= np.linalg.norm(up)
+    return Body(
+        way=way, solid=RigidBody.of(shape.placed(np.array([along, np.cross(up, along), up]).T, np.array(way) / 2))
+    )
+
+
+def rotation(sequence: str, *degrees: float) -> np.ndarray:
+    """Return the axes, in columns, of a frame turned about its own axes one after the other."""
+    total = np.eye(3)
+    for axis, angle in zip(sequence, np.radians(degrees), strict=True):
+        j, k = (("xyz".index(axis) + step) % 3 for step in (1, 2))
+        one = np.eye(3)
+        one[j, j] = one[k, k] = np.cos(angle)
+        one[k, j], one[j, k] = np.sin(angle), -np.sin(angle)
+        total = total @ one
+    return total
+
+
+def turned_weld(displacement: tuple[float, float, float], axes: np.ndarray) -> Weld:
+    """Return a connection that displaces and turns."""
+    vector = np.array([axes[2, 1] - axes[1, 2], axes[0, 2] - axes[2, 0], axes[1, 0] - axes[0, 1]])
+    sine = np.linalg.norm(vector) / 2.0
+    angle = float(np.arctan2(sine, (np.trace(axes) - 1.0) / 2.0))
+    return Weld(displacement=displacement, angle=angle, axis=tuple(vector / (2.0 * sine)))
+
+
+def orientation(path: str, axes: np.ndarray) -> dict[str, float]:
+    """Return start values of a body's axes."""
+    return {f"{path}.{name}.{component}": float(axes[i, k]) for k, name in ((0, "x_axis"), (2, "z_axis"))
+            for i, component in enumerate("xyz")}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -47,15 +137,12 @@ class Example:
         Returns it as a scene, with the start values of the model.
     signals
         What its published signals are here.
-    reference_errs
-        Signals in which the published trajectory errs by more than 1e-4 of the range after the first fifth of the run.
     options
         Further arguments of `simulate`.
     """
 
     make: Callable[[], Scene]
     signals: Mapping[str, Signal | str]
-    reference_errs: tuple[str, ...] = ()
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def signal(self, name: str) -> Signal:
@@ -84,8 +171,11 @@ def made(parts: Mapping[str, Component], joined: str, start: Mapping[str, Any] |
         scene.add(name, part)
 
     def connector(text: str) -> Any:
-        name, _, rest = text.strip().partition(".")
-        return getattr(parts[name], rest)
+        part, *rest = text.strip().split(".")
+        found: Any = parts[part]
+        for step in rest:
+            found = getattr(found, step)
+        return found
 
     for line in joined.replace(",", "\n").splitlines():
         if ">" in line:

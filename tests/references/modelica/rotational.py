@@ -121,7 +121,6 @@ _FIRST = Example(
         "inertia3.phi": "load.angle",
         "inertia3.w": "load.angular_velocity",
     },
-    reference_errs=("inertia3.w",),
 )
 
 EXAMPLES = {
@@ -143,7 +142,6 @@ EXAMPLES = {
             "directInertia.inertia.w": "inertia1a.angular_velocity",
             **_turning("inertia2a", "inertia2b", "inertia3a", "inertia3b"),
         },
-        reference_errs=("inertia3a.w", "inertia3b.w"),
     ),
     "RollingWheel": Example(rolling_wheel, _turning("inertia")),
 }

@@ -1,0 +1,148 @@
+"""Examples of Modelica.Mechanics.MultiBody.Examples.Loops."""
+
+from __future__ import annotations
+
+from atwood import Scene
+from atwood_library import (
+    Ground,
+    Inertia,
+    Pivot,
+    RigidBody,
+    Rod,
+    RotaryDrive,
+    RotationalCoupling,
+    Slider,
+    Weld,
+)
+
+from .building import WORLD, Example, bar, box, cylinder, made
+from .elementary import filtered_sine
+
+__all__ = ["EXAMPLES"]
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def engine1a() -> Scene:
+    """Return a cylinder of an engine: crank, connecting rod, piston and a flywheel."""
+    return made(
+        {
+            "ground": Ground(),
+            "above": Ground(position=(0.15, 0.45, 0.0)),
+            "bearing": Pivot(axis=X),
+            "inertia": Inertia(moment=1.0, axis=X),
+            "shaft": RotationalCoupling(),
+            "crank1": cylinder((0.1, 0.0, 0.0), 0.05),
+            "crank2": box((0.0, 0.1, 0.0), 0.02, 0.05, X),
+            "crank3": cylinder((0.1, 0.0, 0.0), 0.03),
+            "crank4": box((0.0, -0.1, 0.0), 0.02, 0.05, X),
+            "mid": Weld(displacement=(0.05, 0.0, 0.0)),
+            "rod": box((0.0, -0.2, 0.0), 0.02, 0.06, X),
+            "piston": cylinder((0.0, -0.1, 0.0), 0.1),
+            "b1": Pivot(axis=X),
+            "b2": Pivot(axis=X),
+            "cylinder": Slider(axis=(0.0, -1.0, 0.0)),
+        },
+        """ground.frame - bearing.a, bearing.b - crank1.a, bearing.shaft - shaft.b, inertia.flange - shaft.a
+        crank1.b - crank2.a, crank2.b - crank3.a - mid.a, crank3.b - crank4.a
+        above.frame - cylinder.a, cylinder.b - piston.a, piston.b - b1.a, b1.b - rod.a, rod.b - b2.b, mid.b - b2.a""",
+        {"inertia.angle": 0.0, "inertia.angular_velocity": 10.0},
+        **WORLD,
+    )
+
+
+def _fourbar(parts: dict, joined: str) -> Scene:
+    """Return a crank, and a body that slides on a bar, with a rod between them."""
+    return made(
+        {
+            "ground": Ground(),
+            "right": Ground(position=(1.2, 0.0, 0.0)),
+            "j1": Pivot(axis=X),
+            "j2": Slider(axis=X),
+            "b1": cylinder((0.0, 0.5, 0.1), 0.05),
+            "b2": cylinder((0.0, 0.2, 0.0), 0.05),
+            **parts,
+        },
+        "ground.frame - j1.a, j1.b - b1.a, right.frame - j2.a, j2.b - b2.a\n" + joined,
+        {"j1.angle": 0.0, "j1.angular_velocity": 5.235987755982989},
+        **WORLD,
+    )
+
+
+def fourbar1() -> Scene:
+    """Return the mechanism with a heavy rod on hinges."""
+    hinges = {"rev": Y, "rev1": Z, "j3": X, "j4": Y, "j5": Z}
+    scene = _fourbar(
+        {"b3": cylinder((-1.0, 0.3, 0.1), 0.05), **{name: Pivot(axis=axis) for name, axis in hinges.items()}},
+        "b2.b - rev.a, rev.b - rev1.a, rev1.b - b3.a, b1.b - j3.a, j3.b - j4.a, j4.b - j5.a, j5.b - b3.b",
+    )
+    scene.guess = {"j2.displacement": -0.2}
+    return scene
+
+
+def fourbar2() -> Scene:
+    """Return the mechanism with a rod without mass."""
+    scene = _fourbar({"rod": Rod(length=1.1**0.5)}, "b2.b - rod.a, b1.b - rod.b")
+    scene.guess = {"j2.displacement": -0.2}
+    return scene
+
+
+def planar_fourbar() -> Scene:
+    """Return four boxes in a loop of four hinges, one of them damped."""
+    return made(
+        {
+            "ground": Ground(),
+            "revolute1": Pivot(axis=Z, damping=0.1),
+            "revolute2": Pivot(axis=Z),
+            "revolute3": Pivot(axis=Z),
+            "revolute4": Pivot(axis=Z),
+            "body1": box((0.4, 0.0, 0.0), 0.05),
+            "body2": box((0.1, 1.1, 0.0), 0.05),
+            "body3": box((-0.15, 1.0, 0.0), 0.05),
+            "body4": box((0.65, 0.1, 0.0), 0.05),
+        },
+        """ground.frame - revolute1.a - body3.a, revolute1.b - body1.a, body1.b - revolute2.a, revolute2.b - body2.a
+        body3.b - revolute3.a, revolute3.b - body4.a, body4.b - revolute4.a, body2.b - revolute4.b""",
+        {"revolute1.angle": 0.0, "revolute1.angular_velocity": 0.0},
+        **WORLD,
+    )
+
+
+def planar_loops() -> Scene:
+    """Return three loops of hinges in a row, the first of which is driven."""
+    first, second, third = (0.6 - 0.0, 0.0, 0.0), (0.5, 0.1, 0.0), (0.4, -0.05, 0.0)
+    ends = {1: (0.1, 0.5, 0.0), 2: (0.1, 0.6, 0.0), 3: (0.0, 0.55, 0.0)}
+    parts = {
+        "ground": Ground(),
+        "rev": RotaryDrive(axis=Z, rotation=filtered_sine(0.7, 1.0)),
+        "lever0": RigidBody(mass=0.0),
+        "arm0": Weld(displacement=(0.0, 0.5, 0.0)),
+    }
+    joined = "ground.frame - rev.a, rev.b - lever0.frame - arm0.a\n"
+    for n, way in ((1, first), (2, second), (3, third)):
+        parts |= {
+            f"base{n}": Ground(position=(0.5 * n, 0.0, 0.0)),
+            f"hinge{n}": Pivot(axis=Z),
+            f"lever{n}": RigidBody(mass=0.0),
+            f"arm{n}": Weld(displacement=ends[n]),
+            f"near{n}": Pivot(axis=Z),
+            f"far{n}": Pivot(axis=Z),
+            f"rod{n}": bar(way, 1.0, tuple(0.5 * x for x in way)),
+        }
+        joined += f"""
+        base{n}.frame - hinge{n}.a, hinge{n}.b - lever{n}.frame - arm{n}.a
+        arm{n - 1}.b - near{n}.a, near{n}.b - rod{n}.a, rod{n}.b - far{n}.a, arm{n}.b - far{n}.b"""
+    return made(parts, joined, None, **WORLD)
+
+
+EXAMPLES = {
+    "Engine1a": Example(engine1a, {"inertia.phi": "inertia.angle", "inertia.w": "inertia.angular_velocity"}),
+    "Fourbar1": Example(fourbar1, {"j1.phi": "j1.angle", "j1.w": "j1.angular_velocity"}),
+    "Fourbar2": Example(fourbar2, {"j1.phi": "j1.angle", "j1.w": "j1.angular_velocity"}),
+    "Fourbar_analytic": Example(fourbar2, {"j1.phi": "j1.angle", "j1.w": "j1.angular_velocity"}),
+    "PlanarFourbar": Example(
+        planar_fourbar, {"revolute1.phi": "revolute1.angle", "revolute1.w": "revolute1.angular_velocity"}
+    ),
+    "PlanarLoops_analytic": Example(planar_loops, {"rev.phi": "rev.angle", "rev.w": "lever0.spin.z"}),
+}
+"""By the name of the model."""
