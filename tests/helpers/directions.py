@@ -12,9 +12,10 @@ from typing import Any
 
 from atwood import Model
 from atwood.expr import Expression, OutputGroup, Program, atan2, cos, sin, substitute
-from atwood.forms.assembly import MAXIMAL, REDUCED, Assembly
+from atwood.forms.assembly import Assembly
 from atwood.forms.places import TO_MAXIMAL, to_maximal
 from atwood.forms.program import state_groups
+from atwood.forms.shared import MAXIMAL, REDUCED
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.pipeline import assemble
 from atwood.topology.orientation_coordinates import OrientationCoordinates

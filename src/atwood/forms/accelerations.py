@@ -129,7 +129,7 @@ def acceleration_program(assembly: Assembly, method: Method | None = None) -> Ac
 
 _OF_TREES = (None, "joint forces", "leaves to root")
 
-_NOT_READ = ("locals_", "site", "masses", "shapes")
+_NOT_READ = ("locals_", "site", "masses", "shapes", "decisions", "constants")
 """What equations were made of; their derivation reads what was made."""
 
 

@@ -30,7 +30,7 @@ from atwood.forms.program import (
 )
 from atwood.forms.reduced import reduced_form
 from atwood.forms.restoring import recipe
-from atwood.forms.shared import Shared
+from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
 from atwood.forms.source import Source, no_start_quantity
 from atwood.forms.starting import moved_to
 from atwood.late import dataclass
@@ -49,7 +49,7 @@ from atwood.topology.spanning_forest import grow_spanning_forest
 if TYPE_CHECKING:
     from atwood.codegen.llvm.columns import ColumnKernel, ColumnProgram
 
-__all__ = ["MAXIMAL", "REDUCED", "Assembly", "FormName"]
+__all__ = ["Assembly", "FormName"]
 
 FormName = Literal["reduced", "dae"]
 Coordinates = Literal["reduced", "regular", "dae"]
@@ -59,9 +59,6 @@ _BY_HAND = 12
 """Up to so many coordinates the equations are rewritten; beyond, the recursion is shorter than any closed form."""
 
 # What all assemblies of one structure share.
-REDUCED: Key[Equations] = Key("equations in generalized coordinates")
-_REGULAR: Key[Equations] = Key("the same with quaternions")
-MAXIMAL: Key[Equations] = Key("equations in maximal coordinates")
 _ROWS: Key[tuple[Expression, ...]] = Key("equations of motion as by hand")
 _DISCRETE_STATES: Key[tuple[DiscreteState, ...]] = Key("discrete states")
 _OTHER_MODE: Key[Assembly] = Key("the scene in another mode")
@@ -155,7 +152,7 @@ class Assembly:
         """The same with quaternions for orientations, which are regular everywhere: here starts are found."""
         if self.orientation == Orientation():
             return self.reduced
-        return self.shared.get(_REGULAR, lambda: self._equations("reduced", Orientation()))
+        return self.shared.get(REGULAR, lambda: self._equations("reduced", Orientation()))
 
     @property
     def maximal(self) -> Equations:

@@ -16,6 +16,8 @@ from atwood.expr import Expression
 from atwood.forms.kept import Key
 from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism, check_closures
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.kinematics.mechanism import Decision
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.laws import LocalPart, variation_names
@@ -23,7 +25,22 @@ from atwood.model.values.vector import Vector
 from atwood.stages import stage
 from atwood.topology.line_signs import find_line_signs
 
-__all__ = ["DECIDED", "Shared", "Slot", "decided_alike", "find_slots", "with_values_of"]
+__all__ = [
+    "DECIDED",
+    "MAXIMAL",
+    "REDUCED",
+    "REGULAR",
+    "Shared",
+    "Slot",
+    "decided_alike",
+    "decisions_of",
+    "find_slots",
+    "with_values_of",
+]
+
+REDUCED: Key[Equations] = Key("equations in generalized coordinates")
+REGULAR: Key[Equations] = Key("the same with quaternions")
+MAXIMAL: Key[Equations] = Key("equations in maximal coordinates")
 
 T = TypeVar("T")
 
@@ -70,6 +87,11 @@ class Shared:
                 if place not in self._made:
                     self._made[place] = make()
                 found = self._made[place]
+        return found
+
+    def known(self, key: Key[T]) -> T | None:
+        """Return what was made under a key; None if nothing was."""
+        found: T | None = self._made.get(key)
         return found
 
 
@@ -192,7 +214,7 @@ def with_values_of(
     values |= {symbol: 0.0 for symbol in mechanism.table.values if symbol.name in varied}
     moved = _moved(mechanism, other, values)
     check_closures(moved)
-    if values != mechanism.table.values and not decided_alike(moved):
+    if values != mechanism.table.values and not decided_alike(moved, shared):
         return None, DECIDED
     if mechanism.line_signs is not None and _line_signs(moved, other, shared) != mechanism.line_signs:
         return None, "on the line, parts start on other sides of each other"
@@ -202,15 +224,23 @@ def with_values_of(
 DECIDED = "other coordinates are eliminated with these values"
 
 
-def decided_alike(mechanism: Mechanism) -> bool:
+def decisions_of(mechanism: Mechanism, shared: Shared) -> list[Decision]:
+    """Return what was decided by the size of numbers: of the mechanism, and of the equations that have been made."""
+    made = (shared.known(key) for key in (REDUCED, REGULAR, MAXIMAL))
+    return [*mechanism.decisions, *(one for equations in made if equations for one in equations.decisions)]
+
+
+def decided_alike(mechanism: Mechanism, shared: Shared) -> bool:
     """Return whether all that was decided by the size of numbers comes out with these as it did.
 
     Parameters
     ----------
     mechanism
         With other values than those that it was decided with.
+    shared
+        Has the equations.
     """
-    return all(decide(mechanism) == outcome for decide, outcome in mechanism.decisions)
+    return all(one.how(mechanism) == one.outcome for one in decisions_of(mechanism, shared))
 
 
 def _changed_parts(flat: FlatScene, other: FlatScene) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["moved_to", "starting", "with_places"]
 
-_Decisions = list[tuple[Callable[[Mechanism], object], object]]
-_STARTING: Key[tuple[Shared, _Decisions]] = Key("the scene as its start is found")
+_STARTING: Key[Shared] = Key("what the scene shares as its start is found")
 
 
 def starting(assembly: Assembly) -> Assembly:
@@ -32,11 +31,10 @@ def starting(assembly: Assembly) -> Assembly:
     mechanism = assembly.mechanism
     if mechanism.places is None:
         return assembly
-    decisions: list[tuple[Callable[[Mechanism], object], object]] = []
-    shared, decisions = assembly.shared.get(_STARTING, lambda: (_beside(assembly.shared), decisions))
+    shared = assembly.shared.get(_STARTING, lambda: _beside(assembly.shared))
     values = {symbol: value for symbol, value in mechanism.table.values.items() if symbol not in mechanism.constants}
     table = replace(mechanism.table, values=values)
-    before = replace(mechanism, table=table, places=None, constants={}, decisions=decisions)
+    before = replace(mechanism, table=table, places=None, constants={})
     return replace(assembly, mechanism=before, source=None, why_new="", shared=shared)
 
 
@@ -50,14 +48,11 @@ def with_places(assembly: Assembly, places: Mapping[str, Mapping[Expression, flo
     places
         See `atwood.mechanics.kinematics.mechanism.Mechanism`.
     """
-    shared, decisions = _beside(assembly.shared), assembly.mechanism.decisions
-    shared.get(_STARTING, lambda: (assembly.shared, decisions))
-    # Constants of integration are further parameters.
-    table = replace(assembly.mechanism.table, values=dict(assembly.mechanism.table.values))
-    mechanism = replace(assembly.mechanism, table=table, places=places, constants={}, decisions=[])
-    made = replace(assembly, mechanism=mechanism, shared=shared)
-    _ = made.reduced, made.maximal  # the constants must be there before anything is bound
-    return made
+    shared = _beside(assembly.shared)
+    shared.get(_STARTING, lambda: assembly.shared)
+    made = replace(assembly, mechanism=replace(assembly.mechanism, places=places), shared=shared)
+    constants = {**made.reduced.constants, **made.maximal.constants}
+    return replace(made, mechanism=started_at(replace(made.mechanism, constants=constants), places))
 
 
 def _beside(shared: Shared) -> Shared:
@@ -106,4 +101,4 @@ def moved_to(assembly: Assembly, flat: FlatScene) -> tuple[Mechanism | None, str
     if places == own.places and made.table.values == own.table.values:
         return made, ""  # at the same place with the same numbers everything was decided already
     with assembly.shared.lock:
-        return (made, "") if decided_alike(made) else (None, DECIDED)
+        return (made, "") if decided_alike(made, assembly.shared) else (None, DECIDED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from atwood.errors import DeclarationError
@@ -11,12 +11,19 @@ from atwood.mechanics.constraints.elimination import SOLVED, check_held, drop_cl
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
 from atwood.mechanics.constraints.read_multipliers import known_multipliers, with_known
 from atwood.mechanics.constraints.rolling import Taken, integrated, take_up, without_idle_spins
-from atwood.mechanics.constraints.values import constraint_values, find_constraints, levels, velocity_levels
+from atwood.mechanics.constraints.values import Values, constraint_values, find_constraints, levels, velocity_levels
 from atwood.mechanics.dynamics.equations import Equations, force_rows, motion_rows, put_in_place
 from atwood.mechanics.dynamics.forces import Site, in_joint_coordinates, local_map
-from atwood.mechanics.dynamics.inertia import add_masses, check_masses
-from atwood.mechanics.kinematics.mechanism import Mechanism, check_closures, extent, make_gravity
-from atwood.mechanics.kinematics.motion import motion_in_plane, motion_in_space
+from atwood.mechanics.dynamics.inertia import Masses, add_masses, check_masses
+from atwood.mechanics.kinematics.mechanism import (
+    Derivation,
+    Mechanism,
+    check_closures,
+    derivation_of,
+    extent,
+    make_gravity,
+)
+from atwood.mechanics.kinematics.motion import Motion, motion_in_plane, motion_in_space
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.mechanics.kinematics.positions import Kinematics, shapes
 from atwood.model.declare.component import bind
@@ -46,49 +53,39 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
     UnsupportedError
         If a law asks for what this version cannot do.
     """
-    graph, bodies, space = mechanism.table.graph, mechanism.bodies, mechanism.space
+    derivation = derivation_of(mechanism)
+    graph, bodies, space = derivation.table.graph, derivation.bodies, derivation.space
     layouts = {body.index: body_offsets(body, space) for body in bodies.bodies}
-    masses = add_masses(mechanism.graph, bodies, mechanism.locals_, layouts, space)
-    check_masses(masses, mechanism.table.values)
+    masses = add_masses(derivation.graph, bodies, derivation.locals_, layouts, space)
+    check_masses(masses, derivation.table.values)
     shape_of = shapes(bodies, layouts, {index: one.center for index, one in masses.bodies.items()})
     turns = {node: turn for _, body_turns in layouts.values() for node, turn in body_turns.items()}
-    site = Site(graph, mechanism.graph, bodies, space, turns)
-    motion = (motion_in_space if space.name == "space" else motion_in_plane)(mechanism, forest, shape_of)
-    left = find_constraints(mechanism, forest, motion.placements)
-    values = constraint_values(mechanism, site, motion.placements, left.on_positions)
-    every = motion.all_coordinates
-    check_held(mechanism, masses, forest, every, values, left.on_velocities)
-    solution = eliminate_linear(mechanism, masses, forest, every, values) if forest.form == "reduced" else {}
-    taken = Taken(solution, {}, (), left.on_velocities)
-    if forest.form == "reduced" and mechanism.places is not None:
-        others = [one for one in left.on_velocities if one[1].law is not IDLE_SPIN]
-        taken = take_up(mechanism, site, masses, forest, motion, solution, values, others)
-        solution = dict(taken.solution)
-        taken = without_idle_spins(mechanism, motion.finish(solution), taken, left.on_velocities, values)
-    values = [(path, c, substitute([v], solution)[0] if solution else v) for path, c, v in values if v is not SOLVED]
-    state = motion.finish(solution, taken.speeds)
-    values, prescribed = drop_closed(mechanism, state.coordinates, values)
-    signals = resolve_signals(mechanism, site, state.kinematics)
+    site = Site(graph, derivation.graph, bodies, space, turns)
+    motion = (motion_in_space if space.name == "space" else motion_in_plane)(derivation, forest, shape_of)
+    values, taken = _use_up(derivation, site, masses, forest, motion)
+    state = motion.finish(taken.solution, taken.speeds)
+    values, prescribed = drop_closed(derivation, state.coordinates, values)
+    signals = resolve_signals(derivation, site, state.kinematics)
     held = [(path, c, _multiplier(graph, path, c)) for path, c, _ in values]
     rolling = [(path, c, _multiplier(graph, path, c)) for path, c in taken.left]
-    integrals = integrated(mechanism, site, state, taken.left) if forest.form == "dae" else {}
-    rows = motion_rows(site, mechanism.locals_, masses, state.kinematics, state.lifted, signals, state.speeds)
+    integrals = integrated(derivation, site, state, taken.left) if forest.form == "dae" else {}
+    rows = motion_rows(site, derivation.locals_, masses, state.kinematics, state.lifted, signals, state.speeds)
     # Before the constraints' rates, which can then be written with the slopes that the forces are made of.
-    forces = force_rows(site, mechanism.locals_, state.kinematics, [*held, *rolling], signals, state.speeds)
+    forces = force_rows(site, derivation.locals_, state.kinematics, [*held, *rolling], signals, state.speeds)
     constraints = (
-        *levels(mechanism, site, state, held, [value for _, _, value in values]),
-        *velocity_levels(mechanism, site, state, rolling, signals, integrals),
+        *levels(derivation, site, state, held, [value for _, _, value in values]),
+        *velocity_levels(derivation, site, state, rolling, signals, integrals),
     )
-    parts = _states(mechanism, site, state.kinematics, signals)
+    parts = _states(derivation, site, state.kinematics, signals)
     made = Equations(
         graph=graph,
         forest=forest,
         site=site,
-        locals_=mechanism.locals_,
+        locals_=derivation.locals_,
         masses=masses,
         shapes=shape_of,
         kinematics=state.kinematics,
-        time=mechanism.time,
+        time=derivation.time,
         coordinates=(*state.coordinates, *(one.symbol for one in parts)),
         speeds=state.speeds,
         accelerations=state.accelerations,
@@ -98,18 +95,54 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         rows=tuple(rows),
         constraint_rows=tuple(forces),
         constraints=constraints,
-        eliminated=tuple(c.name for c, s in zip(forest.coordinates, every, strict=True) if s in solution),
+        eliminated=_names_of(forest, motion.all_coordinates, taken.solution),
         prescribed=prescribed,
         orientation_coordinates=state.orientation_coordinates,
         solved_speeds=tuple(s.name.removeprefix("u:") for s in taken.speeds),
         integrals=(*taken.integrals, *integrals.values()),
         states=parts,
+        decisions=tuple(derivation.decided),
+        constants=dict(derivation.found),
     )
-    read = _read_multipliers(mechanism, signals) if mechanism.can_read_multipliers else []
+    read = _read_multipliers(derivation, signals) if derivation.can_read_multipliers else []
     if forest.form == "reduced":
         return replace(made, read=dict(zip(read, read, strict=True)))
-    with mechanism.relations.reading(False):
-        return with_known(made, known_multipliers(mechanism, made, read)) if read else made
+    with derivation.relations.reading(False):
+        return with_known(made, known_multipliers(derivation, made, read)) if read else made
+
+
+def _use_up(
+    derivation: Derivation, site: Site, masses: Masses, forest: SpanningForest, motion: Motion
+) -> tuple[Values, Taken]:
+    """Use up the constraints that eliminate coordinates or speeds of the reduced form.
+
+    Returns
+    -------
+    Values
+        The constraints on positions that are left, in terms of the coordinates that are left.
+    Taken
+        What was eliminated, and the constraints on velocities that are left.
+    """
+    found = find_constraints(derivation, forest, motion.placements)
+    values = constraint_values(derivation, site, motion.placements, found.on_positions)
+    check_held(derivation, masses, forest, motion.all_coordinates, values, found.on_velocities)
+    if forest.form != "reduced":
+        return values, Taken({}, {}, (), found.on_velocities)
+    solution = eliminate_linear(derivation, masses, forest, motion.all_coordinates, values)
+    taken = Taken(solution, {}, (), found.on_velocities)
+    if derivation.places is not None:
+        others = [one for one in found.on_velocities if one[1].law is not IDLE_SPIN]
+        taken = take_up(derivation, site, masses, forest, motion, solution, values, others)
+        taken = without_idle_spins(derivation, motion.finish(taken.solution), taken, found.on_velocities, values)
+    solution = dict(taken.solution)
+    return [
+        (path, c, substitute([v], solution)[0] if solution else v) for path, c, v in values if v is not SOLVED
+    ], taken
+
+
+def _names_of(forest: SpanningForest, symbols: Sequence[Expression], chosen: Collection[Expression]) -> tuple[str, ...]:
+    """Return the names of the coordinates whose symbols are among those that were chosen."""
+    return tuple(one.name for one, symbol in zip(forest.coordinates, symbols, strict=True) if symbol in chosen)
 
 
 def _states(

@@ -129,6 +129,7 @@ class LinearScene:
         self.length = scene_length(assembly)
         self.sizes = motion_scales(self.equations, self.length)
         self.displacement_sizes = np.array([self.length if unit == "m" else 1.0 for unit in self.tangents.units])
+        self._bound: BoundKernel | None = None
 
     # -- programs -------------------------------------------------------------------------------------------------
 
@@ -203,19 +204,25 @@ class LinearScene:
         """The program of the expressions and the entries of their derivatives at a state."""
         return self._made[1]
 
-    @cached_property
+    @property
     def _kernel(self) -> BoundKernel:
-        return self.assembly.kernel(self.derivatives)
+        if self._bound is None:
+            self._bound = self.assembly.kernel(self.derivatives)
+        return self._bound
+
+    def _with_values(self, values: FloatArray) -> LinearScene:
+        """Return the same with other values of the parameters."""
+        found = copy(self)
+        found._bound = self.assembly.compiled(self.derivatives).bind(values)
+        return found
 
     def with_inputs(self, values: Mapping[str, float]) -> LinearScene:
         """Return the same with inputs that have other values than zero, by the name of their symbol."""
-        found = copy(self)
         numbers = self.assembly.parameter_values.copy()
         place = {symbol.name: i for i, symbol in enumerate(self.assembly.parameters)}
         for name, value in values.items():
             numbers[place[name]] = value
-        found.__dict__["_kernel"] = self.assembly.compiled(self.derivatives).bind(numbers)
-        return found
+        return self._with_values(numbers)
 
     @property
     def depends_on_time(self) -> bool:
@@ -224,11 +231,8 @@ class LinearScene:
 
     def disturbed(self, random: np.random.Generator) -> LinearScene:
         """Return the same with parameters that are off by a little more than rounding."""
-        found = copy(self)
         values = self.assembly.parameter_values
-        near = values * (1.0 + ROUGHNESS * random.uniform(-1.0, 1.0, values.shape))
-        found.__dict__["_kernel"] = self.assembly.compiled(self.derivatives).bind(near)
-        return found
+        return self._with_values(values * (1.0 + ROUGHNESS * random.uniform(-1.0, 1.0, values.shape)))
 
     # -- numbers --------------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, s
 from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.inertia import Masses
-from atwood.mechanics.kinematics.mechanism import Mechanism, decide, extent
+from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent
 from atwood.model.local.laws import LocalConstraint
 from atwood.tolerances import tolerances
 from atwood.topology.spanning_forest import SpanningForest
@@ -50,7 +50,7 @@ SOLVED: Expression = _Solved()  # type: ignore[assignment]
 
 
 def eliminate_linear(
-    mechanism: Mechanism,
+    derivation: Derivation,
     masses: Masses,
     forest: SpanningForest,
     q: Sequence[Expression],
@@ -62,8 +62,8 @@ def eliminate_linear(
     Coordinates of what has no mass go first, then those that were met last, so that the names that a reader expects
     stay. What was eliminated before is given by `before`.
     """
-    parameters = mechanism.table.values
-    weightless = _weightless(mechanism, masses, forest)
+    parameters = derivation.table.values
+    weightless = _weightless(derivation, masses, forest)
     orientation_coordinates = {
         number for orientation in forest.orientation_coordinates for number in orientation.coordinates
     }
@@ -80,7 +80,7 @@ def eliminate_linear(
             continue
         coefficients, remainder = affine
         light = [q.index(symbol) in weightless for symbol in free]
-        index = decide(mechanism, partial(_pivot, list(coefficients), light))
+        index = decide(derivation, partial(_pivot, list(coefficients), light))
         if index is None:
             continue
         pivot = coefficients[index]
@@ -90,7 +90,7 @@ def eliminate_linear(
                 total = total + coefficient * free[i]
         expression = -total / pivot
         solution = {s: substitute([e], {free[index]: expression})[0] for s, e in solution.items()}
-        solution[free[index]] = mechanism.table.graph.convert(expression)
+        solution[free[index]] = derivation.table.graph.convert(expression)
         values[number] = (path, constraint, SOLVED)
     return solution
 
@@ -125,7 +125,7 @@ def _weightless(mechanism: Mechanism, masses: Masses, forest: SpanningForest) ->
 Prescribed = tuple[tuple[tuple[str, str, int], Expression], ...]
 
 
-def drop_closed(mechanism: Mechanism, q: Sequence[Expression], values: Values) -> tuple[Values, Prescribed]:
+def drop_closed(derivation: Derivation, q: Sequence[Expression], values: Values) -> tuple[Values, Prescribed]:
     """Take out the constraints that no coordinate can change; return the rest, and those that depend on time.
 
     Those that do not are checked here; functions of time are checked when it is known for which times.
@@ -136,10 +136,10 @@ def drop_closed(mechanism: Mechanism, q: Sequence[Expression], values: Values) -
         if depends_on(value, q):
             kept.append((path, constraint, value))
             continue
-        if depends_on(value, mechanism.relations.roots):
+        if depends_on(value, derivation.relations.roots):
             prescribed.append(((path, constraint.law.name, constraint.index), value))
             continue
-        decide(mechanism, partial(_check_closed, f"{path}.{constraint.law.name}", value))
+        decide(derivation, partial(_check_closed, f"{path}.{constraint.law.name}", value))
     return kept, tuple(prescribed)
 
 

@@ -17,7 +17,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, Scalar, depends_on, evaluate, is_zero
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.inertia import RigidMass, add_masses
-from atwood.mechanics.kinematics.mechanism import Mechanism, decide
+from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, derivation_of
 from atwood.mechanics.kinematics.motion import Movement
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets
 from atwood.model.declare.laws import ConstraintOptions, Law
@@ -59,20 +59,20 @@ class _Slender:
     touched: tuple[tuple[int, Vector], ...]
 
 
-def idle_speeds(mechanism: Mechanism, state: Movement) -> dict[Expression, Expression]:
+def idle_speeds(derivation: Derivation, state: Movement) -> dict[Expression, Expression]:
     """Return, for each spin that is held, one component of the angular velocity in terms of the two others.
 
     Parameters
     ----------
-    mechanism, state
+    derivation, state
         The mechanism, and how it moves.
     """
     found: dict[Expression, Expression] = {}
-    for index, axis in mechanism.idle_spins.items():
+    for index, axis in derivation.idle_spins.items():
         spin = state.kinematics.angular_velocities[index]
-        along = decide(mechanism, partial(_largest, axis))
+        along = decide(derivation, partial(_largest, axis))
         others = [axis[i] * spin[i] for i in range(3) if i != along]
-        found[spin[along]] = mechanism.table.graph.convert(-(others[0] + others[1]) / axis[along])
+        found[spin[along]] = derivation.table.graph.convert(-(others[0] + others[1]) / axis[along])
     return found
 
 
@@ -93,6 +93,7 @@ def hold_idle_spins(mechanism: Mechanism) -> Mechanism:
     free = _free_to_spin(mechanism)
     if not free:
         return mechanism
+    derivation = derivation_of(mechanism)
     layouts = {body.index: body_offsets(body, mechanism.space) for body in mechanism.bodies.bodies}
     masses = add_masses(mechanism.graph, mechanism.bodies, mechanism.locals_, layouts, mechanism.space).bodies
     locals_, axes = dict(mechanism.locals_), dict(mechanism.idle_spins)
@@ -101,14 +102,14 @@ def hold_idle_spins(mechanism: Mechanism) -> Mechanism:
             continue
         offsets, turns = layouts[index]
         slender = _Slender(masses[index], tuple((node, offsets[node]) for node in nodes))
-        how = decide(mechanism, partial(_axis, slender))
+        how = decide(derivation, partial(_axis, slender))
         if how is None:
             continue
         path, name = _frame_of(mechanism, index, slender.mass)
         connector = locals_[path].connectors[name]
         axis = axes[index] = _direction(slender, how)
         locals_[path] = _held(mechanism, locals_[path], connector, axis, turns[mechanism.graph.node_of[path, name]])
-    return replace(mechanism, locals_=locals_, idle_spins=axes)
+    return replace(mechanism, locals_=locals_, idle_spins=axes, decisions=tuple(derivation.decided))
 
 
 def _free_to_spin(mechanism: Mechanism) -> dict[int, list[int]]:

@@ -22,7 +22,7 @@ from atwood.expr.core.operations import PIECEWISE_CONSTANT
 from atwood.late import dataclass
 from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.kinematics.mechanism import Mechanism, decide, extent
+from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent
 from atwood.mechanics.kinematics.motion import Movement
 from atwood.model.local.laws import LocalConstraint
 from atwood.tolerances import tolerances
@@ -171,7 +171,7 @@ class Places:
         return place
 
 
-def is_idle(mechanism: Mechanism, places: Places, form: Form) -> bool:
+def is_idle(derivation: Derivation, places: Places, form: Form) -> bool:
     """Return whether a form is zero everywhere, so that nothing can violate it."""
 
     def how(mechanism: Mechanism) -> bool:
@@ -183,7 +183,7 @@ def is_idle(mechanism: Mechanism, places: Places, form: Form) -> bool:
         return bool(np.max(np.abs(values)) <= tolerances.SAME * np.max(np.abs(terms * sizes), initial=0.0))
 
     return all(c.is_zero for c in (*form.coefficients, form.explicit_rate)) or (
-        not form.switches and decide(mechanism, how)
+        not form.switches and decide(derivation, how)
     )
 
 
@@ -192,13 +192,13 @@ def _scaled(places: Places, form: Form, mechanism: Mechanism) -> FloatArray:
 
 
 def constant_pivot(
-    mechanism: Mechanism, places: Places, form: Form, allowed: Sequence[int]
+    derivation: Derivation, places: Places, form: Form, allowed: Sequence[int]
 ) -> tuple[int, Expression] | None:
     """Return the speed with the largest coefficient of those that are the same everywhere, and its coefficient.
 
     Parameters
     ----------
-    mechanism, places, form
+    derivation, places, form
         What is asked, and where.
     allowed
         Numbers of the speeds that may be taken.
@@ -219,17 +219,17 @@ def constant_pivot(
         chosen = max(allowed, key=lambda i: float(sizes[i]), default=None)
         return chosen if chosen is not None and sizes[chosen] >= 0.1 * largest > 0.0 else None
 
-    pivot = decide(mechanism, how)
+    pivot = decide(derivation, how)
     if pivot is None:
         return None
-    (coefficient,) = _at_reference(mechanism, places, [form.coefficients[pivot]])
+    (coefficient,) = _at_reference(derivation, places, [form.coefficients[pivot]])
     return pivot, coefficient
 
 
-def _at_reference(mechanism: Mechanism, places: Places, constants: Sequence[Expression]) -> list[Expression]:
+def _at_reference(derivation: Derivation, places: Places, constants: Sequence[Expression]) -> list[Expression]:
     """Return expressions that are the same everywhere, but for a common factor, in terms of parameters alone."""
     found = substitute(list(constants), places.reference())
-    numbers = decide(mechanism, partial(_away_from_reference, places, tuple(constants), tuple(found)))
+    numbers = decide(derivation, partial(_away_from_reference, places, tuple(constants), tuple(found)))
     return found if numbers is None else [one.graph.constant(x) for one, x in zip(found, numbers, strict=True)]
 
 
@@ -257,12 +257,12 @@ Time has the number after the last speed.
 """
 
 
-def linear_integrals(mechanism: Mechanism, places: Places, forms: Sequence[Form], together: bool) -> list[Integral]:
+def linear_integrals(derivation: Derivation, places: Places, forms: Sequence[Form], together: bool) -> list[Integral]:
     """Return functions, linear in the coordinates, whose constancy says as much as forms do.
 
     Parameters
     ----------
-    mechanism, places, forms
+    derivation, places, forms
         What is asked, and where.
     together
         Whether combinations of forms are looked at where no form alone can be integrated.
@@ -270,16 +270,16 @@ def linear_integrals(mechanism: Mechanism, places: Places, forms: Sequence[Form]
     own = _integrable_speeds(places.state)
     found: list[Integral] = []
     for number, form in enumerate(forms):
-        if form.switches or not decide(mechanism, partial(_is_constant, places, form, own)):
+        if form.switches or not decide(derivation, partial(_is_constant, places, form, own)):
             continue
         entries = [*form.coefficients, form.explicit_rate]
-        coefficients = _at_reference(mechanism, places, entries)
+        coefficients = _at_reference(derivation, places, entries)
         kept = {i: c for i, c in enumerate(coefficients) if (i in own or i == len(form.coefficients)) and not c.is_zero}
         found.append(((number,), kept))
     if found or not together or len(forms) < 2:
         return found
-    graph = mechanism.table.graph
-    combined = decide(mechanism, partial(_combinations, places, tuple(forms), own))
+    graph = derivation.table.graph
+    combined = decide(derivation, partial(_combinations, places, tuple(forms), own))
     return [(members, {i: graph.constant(c) for i, c in entries}) for members, entries in combined]
 
 

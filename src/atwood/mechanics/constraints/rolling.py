@@ -33,7 +33,7 @@ from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.equations import Integral, put_in_place
 from atwood.mechanics.dynamics.forces import Site, local_map
 from atwood.mechanics.dynamics.inertia import Masses
-from atwood.mechanics.kinematics.mechanism import Mechanism, decide, extent, from_start
+from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent, from_start
 from atwood.mechanics.kinematics.motion import Motion, Movement
 from atwood.model.local.laws import LocalConstraint
 from atwood.topology.spanning_forest import SpanningForest
@@ -66,7 +66,7 @@ class Taken:
 
 
 def take_up(
-    mechanism: Mechanism,
+    derivation: Derivation,
     site: Site,
     masses: Masses,
     forest: SpanningForest,
@@ -79,8 +79,8 @@ def take_up(
 
     Parameters
     ----------
-    mechanism, site, masses, forest, motion
-        The mechanism.
+    derivation, site, masses, forest, motion
+        The derivation.
     solution
         Coordinates that constraints on positions have eliminated.
     values
@@ -91,27 +91,27 @@ def take_up(
     found, left = dict(solution), list(rolling)
     integrals: list[Integral] = []
     while left:
-        integrals += _held_still(mechanism, motion, found, values, len(integrals))
+        integrals += _held_still(derivation, motion, found, values, len(integrals))
         state = motion.finish(found)
-        places = Places(state, mechanism.time)
-        forms = _forms(mechanism, site, state, left)
-        moving = [form for form in forms if not is_idle(mechanism, places, form)]
+        places = Places(state, derivation.time)
+        forms = _forms(derivation, site, state, left)
+        moving = [form for form in forms if not is_idle(derivation, places, form)]
         left = [(form.path, form.constraint) for form in moving]
         even = not any(form.switches for form in moving)
-        new = linear_integrals(mechanism, places, moving, together=even)
+        new = linear_integrals(derivation, places, moving, together=even)
         if not new:
             held = any(value is not SOLVED and _holds(value, found, state) for _, _, value in values)
-            in_turn = even and not held and mechanism.space.name == "space"
-            speeds = _solved_speeds(mechanism, places, moving) if in_turn else {}
+            in_turn = even and not held and derivation.space.name == "space"
+            speeds = _solved_speeds(derivation, places, moving) if in_turn else {}
             return Taken(found, speeds, tuple(integrals), () if speeds else tuple(left))
         made = [
-            _integral(mechanism, state, moving, members, c, len(integrals) + i) for i, (members, c) in enumerate(new)
+            _integral(derivation, state, moving, members, c, len(integrals) + i) for i, (members, c) in enumerate(new)
         ]
         pending: Values = [
             (moving[members[-1]].path, moving[members[-1]].constraint, one.value)
             for (members, _), one in zip(new, made, strict=True)
         ]
-        more = eliminate_linear(mechanism, masses, forest, motion.all_coordinates, pending, found)
+        more = eliminate_linear(derivation, masses, forest, motion.all_coordinates, pending, found)
         used = {members[-1] for (members, _), (_, _, value) in zip(new, pending, strict=True) if value is SOLVED}
         if not used:
             return Taken(found, {}, tuple(integrals), tuple(left))
@@ -122,14 +122,14 @@ def take_up(
 
 
 def without_idle_spins(
-    mechanism: Mechanism, state: Movement, taken: Taken, on_velocities: OnVelocities, values: Values
+    derivation: Derivation, state: Movement, taken: Taken, on_velocities: OnVelocities, values: Values
 ) -> Taken:
     """Return the same with spins that have no inertia: each takes one speed away, where nothing else is constrained.
 
     Parameters
     ----------
-    mechanism, state
-        The mechanism, and how it moves.
+    derivation, state
+        The derivation, and how it moves.
     taken
         What has become of the other constraints on velocities.
     on_velocities, values
@@ -140,13 +140,13 @@ def without_idle_spins(
         return taken
     if taken.left or any(value is not SOLVED for _, _, value in values):
         return replace(taken, left=(*taken.left, *idle))
-    spins = idle_speeds(mechanism, state)
+    spins = idle_speeds(derivation, state)
     rolling = dict(zip(taken.speeds, substitute(list(taken.speeds.values()), spins), strict=True))
     return replace(taken, speeds={**rolling, **spins})
 
 
 def _held_still(
-    mechanism: Mechanism,
+    derivation: Derivation,
     motion: Motion,
     solution: dict[Expression, Expression],
     values: Values,
@@ -163,18 +163,18 @@ def _held_still(
             continue
         value = substitute([given], solution)[0] if solution else given
         state = state or motion.finish(solution)
-        places = Places(state, mechanism.time)
-        alone = None if switches([value]) else decide(mechanism, partial(_depends_on_one, places, value))
+        places = Places(state, derivation.time)
+        alone = None if switches([value]) else decide(derivation, partial(_depends_on_one, places, value))
         if alone is None:
             continue
         symbol = state.coordinates[alone]
         (gradient,) = jvp([value], {symbol: 1.0})
         is_length = state.names[alone].unit == "m"
-        if not decide(mechanism, partial(_stands_by_itself, places, symbol, gradient, is_length)):
+        if not decide(derivation, partial(_stands_by_itself, places, symbol, gradient, is_length)):
             continue
-        constant = mechanism.table.graph.zero  # it shapes the equations, as other zeros do
-        if not decide(mechanism, partial(_is_at_zero, symbol, is_length)):
-            constant = from_start(mechanism, f"place {count + len(made)}", "reduced", symbol)
+        constant = derivation.table.graph.zero  # it shapes the equations, as other zeros do
+        if not decide(derivation, partial(_is_at_zero, symbol, is_length)):
+            constant = from_start(derivation, f"place {count + len(made)}", "reduced", symbol)
         solution.update({s: substitute([e], {symbol: constant})[0] for s, e in solution.items()})
         solution[symbol] = constant
         values[number] = (path, one, SOLVED)
@@ -242,7 +242,7 @@ def _forms(mechanism: Mechanism, site: Site, state: Movement, rolling: OnVelocit
 
 
 def _integral(
-    mechanism: Mechanism,
+    derivation: Derivation,
     state: Movement,
     forms: Sequence[Form],
     members: Sequence[int],
@@ -251,21 +251,21 @@ def _integral(
     form: str = "reduced",
 ) -> Integral:
     """Return an integral with its constant, a parameter that gets its value from the start."""
-    graph = mechanism.table.graph
+    graph = derivation.table.graph
     places = {rate: q for q, rate in zip(state.coordinates, state.rates, strict=True)}
-    symbols = [places.get(speed) for speed in state.speeds] + [mechanism.time]
+    symbols = [places.get(speed) for speed in state.speeds] + [derivation.time]
     total = graph.zero
     for i, c in coefficients.items():
         symbol = symbols[i]
         assert symbol is not None
         total = total + c * symbol
     # Also where it is zero, which another start need not make it.
-    constant = from_start(mechanism, f"integral {number} ({form})", form, graph.convert(total))
+    constant = from_start(derivation, f"integral {number} ({form})", form, graph.convert(total))
     keys = tuple((forms[i].path, forms[i].constraint.law.name, forms[i].constraint.index) for i in members)
     return Integral(keys, graph.convert(total - constant), constant)
 
 
-def _solved_speeds(mechanism: Mechanism, places: Places, forms: Sequence[Form]) -> dict[Expression, Expression]:
+def _solved_speeds(derivation: Derivation, places: Places, forms: Sequence[Form]) -> dict[Expression, Expression]:
     """Return speeds in terms of the others, one for each form; none unless all forms can be solved so."""
     state = places.state
     rates = set(state.rates)
@@ -274,7 +274,7 @@ def _solved_speeds(mechanism: Mechanism, places: Places, forms: Sequence[Form]) 
         rate = substitute([form.rate], solved)[0] if solved else form.rate
         (now,) = pfaffian_forms(state, [(form.path, form.constraint, rate)])
         allowed = [i for i, speed in enumerate(state.speeds) if speed in rates and speed not in solved]
-        chosen = constant_pivot(mechanism, places, now, allowed)
+        chosen = constant_pivot(derivation, places, now, allowed)
         if chosen is None:
             return {}
         pivot, coefficient = chosen
@@ -287,20 +287,20 @@ def _solved_speeds(mechanism: Mechanism, places: Places, forms: Sequence[Form]) 
 
 
 def integrated(
-    mechanism: Mechanism, site: Site, state: Movement, rolling: OnVelocities
+    derivation: Derivation, site: Site, state: Movement, rolling: OnVelocities
 ) -> dict[tuple[str, str, int], Integral]:
     """Return the constraints on velocities that are ones on positions by themselves, in the dae form.
 
     Parameters
     ----------
-    mechanism, site, state
-        The mechanism, and how it moves.
+    derivation, site, state
+        The derivation, and how it moves.
     rolling
         The constraints on velocities.
     """
-    if mechanism.places is None or not rolling:
+    if derivation.places is None or not rolling:
         return {}
-    forms = _forms(mechanism, site, state, rolling)
-    found = linear_integrals(mechanism, Places(state, mechanism.time), forms, together=False)
-    made = [_integral(mechanism, state, forms, *one, number, "dae") for number, one in enumerate(found)]
+    forms = _forms(derivation, site, state, rolling)
+    found = linear_integrals(derivation, Places(state, derivation.time), forms, together=False)
+    made = [_integral(derivation, state, forms, *one, number, "dae") for number, one in enumerate(found)]
     return {one.keys[-1]: one for one in made}

@@ -14,6 +14,7 @@ from atwood.late import dataclass
 from atwood.mechanics.dynamics.forces import Forces, Site, constraint_forces, local_map, part_forces
 from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
 from atwood.mechanics.kinematics.body_points import body_point_of
+from atwood.mechanics.kinematics.mechanism import Constant, Decision
 from atwood.mechanics.kinematics.orientation import inertial_torque, torque_components
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics
 from atwood.model.declare.contributions import BodyInertia
@@ -138,6 +139,10 @@ class Equations:
         Continuous states of parts: the last of the coordinates, which no speed moves.
     rows_with_multipliers
         In maximal coordinates, the rows as they are: with the multipliers themselves; empty if they have none.
+    decisions
+        What was decided by the size of numbers on the way.
+    constants
+        Parameters that have their values from the start of the scene.
     """
 
     graph: Graph
@@ -165,6 +170,8 @@ class Equations:
     read: Mapping[Expression, Expression] = field(default_factory=dict)
     rows_with_multipliers: tuple[Expression, ...] = ()
     states: tuple[LocalState, ...] = ()
+    decisions: tuple[Decision, ...] = ()
+    constants: Mapping[Expression, Constant] = field(default_factory=dict)
 
     @property
     def placing(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import field, replace
+from dataclasses import field, fields, replace
 from typing import Any, TypeVar
 
 from atwood.errors import TopologyError
@@ -23,9 +23,13 @@ from atwood.topology.bodies import Bodies
 from atwood.topology.graph import Joint, MechanismGraph
 
 __all__ = [
+    "Constant",
+    "Decision",
+    "Derivation",
     "Mechanism",
     "check_closures",
     "decide",
+    "derivation_of",
     "discrete_states_of",
     "extent",
     "from_start",
@@ -34,6 +38,38 @@ __all__ = [
 ]
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What was decided by the size of numbers, which other values of parameters may decide otherwise.
+
+    Attributes
+    ----------
+    how
+        Decides it, for a mechanism with any values of its parameters.
+    outcome
+        How it came out.
+    """
+
+    how: Callable[[Mechanism], object]
+    outcome: object
+
+
+@dataclass(frozen=True)
+class Constant:
+    """What the value of a constant of integration is read from.
+
+    Attributes
+    ----------
+    form
+        In which form's coordinates it is said.
+    expression
+        What it is the value of where the scene starts.
+    """
+
+    form: str
+    expression: Expression
 
 
 @dataclass(frozen=True)
@@ -57,13 +93,12 @@ class Mechanism:
     line_signs
         On a line, the signs of lengths as the start values tell them; None elsewhere, and where they were given.
     decisions
-        What shaped the equations by the size of numbers: how each was decided, and how it came out.
+        What was decided by the size of numbers when the laws were read; equations have decisions of their own.
     places
         Where the scene starts, by form and by the symbols of its coordinates; None where nothing depends on it: then
         constraints on velocities stay what they are.
     constants
-        Further parameters, whose values the start gives: for each, by which form's coordinates it is said, and what it
-        is the value of there. One may depend on those before it.
+        Further parameters, whose values the start gives, of both forms. One may depend on those before it.
     t_start
         When it starts, s.
     idle_spins
@@ -79,9 +114,9 @@ class Mechanism:
     bodies: Bodies
     links: Mapping[tuple[str, str], tuple[str, str]]
     line_signs: Mapping[tuple[str, str, str], float] | None = None
-    decisions: list[tuple[Callable[[Mechanism], object], object]] = field(default_factory=list)
+    decisions: tuple[Decision, ...] = ()
     places: Mapping[str, Mapping[Expression, float]] | None = None
-    constants: dict[Expression, tuple[str, Expression]] = field(default_factory=dict)
+    constants: Mapping[Expression, Constant] = field(default_factory=dict)
     t_start: float = 0.0
     idle_spins: Mapping[int, Vector] = field(default_factory=dict)
 
@@ -114,34 +149,57 @@ def discrete_states_of(mechanism: Mechanism) -> tuple[DiscreteState, ...]:
     return tuple(one for local in mechanism.locals_.values() for one in local.discrete_states)
 
 
-def decide(mechanism: Mechanism, how: Callable[[Mechanism], T]) -> T:
+@dataclass(frozen=True)
+class Derivation(Mechanism):
+    """A mechanism while something is derived from it. Its table is its own, to which constants of the start are added.
+
+    Attributes
+    ----------
+    decided
+        What has been decided by the size of numbers.
+    found
+        The constants of the start that have been found.
+    """
+
+    decided: list[Decision] = field(default_factory=list)
+    found: dict[Expression, Constant] = field(default_factory=dict)
+
+
+def derivation_of(mechanism: Mechanism) -> Derivation:
+    """Return a mechanism as a derivation in which nothing has been decided."""
+    own = {one.name: getattr(mechanism, one.name) for one in fields(Mechanism)}
+    own["table"] = replace(mechanism.table, values=dict(mechanism.table.values))
+    return Derivation(**own)
+
+
+def decide(derivation: Derivation, how: Callable[[Mechanism], T]) -> T:
     """Decide something by the size of numbers, and note it: other values may decide it otherwise."""
-    outcome = how(mechanism)
-    mechanism.decisions.append((how, outcome))
+    outcome = how(derivation)
+    derivation.decided.append(Decision(how, outcome))
     return outcome
 
 
-def from_start(mechanism: Mechanism, name: str, form: str, value: Expression) -> Expression:
+def from_start(derivation: Derivation, name: str, form: str, value: Expression) -> Expression:
     """Return a parameter that has the value of an expression where the scene starts, whichever start that is.
 
     Parameters
     ----------
-    mechanism
+    derivation
         It notes the parameter.
     name
         Of the parameter.
     form, value
         In which form's coordinates it is said, and what it is the value of.
     """
-    symbol = mechanism.table.graph.parameter(name)
-    mechanism.constants[symbol] = form, value
-    mechanism.table.values[symbol] = _at_start(mechanism, form, value)
+    symbol = derivation.table.graph.parameter(name)
+    derivation.found[symbol] = constant = Constant(form, value)
+    derivation.table.values[symbol] = _at_start(derivation, constant)
     return symbol
 
 
-def _at_start(mechanism: Mechanism, form: str, value: Expression) -> float:
+def _at_start(mechanism: Mechanism, constant: Constant) -> float:
     assert mechanism.places is not None
-    return evaluate([value], {**mechanism.table.values, **mechanism.places[form]})[0]
+    return evaluate([constant.expression], {**mechanism.table.values, **mechanism.places[constant.form]})[0]
 
 
 def started_at(mechanism: Mechanism, places: Mapping[str, Mapping[Expression, float]]) -> Mechanism:
@@ -155,8 +213,8 @@ def started_at(mechanism: Mechanism, places: Mapping[str, Mapping[Expression, fl
         Where it starts.
     """
     made = replace(mechanism, places=places, table=replace(mechanism.table, values=dict(mechanism.table.values)))
-    for symbol, said in mechanism.constants.items():
-        made.table.values[symbol] = _at_start(made, *said)
+    for symbol, constant in mechanism.constants.items():
+        made.table.values[symbol] = _at_start(made, constant)
     return made
 
 

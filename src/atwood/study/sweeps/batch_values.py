@@ -13,7 +13,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
-from atwood.forms.shared import Slot, find_slots
+from atwood.forms.shared import Slot, decisions_of, find_slots
 from atwood.forms.starting import starting
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.model.declare.component import Component
@@ -73,7 +73,9 @@ class ParameterRows:
         kinds = {type(part.component) for path, part in assembly.flat.parts.items() if path in varied}
         checks = any(kind.check_values is not Component.check_values for kind in kinds)
         closures = mechanism.bodies.closures
-        is_plain = not mechanism.decisions and not mechanism.constants and not closures and not checks
+        is_plain = (
+            not decisions_of(mechanism, assembly.shared) and not mechanism.constants and not closures and not checks
+        )
         self._is_simple = is_plain and not self._builds()
 
     def _builds(self) -> bool:
