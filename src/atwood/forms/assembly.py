@@ -213,6 +213,8 @@ class Assembly:
         """The values of the relations in this piece of a run: until the next time event."""
         if self.given_relations is not None:
             return self.given_relations
+        if not self.relations:
+            return ()
         with self.shared.lock:  # derivatives may be new to the graph
             return values_just_after(self.relations, self.mechanism.table.values, self.flat.t_start)
 
@@ -400,13 +402,19 @@ class Assembly:
 
     def balance(self, form: FormName) -> BalanceProgram:
         """Return the balance of forces in the coordinates of either form."""
-        parts = f"{self.flat.name} ({form})", self.in_coordinates(form), self.parameters
-        return self.shared.get(_BALANCE, lambda: balance_program(*parts), form)
+        return self.shared.get(
+            _BALANCE,
+            lambda: balance_program(f"{self.flat.name} ({form})", self.in_coordinates(form), self.parameters),
+            form,
+        )
 
     def rates(self, form: Coordinates) -> RatesProgram:
         """Return how the coordinates move with their speeds."""
-        parts = f"{self.flat.name} ({form})", self.in_coordinates(form), self.parameters
-        return self.shared.get(_RATES, lambda: rates_program(*parts), form)
+        return self.shared.get(
+            _RATES,
+            lambda: rates_program(f"{self.flat.name} ({form})", self.in_coordinates(form), self.parameters),
+            form,
+        )
 
     def kernel(self, program: Program, vectorized: bool = False) -> BoundKernel:
         """Return a program with the parameters of this scene, ready to run."""

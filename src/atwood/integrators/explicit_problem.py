@@ -30,6 +30,7 @@ __all__ = [
     "ExplicitProblem",
     "HeedingStepper",
     "Outcome",
+    "RenewedStepper",
     "Stepper",
     "absolute_tolerances",
     "first_step",
@@ -198,6 +199,15 @@ class LimitedStepper(Protocol):
 
     def limit_steps(self, longest: float) -> None:
         """Take no longer steps from now on than this, nor than the options allow."""
+        ...
+
+
+@runtime_checkable
+class RenewedStepper(Protocol):
+    """What a stepper has in addition if it can make one run after another."""
+
+    def renew(self, horizon: float) -> None:
+        """Count from zero again, for a run of another typical length, s."""
         ...
 
 

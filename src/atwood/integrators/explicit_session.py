@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import cache
 from math import inf
 from typing import Literal, cast
 
@@ -21,6 +22,7 @@ from atwood.integrators.explicit_problem import (
     HeedingStepper,
     LimitedStepper,
     Outcome,
+    RenewedStepper,
     Stepper,
 )
 from atwood.integrators.protocol import (
@@ -110,34 +112,59 @@ class ExplicitSession:
         leave: Leave | None = None,
         end: float = inf,
     ) -> None:
-        self.budget = budget or Budget()
-        self._opened = 0.0  # when it first went on
-        self._end = end
-        self._leave, self._judged, self._is_left = leave, 0, False
         self._size = problem.size
         self._stepper = stepper
         # The watch reads nothing of a problem but its events.
         watched = cast("ImplicitProblem", problem)
         self._locator = EventLocator(watched, options.horizon) if problem.events is not None else None
         self._notices = self._event_stepper(problem, stepper)
-        if leave is not None and isinstance(stepper, HeedingStepper):
-            stepper.heed_stiffness()
+        if leave is not None and _has(type(stepper), HeedingStepper):
+            cast("HeedingStepper", stepper).heed_stiffness()
         self._no_events = (0,) * problem.event_count
+        self._chunk = max(1, FIRST_CHUNK // problem.size)
+        self._begin(t, y, budget, leave, end)
+
+    def _begin(self, t: float, y: FloatArray, budget: Budget | None, leave: Leave | None, end: float) -> None:
+        """Set all that belongs to one run."""
+        self.budget = budget or Budget()
+        self._opened = 0.0  # when it first went on
+        self._end = end
+        self._leave, self._judged, self._is_left = leave, 0, False
         self._starts = 0
         self._seconds = 0.0
-        self._chunk = max(1, FIRST_CHUNK // problem.size)
         self.reinitialize(t, y)
+
+    def begin_again(
+        self, t: float, y: FloatArray, horizon: float, budget: Budget | None, leave: Leave | None, end: float
+    ) -> None:
+        """Make another run, with the same method: all is as in a new session, and is counted from zero.
+
+        What the rates depend on besides time and values may have changed before. For compiled steps without events,
+        and for sessions that were opened to leave stiff problems to others or not, as this run does.
+
+        Parameters
+        ----------
+        t, y, budget, leave, end
+            As in `open_explicit`.
+        horizon
+            A typical length of the run, s.
+        """
+        if not _has(type(self._stepper), RenewedStepper) or self._locator is not None:
+            raise UsageError("only compiled steps without events can be begun again")
+        cast("RenewedStepper", self._stepper).renew(horizon)
+        self._begin(t, y, budget, leave, end)
 
     @staticmethod
     def _event_stepper(problem: ExplicitProblem, stepper: Stepper) -> EventStepper | None:
         """Let the stepper look for events by itself, if it can."""
-        if problem.compiled_events is None or not isinstance(stepper, EventStepper):
+        if problem.compiled_events is None or not _has(type(stepper), EventStepper):
             return None
         events = problem.compiled_events()
         if events is None:
             return None
-        stepper.watch(events)
-        return stepper
+        found = cast("EventStepper", stepper)
+        found.watch(events)
+        return found
 
     @property
     def statistics(self) -> Statistics:
@@ -161,8 +188,8 @@ class ExplicitSession:
 
     def limit_steps(self, longest: float) -> None:
         """Take no longer steps from now on than this, nor than the options allow, if the stepper can be told so."""
-        if isinstance(self._stepper, LimitedStepper):
-            self._stepper.limit_steps(longest)
+        if _has(type(self._stepper), LimitedStepper):
+            cast("LimitedStepper", self._stepper).limit_steps(longest)
 
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
         """Go on from another state; its rates follow from it."""
@@ -404,6 +431,12 @@ class ExplicitSession:
     def _stopped(self, status: Status, reason: str) -> StepResult:
         message = f"{reason} (at t = {self._here[0]:.9g})"
         return StepResult(*_copied(self._here), status, self._no_events, message)
+
+
+@cache
+def _has(kind: type, more: type) -> bool:
+    """Return whether a kind of stepper has what a protocol says; to ask that takes longer than a step."""
+    return issubclass(kind, more)
 
 
 def _copied(state: State) -> State:

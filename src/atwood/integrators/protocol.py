@@ -11,7 +11,6 @@ for a reason that its status names; in every case it hands back a state that is 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from enum import Enum
 from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
@@ -345,9 +344,9 @@ class Statistics:
 
     def __add__(self, other: Statistics) -> Statistics:
         sums: dict[str, Any] = {}
-        for field in fields(self):
-            mine, theirs = getattr(self, field.name), getattr(other, field.name)
-            sums[field.name] = None if mine is None or theirs is None else mine + theirs
+        for name in Statistics.__annotations__:
+            mine, theirs = getattr(self, name), getattr(other, name)
+            sums[name] = None if mine is None or theirs is None else mine + theirs
         return Statistics(**sums)
 
 

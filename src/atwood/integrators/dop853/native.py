@@ -199,6 +199,12 @@ class CompiledStepper:
         """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
         self._counts[_HEEDS] = 1
 
+    def renew(self, horizon: float) -> None:
+        """Count from zero again, for a run of another typical length, s."""
+        self._counts[_STEPS : _STEPS + len(fields(Counts))] = 0
+        self._numbers[_HORIZON] = horizon
+        self._numbers[_LONGEST] = self._options.max_step or inf
+
     def begin_of_step(self) -> float:
         """Return the time at the begin of the last step."""
         return float(self._numbers[_T_OLD])

@@ -84,7 +84,7 @@ class Balance:
     program
         The program.
     kernel, constraint_kernel
-        The same, and the constraints alone, ready to run on one state.
+        Give the same, and the constraints alone, ready to run on one state.
     kinematic_map
         How the coordinates move with the speeds.
     errors
@@ -96,13 +96,13 @@ class Balance:
     def __init__(
         self,
         program: BalanceProgram,
-        kernel: BoundKernel,
+        kernel: Callable[[], BoundKernel],
         constraint_kernel: Callable[[], BoundKernel],
         kinematic_map: KinematicMap,
         errors: RowErrors,
         mass: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
     ) -> None:
-        self.program, self.kernel, self.kinematic_map = program, kernel, kinematic_map
+        self.program, self._kernel, self.kinematic_map = program, kernel, kinematic_map
         self.errors, self._mass = errors, mass
         self._all = len(program.holonomic) == program.constraints
         self._constraint_kernel = constraint_kernel
@@ -116,7 +116,7 @@ class Balance:
     def at(self, t: float, q: FloatArray, u: FloatArray) -> BalanceValues:
         """Return the balance at a state."""
         p = self.program
-        mass, bias, value, rate, gamma, entries, explicit_rate = self.kernel([t], q, u)
+        mass, bias, value, rate, gamma, entries, explicit_rate = self._kernel()([t], q, u)
         full = self._mass is not None or is_best_full((p.speeds, p.speeds), len(mass))
         if self._mass is not None:
             matrix = self._mass(t, q, u)
@@ -225,7 +225,7 @@ def balance_of(assembly: Assembly, form: FormName) -> Balance:
     places, kinematic_map = (program.jacobian_rows, program.jacobian_columns), kinematic_map_of(assembly, form)
     laws = [one.key[:2] for one in assembly.in_coordinates(form).constraints]
     errors = RowErrors(assembly, program.constraints_alone, ("value", "jacobian"), laws, places, kinematic_map)
-    return Balance(program, assembly.kernel(program.program), held, kinematic_map, errors, mass)
+    return Balance(program, partial(assembly.kernel, program.program), held, kinematic_map, errors, mass)
 
 
 def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -> tuple[FloatArray, FloatArray]:

@@ -104,12 +104,12 @@ class Sampler:
 
     def next(self, t: float, end: float) -> float:
         """Return the next sample time after a time, or the end of the run."""
-        number = int(np.searchsorted(self.times, t, side="right"))
+        number = int(self.times.searchsorted(t, side="right"))
         return float(self.times[number]) if number < len(self.times) else end
 
     def due_at(self, t: float) -> tuple[int, ...]:
         """Return which updates are due at a time."""
-        number = int(np.searchsorted(self.times, t, side="left"))
+        number = int(self.times.searchsorted(t, side="left"))
         return self.due[number] if number < len(self.times) and self.times[number] == t else ()
 
     def due_after(self, part: str, event: str) -> tuple[int, ...]:

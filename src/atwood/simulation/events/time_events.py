@@ -64,7 +64,7 @@ class Schedule:
 
     def piece(self, t: float) -> int:
         """Return in which piece a time is; a time of change belongs to what comes after it."""
-        return int(np.searchsorted(self.times, t, side="right"))
+        return int(self.times.searchsorted(t, side="right"))
 
     def next(self, t: float, end: float) -> float:
         """Return the next time of change after a time, or the end of the run."""

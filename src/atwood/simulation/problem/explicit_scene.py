@@ -13,9 +13,9 @@ from atwood.integrators.explicit_problem import CompiledRates, ExplicitProblem
 from atwood.integrators.protocol import FloatArray, Values
 
 if TYPE_CHECKING:
-    from atwood.integrators.dop853.native import CompiledAccelerations
+    from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
 
-__all__ = ["compiled_rates", "explicit_problem"]
+__all__ = ["compiled_rates", "explicit_problem", "own_rates"]
 
 _COMPILED: Key[CompiledAccelerations] = Key("machine code of accelerations")
 
@@ -71,11 +71,7 @@ def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAc
 
 def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], CompiledRates] | None:
     """Return what gives each session compiled rates, made when they are first asked for; None if they cannot be."""
-    try:
-        from atwood.integrators.dop853 import native as explicit_native  # noqa: F401
-    except ImportError:  # no compiler: steps in Python
-        return None
-    if any(node.operation == "external" for node in found.program.nodes):
+    if not _compiles(found):
         return None
 
     @cache
@@ -83,3 +79,26 @@ def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], Co
         return compiled_rates(assembly, found).bind(assembly.parameter_values)
 
     return lambda: bound()()
+
+
+def own_rates(assembly: Assembly) -> tuple[CompiledAccelerations, OwnRates] | None:
+    """Return the accelerations of a scene as machine code, and rates with its parameters, for which others can be set.
+
+    None where they cannot be compiled, and where the scene is not one for explicit methods.
+    """
+    found = accelerations_of(assembly)
+    if found is None or not _compiles(found):
+        return None
+    code = compiled_rates(assembly, found)
+    rates = code.open()
+    code.fill(rates, assembly.parameter_values)
+    return code, rates
+
+
+def _compiles(found: AccelerationProgram) -> bool:
+    """Return whether accelerations can be machine code."""
+    try:
+        from atwood.integrators.dop853 import native as explicit_native  # noqa: F401
+    except ImportError:  # no compiler: steps in Python
+        return False
+    return not any(node.operation == "external" for node in found.program.nodes)

@@ -114,7 +114,7 @@ class Samples:
 
     def until(self, t: float, limit: float) -> Samples:
         """Return those after one time up to another, which is among them."""
-        ahead = (self.times > t) & (self.times <= limit)
+        ahead = slice(*self.times.searchsorted([t, limit], side="right"))
         times, shown, between = self.times[ahead], self.shown[ahead], self.between[ahead]
         if not len(times) or times[-1] != limit:
             times, shown, between = np.append(times, limit), np.append(shown, False), np.append(between, False)
@@ -126,7 +126,8 @@ class Samples:
 
     def shows(self, t: float) -> bool:
         """Return whether a time is that of an output."""
-        return bool(np.any(self.shown[self.times == t]))
+        number = int(self.times.searchsorted(t))
+        return number < len(self.times) and bool(self.times[number] == t and self.shown[number])
 
     @property
     def own(self) -> FloatArray:
@@ -135,6 +136,8 @@ class Samples:
 
     def ends_of_blocks(self, count: int) -> NDArray[np.intp]:
         """Return where to cut them into so many blocks, which are the same whatever lies between."""
+        if count == 1:
+            return np.array([len(self.times)])
         own = np.flatnonzero(~self.between)
         size = -(-len(own) // count)
         return np.append(own[size - 1 : -1 : size] + 1, len(self.times))

@@ -41,6 +41,7 @@ from atwood.simulation.problem.problem import Plan, make_plan
 from atwood.simulation.run.choice import Choice, check_solver, choose, describe_choices
 from atwood.simulation.run.record import Recorder, SegmentRecord
 from atwood.simulation.run.segment import Outcome, Segment, run_segment
+from atwood.simulation.run.session import KeptSession
 from atwood.simulation.run.tolerances import allowed
 from atwood.simulation.singular.crossing import SingularCrossing
 from atwood.stages import stage
@@ -228,6 +229,7 @@ class _Walk:
         self.samples, self.again = samples, again
         self._schedules: dict[Shared, Schedule] = {}
         self._plans: dict[tuple[tuple[float, ...], tuple[float, ...] | None], Plan] = {}
+        self._kept = KeptSession()
         self._piece_start = start.time
         self.segments: list[SegmentRecord] = []
         self.events: list[EventRecord] = []
@@ -310,7 +312,7 @@ class _Walk:
         ahead = self.samples.until(t, limit)
         if limit < options.t_end:  # the state just after it is shown
             ahead = ahead.without_last_shown()
-        segment = Segment(self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics)
+        segment = Segment(self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics, self._kept)
         recorder = Recorder(self.plan)
         outcome = run_segment(segment, recorder, t, q, u)
         if recorder.is_empty and outcome.error is not None:  # not even the start could be projected

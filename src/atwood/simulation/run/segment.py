@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
-from atwood.errors import AtwoodError, SolveError
+from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.protocol import Budget, FloatArray, ReadingSession, Session, Statistics, Status, StepResult
 from atwood.late import dataclass
@@ -27,7 +27,7 @@ from atwood.simulation.problem.problem import Plan, pack_state
 from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import Choice, stiffness_of, turned_stiff
 from atwood.simulation.run.record import Recorder
-from atwood.simulation.run.session import SolverRequest, open_explicit_session, open_implicit_session
+from atwood.simulation.run.session import KeptSession, SolverRequest, open_explicit_session, open_implicit_session
 from atwood.simulation.run.stuck import explain_stuck
 from atwood.simulation.run.tolerances import too_tight
 from atwood.simulation.singular.crossing import SingularCrossing, events_on
@@ -59,6 +59,8 @@ class Segment:
         Whether the start is an output.
     spent
         What the run has cost before.
+    kept
+        The session of an explicit method that the run has opened before.
     """
 
     plan: Plan
@@ -68,6 +70,7 @@ class Segment:
     samples: Samples
     first_shown: bool
     spent: Statistics
+    kept: KeptSession
 
     @property
     def end(self) -> float:
@@ -122,7 +125,7 @@ def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u
     plan = segment.plan
     n = plan.program.coordinates
     with more_time():  # so that there is its start, whatever comes
-        y, yp = (np.zeros(0), np.zeros(0)) if n == 0 else pack_state(plan, t, q, u)
+        y, yp = _first_state(segment, t, q, u)
         recorder.take(t, y, segment.first_shown)
     already = segment.probe.broken_at_start(t)
     if already is not None:
@@ -130,6 +133,15 @@ def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u
     if n == 0:
         return _follow(segment, recorder, t)
     return _Runner(segment, recorder).run(t, y, yp)
+
+
+def _first_state(segment: Segment, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the start of a segment for a solver; explicit methods work out the rates themselves."""
+    if not len(q):
+        return np.zeros(0), np.zeros(0)
+    if segment.choice.solver.startswith("ida"):
+        return pack_state(segment.plan, t, q, u)
+    return np.concatenate([q, u]), np.zeros(0)
 
 
 def _follow(segment: Segment, recorder: Recorder, t: float) -> Outcome:
@@ -305,6 +317,7 @@ class _Runner:
                 wall_seconds=None if options.max_seconds is None else max(0.0, time_left()),
                 poll=_both(segment.plan.poll(choice.solver), options.on_step),
             ),
+            segment.kept,
         )
         if choice.solver.startswith("ida"):
             from atwood.simulation.singular.monitor import singularity_monitor_of
@@ -315,7 +328,11 @@ class _Runner:
             self.session = open_implicit_session(request, choice.solver, t, y, yp, self.monitor)
         else:
             leave = self._is_stiff if options.solver == "auto" else None
-            self.session = open_explicit_session(request, choice.solver, t, y, leave)
+            try:
+                self.session = open_explicit_session(request, choice.solver, t, y, leave)
+            except StartError:
+                pack_state(segment.plan, t, *segment.plan.program.split(y))  # says what has no value, if it can
+                raise
         return self.session
 
     def _is_stiff(self, t: float, y: FloatArray) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from atwood.errors import UsageError
-from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents
+from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession, Leave
 from atwood.integrators.protocol import (
     Budget,
@@ -25,9 +25,10 @@ from atwood.simulation.problem.options import SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
 
 if TYPE_CHECKING:
+    from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
     from atwood.simulation.singular.monitor import SingularityMonitor
 
-__all__ = ["SolverRequest", "open_explicit_session", "open_implicit_session"]
+__all__ = ["KeptSession", "SolverRequest", "open_explicit_session", "open_implicit_session"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +45,8 @@ class SolverRequest:
         Where this stretch ends at the latest, s.
     budget
         Limits.
+    kept
+        The session of an explicit method that the run has opened before.
     """
 
     plan: Plan
@@ -51,6 +54,11 @@ class SolverRequest:
     options: RunOptions
     end: float
     budget: Budget
+    kept: KeptSession
+
+    def horizon(self, t: float) -> float:
+        """Return a typical length of what is left of the run at a time, s."""
+        return self.options.t_end - t if self.options.t_end > t else 1.0
 
     def settings(self, t: float, loosest: float = 1.0) -> SolverOptions:
         """Return the options of a solver that starts at a time, with no looser tolerance than it can hold."""
@@ -61,7 +69,7 @@ class SolverRequest:
             absolute_tolerances=self.plan.tolerances(min(options.absolute_tolerance or relative, loosest)),
             max_step=options.max_step,
             max_order=options.max_order,
-            horizon=options.t_end - t if options.t_end > t else 1.0,
+            horizon=self.horizon(t),
         )
 
 
@@ -135,6 +143,47 @@ def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem
     return replace(problem, events=found.function(), native=native)
 
 
+@dataclass(eq=False)
+class KeptSession:
+    """The session of an explicit method, which a run begins again where only values of parameters have changed.
+
+    So a run that stops at sample times opens one session, not one for each. What it was opened with is compared by
+    identity: a run has one object of each as long as these stay what they are.
+
+    Attributes
+    ----------
+    session
+        The session; None before the first.
+    code, rates
+        The compiled rates, and their place for parameters.
+    opened_with
+        What else it was opened with.
+    """
+
+    session: ExplicitSession | None = None
+    code: CompiledAccelerations | None = None
+    rates: OwnRates | None = None
+    opened_with: tuple[object, ...] = ()
+
+    def begin_again(
+        self, request: SolverRequest, t: float, y: FloatArray, leave: Leave | None
+    ) -> ExplicitSession | None:
+        """Return the session at the start of another segment; None where it was opened for something else."""
+        session, code, rates = self.session, self.code, self.rates
+        if session is None or code is None or rates is None or request.probe.event_functions:
+            return None
+        if not all(one is other for one, other in zip(self.opened_with, _opened_with(request, leave), strict=True)):
+            return None
+        code.fill(rates, request.plan.assembly.parameter_values)
+        session.begin_again(t, y, request.horizon(t), request.budget, leave, request.end)
+        return session
+
+
+def _opened_with(request: SolverRequest, leave: Leave | None) -> tuple[object, ...]:
+    plan = request.plan
+    return plan.assembly.shared, plan.program, request.options, plan.scales, plan.sizes, leave is None
+
+
 def open_explicit_session(
     request: SolverRequest, solver: str, t: float, y: FloatArray, leave: Leave | None = None
 ) -> ExplicitSession:
@@ -156,7 +205,43 @@ def open_explicit_session(
     UsageError
         If the scene is not one for explicit methods.
     """
+    if solver == "taylor":
+        return _open_taylor(request, t, y)
+    session = request.kept.begin_again(request, t, y, leave)
+    if session is None:
+        session = _open_steps(request, t, y, leave)
+    equations, program = request.plan.assembly.own_equations, request.plan.program
+    session.limit_steps(longest_step(equations, program.split(y)[1]))
+    return session
+
+
+def _open_steps(request: SolverRequest, t: float, y: FloatArray, leave: Leave | None) -> ExplicitSession:
+    """Start the method of order 8(5,3), and keep its session if that can be begun again."""
     from atwood.integrators.explicit_session import open_explicit
+    from atwood.simulation.problem.explicit_scene import own_rates
+
+    problem, kept, assembly = _explicit_problem(request, "explicit"), request.kept, request.plan.assembly
+    own = None if problem.events is not None else own_rates(assembly)
+    if own is None:
+        return open_explicit(problem, request.settings(t, LOOSEST), t, y, request.budget, leave=leave, end=request.end)
+    code, rates = own
+    problem = replace(problem, compiled=lambda: rates.rates)
+    session = open_explicit(problem, request.settings(t, LOOSEST), t, y, request.budget, leave=leave, end=request.end)
+    kept.session, kept.code, kept.rates = session, code, rates
+    kept.opened_with = _opened_with(request, leave)
+    return session
+
+
+def _open_taylor(request: SolverRequest, t: float, y: FloatArray) -> ExplicitSession:
+    from atwood.simulation.problem.taylor_scene import open_taylor, taylor_problem
+
+    problem = _explicit_problem(request, "taylor")
+    series = taylor_problem(request.plan.assembly, request.end, has_events=bool(request.probe.directions))
+    return open_taylor(problem, series, request.settings(t, LOOSEST), t, y, request.budget)
+
+
+def _explicit_problem(request: SolverRequest, solver: str) -> ExplicitProblem:
+    """Return the equations for an explicit method, with what is watched."""
     from atwood.simulation.problem.explicit_scene import explicit_problem
 
     assembly, probe = request.plan.assembly, request.probe
@@ -169,14 +254,7 @@ def open_explicit_session(
         )
     problem = replace(problem, event_rough=probe.rough)
     found = None if problem.events is None else probe.compiled(for_ida=False)
-    if found is not None:
-        own = CompiledEvents(found.explicit, found.address, found.count, found.restart, found)
-        problem = replace(problem, events=found.function(), compiled_events=lambda: own)
-    if solver == "taylor":
-        from atwood.simulation.problem.taylor_scene import open_taylor, taylor_problem
-
-        series = taylor_problem(assembly, request.end, has_events=bool(probe.directions))
-        return open_taylor(problem, series, request.settings(t, LOOSEST), t, y, request.budget)
-    session = open_explicit(problem, request.settings(t, LOOSEST), t, y, request.budget, leave=leave, end=request.end)
-    session.limit_steps(longest_step(assembly.own_equations, request.plan.program.split(y)[1]))
-    return session
+    if found is None:
+        return problem
+    own = CompiledEvents(found.explicit, found.address, found.count, found.restart, found)
+    return replace(problem, events=found.function(), compiled_events=lambda: own)

@@ -1,0 +1,96 @@
+"""A run that stops at sample times or time events opens one session of an explicit method and begins it again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from numpy.testing import assert_array_equal
+
+from atwood import Model, Scene, assemble, select, simulate, sin
+from atwood.integrators.dop853.native import CompiledStepper
+from atwood.simulation.run.session import KeptSession
+from atwood_library import Force, Ground, PointMass, Rod
+from atwood_library.scenes import CartPole
+
+
+def switched() -> Scene:
+    """A pendulum whose bob is pushed to and fro by the clock."""
+    scene = Scene(t_end=1.0)
+    ground, rod, bob = scene.add("ground", Ground()), scene.add("rod", Rod()), scene.add("bob", PointMass())
+    push = scene.add("push", Force(direction=(1.0, 0.0, 0.0), value=lambda t: select(sin(60.0 * t) > 0.0, 3.0, -1.0)))
+    scene.connect(ground.frame, rod.a)
+    scene.connect(rod.b, bob.point)
+    scene.connect(push.point, bob.point)
+    scene.start.update({"rod.angle": 0.3, "rod.angular_velocity": 0.0})
+    return scene
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The number of steppers that were made, as the length of a list."""
+    made: list[int] = []
+    first = CompiledStepper.__init__
+
+    def counted(self: CompiledStepper, *given: object) -> None:
+        made.append(1)
+        first(self, *given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(CompiledStepper, "__init__", counted)
+    return made
+
+
+@pytest.mark.parametrize(("make", "segments"), [(CartPole, 50), (switched, 20)])
+def test_one_session_serves_all_segments_of_a_run(
+    make: Callable[[], Model], segments: int, opened: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = assemble(make())
+    kept = simulate(scene, t_end=1.0, solver="explicit")
+    assert len(opened) == 1
+    opened.clear()
+    monkeypatch.setattr(KeptSession, "begin_again", lambda *_: None)
+    anew = simulate(scene, t_end=1.0, solver="explicit")
+    assert len(opened) >= segments
+    for path, values in anew.table().items():
+        assert_array_equal(kept[path], values, err_msg=path)
+    ours, theirs = (
+        {name: getattr(one.statistics, name) for name in type(one.statistics).__annotations__ if name != "seconds"}
+        for one in (kept, anew)
+    )
+    assert ours == theirs
+
+
+def test_a_run_with_events_opens_a_session_for_each_segment(opened: list[int]) -> None:
+    """Compiled events have parameters of their own, which would be those of the first segment."""
+    scene = CartPole()
+    plain = simulate(scene, t_end=0.4, solver="explicit")
+    opened.clear()
+    watched = simulate(scene, t_end=0.4, solver="explicit", record="rail.displacement crosses 1 mm")
+    assert len(opened) == 20
+    for path in ("hinge.angle", "push.force"):
+        assert_array_equal(watched[path][-1], plain[path][-1])
+
+
+def test_a_kept_session_belongs_to_one_run() -> None:
+    """Runs of one assembly at the same time, and of others in between, are those of each alone."""
+    scenes = [assemble(CartPole(lean=lean)) for lean in (0.2, 0.1)]
+    scenes.append(scenes[0].with_values({"lean": 0.15}))
+    alone = [simulate(one, t_end=0.5)["hinge.angle"] for one in scenes]
+    with ThreadPoolExecutor(3) as pool:
+        together = list(pool.map(lambda k: simulate(scenes[k % 3], t_end=0.5)["hinge.angle"], range(6)))
+    for k, found in enumerate(together):
+        assert_array_equal(found, alone[k % 3])
+
+
+def test_an_update_that_raises_leaves_nothing_behind() -> None:
+    scene = assemble(CartPole())
+    expected = simulate(scene, t_end=0.5)["hinge.angle"]
+
+    def stop(t: float) -> None:
+        if t > 0.2:
+            raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        simulate(scene, t_end=0.5, progress=stop)
+    assert_array_equal(simulate(scene, t_end=0.5)["hinge.angle"], expected)
