@@ -93,6 +93,8 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "section": atwood.poincare_section(DoublePendulum(), "rod1.angle crosses 0", ["rod2.angle"]),
         "linear": atwood.linearize(scene, at=hanging, inputs=[], outputs=["bob[0].position.x"]),
         "dynamics": atwood.dynamics(scene),
+        "conserved": atwood.conserved(FourBar()),
+        "symmetry": atwood.Symmetry(dict.fromkeys(angles, 1.0), 0.0),
         "modes": atwood.normal_modes(scene, at=hanging),
         "equilibria": list(atwood.equilibria(DoublePendulum())),
         "equilibria of a loop": atwood.equilibria(FourBar()),

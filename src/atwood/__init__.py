@@ -154,6 +154,7 @@ if TYPE_CHECKING:
         root_locus,
         trim,
     )
+    from atwood.theory.symmetries import Conserved, ConservedQuantity, Symmetry, conserved
 
     __version__: str
 
@@ -192,6 +193,8 @@ __all__ += [
 # Equations and what follows from them
 __all__ += [
     "BranchPoint",
+    "Conserved",
+    "ConservedQuantity",
     "Dynamics",
     "EquationsOfMotion",
     "Equilibria",
@@ -205,8 +208,10 @@ __all__ += [
     "PartOfEquations",
     "PoincareSection",
     "RootLocus",
+    "Symmetry",
     "TangentFlow",
     "Trim",
+    "conserved",
     "dynamics",
     "equations",
     "equilibria",
@@ -309,6 +314,8 @@ _LATER = {
     "CheckReport": "atwood.checking",
     "Comparison": "atwood.study",
     "ComparisonRow": "atwood.study",
+    "Conserved": "atwood.theory.symmetries",
+    "ConservedQuantity": "atwood.theory.symmetries",
     "Dynamics": "atwood.theory.dynamics",
     "EquationsOfMotion": "atwood.theory.equations",
     "Equilibria": "atwood.theory.linearization",
@@ -327,12 +334,14 @@ _LATER = {
     "RootLocus": "atwood.theory.linearization",
     "SavedResult": "atwood.result.files",
     "Sweep": "atwood.study",
+    "Symmetry": "atwood.theory.symmetries",
     "TangentFlow": "atwood.theory.flow",
     "Trim": "atwood.theory.linearization",
     "animate": "atwood.plotting",
     "assemble": "atwood.pipeline",
     "check": "atwood.checking",
     "compare": "atwood.study",
+    "conserved": "atwood.theory.symmetries",
     "dynamics": "atwood.theory.dynamics",
     "equations": "atwood.theory.equations",
     "equilibria": "atwood.theory.linearization",

@@ -60,6 +60,7 @@ def main() -> None:
     atwood info four-bar                 bodies, joints, freedom, equations
     atwood info Pivot                    connectors, parameters, quantities
     atwood equations double-pendulum     its equations of motion, as in a textbook
+    atwood conserved pendulum-on-cart    what its motion conserves
     atwood run double-pendulum           its motion and its forces
     atwood compare double-pendulum       what each form costs for which error
     atwood sweep double-pendulum --vary mass2=0.5:2:16
@@ -208,6 +209,22 @@ def equations_command(scene: str, as_json: bool, **options: Any) -> None:
     from atwood.cli.equations import EquationsRequest, show_equations
 
     show_equations(EquationsRequest(scene=scene, as_json=as_json, **options))
+
+
+@main.command("conserved", short_help="List what a scene conserves, and how that is known.", epilog=_SCENE_HELP)
+@_scene_options
+@_ORIENTATION
+@reporting_errors
+def conserved_command(
+    scene: str, settings: tuple[str, ...], starts: tuple[str, ...], as_json: bool, orientation: str
+) -> None:
+    """List what is conserved along all motions of SCENE: momenta, energy function, boosts; proven or checked.
+
+    In space, --orientation euler-zxz gives momenta of Euler angles.
+    """
+    from atwood.cli.conserved import show_conserved
+
+    show_conserved(scene, settings, starts, as_json, orientation)
 
 
 @main.command("compare", short_help="Compare what each form costs for which error.", epilog=_SCENE_HELP)

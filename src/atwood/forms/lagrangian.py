@@ -92,6 +92,8 @@ class Lagrangian:
     moves
         For each velocity, the number of the coordinate of which it is the derivative; None for a component of an
         angular velocity.
+    speeds
+        The speeds of the equations in terms of coordinates and velocities.
     parts
         What each part contributes.
     inertial
@@ -113,6 +115,7 @@ class Lagrangian:
     accelerations: tuple[Expression, ...]
     rates: tuple[Expression, ...]
     moves: tuple[int | None, ...]
+    speeds: tuple[Expression, ...]
     parts: tuple[Contribution, ...]
     inertial: tuple[Expression, ...]
     rows: tuple[Expression, ...]
@@ -257,6 +260,7 @@ def _along_speeds(assembly: Assembly, equations: Equations) -> Lagrangian:
         accelerations=equations.accelerations,
         rates=equations.rates,
         moves=tuple(number.get(u) for u in equations.speeds),
+        speeds=equations.speeds,
         parts=tuple(one for one in parts if not one.is_nothing),
         inertial=tuple(_inertial(equations, signals)),
         rows=equations.rows_with_multipliers or equations.rows,
@@ -413,6 +417,7 @@ def _along_angles(made: Lagrangian) -> Lagrangian:
         accelerations=tuple(accelerations),
         rates=tuple(rates),
         moves=tuple(moves),
+        speeds=tuple(speeds),
         parts=tuple(parts),
         inertial=on_angles(made.inertial),
         rows=on_angles(made.rows),

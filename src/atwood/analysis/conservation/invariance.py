@@ -1,0 +1,119 @@
+"""Directions in which a family of quantities is conserved: the null space of their rates, in a readable basis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from atwood.analysis.conservation.states import State
+from atwood.arrays import FloatArray
+
+__all__ = ["KEPT", "conserved_directions", "is_constant", "is_kept", "readable_basis"]
+
+KEPT = 1e-9
+"""Relative to its terms: how well the rate of a quantity must vanish at each state."""
+
+_RANK = 1e-8
+"""Relative to the largest singular value: what counts as zero among rates of a family."""
+
+_ROUND = 1e-9
+"""Components of directions this near to zero or one are these."""
+
+
+def is_kept(states: Sequence[State], number: int) -> bool:
+    """Return whether the rate of a quantity vanishes at all states."""
+    return all(abs(one.rates[number]) <= KEPT * one.terms[number] for one in states)
+
+
+def is_constant(values: FloatArray) -> bool:
+    """Return whether a quantity has one value at all states, so that it says nothing."""
+    return float(np.ptp(values)) <= KEPT * float(np.max(np.abs(values), initial=0.0)) if len(values) else True
+
+
+def conserved_directions(states: Sequence[State], numbers: Sequence[int], units: FloatArray) -> FloatArray:
+    """Return the combinations of quantities that are conserved, and not constant at all states.
+
+    Parameters
+    ----------
+    states
+        The quantities at random states.
+    numbers
+        Which of them belong to the family.
+    units
+        By what each is divided to be compared with the others.
+
+    Returns
+    -------
+    ndarray
+        Coefficients as columns, of the quantities in their own units.
+    """
+    own = list(numbers)
+    rates = np.array([one.rates[own] for one in states]) / units
+    terms = np.array([one.terms[own] for one in states]) / units
+    rates = np.where(np.abs(rates) > KEPT * terms, rates, 0.0)
+    rows = np.max(terms, axis=1, initial=0.0)
+    kept = _null_space(rates[rows > 0.0] / rows[rows > 0.0, None])
+    values = np.array([one.values[own] for one in states]) / units
+    size = float(np.max(np.abs(values), initial=0.0)) or 1.0
+    centred = (values - values.mean(axis=0)) / size @ kept
+    centred[np.abs(centred) < KEPT] = 0.0
+    silent = kept @ _null_space(centred)
+    # What is constant whatever happens is taken away from the rest, along the units that they are compared in.
+    rest = kept - silent @ (silent.T @ kept)
+    vectors, sizes, _ = np.linalg.svd(rest, full_matrices=False)
+    found = vectors[:, sizes > 0.5]
+    return np.asarray(found / units[:, None])
+
+
+def _null_space(matrix: FloatArray) -> FloatArray:
+    """Return an orthonormal basis, as columns, of what a matrix takes to zero."""
+    if not matrix.size or not np.any(matrix):
+        return np.eye(matrix.shape[1])
+    _, sizes, directions = np.linalg.svd(matrix, full_matrices=True)
+    rank = int(np.sum(sizes > _RANK * sizes[0]))
+    return np.asarray(directions[rank:].T)
+
+
+def readable_basis(columns: FloatArray) -> FloatArray:
+    """Return a basis of the same space of vectors with as many zeros and ones as there can be.
+
+    Coordinate axes where they are in it; else orthonormal vectors, the first of them in row echelon form, each with its
+    largest component positive.
+
+    Parameters
+    ----------
+    columns
+        Independent vectors.
+    """
+    rows = _row_echelon(np.asarray(columns, dtype=float).T)
+    if not np.all(np.sum(rows != 0.0, axis=1) <= 1):
+        made: list[FloatArray] = []
+        for row in rows:
+            for other in made:
+                row = row - (row @ other) * other
+            made.append(row / np.linalg.norm(row))
+        rows = np.array(made)
+    rows = np.where(np.abs(rows) < _ROUND, 0.0, rows)
+    rows = np.where(np.abs(np.abs(rows) - 1.0) < _ROUND, np.sign(rows), rows)
+    largest = np.argmax(np.round(np.abs(rows), 9), axis=1)
+    signs = np.sign(rows[np.arange(len(rows)), largest])
+    return np.asarray((rows * signs[:, None]).T)
+
+
+def _row_echelon(rows: FloatArray) -> FloatArray:
+    rows, row = rows.copy(), 0
+    for column in range(rows.shape[1]):
+        if row == len(rows):
+            break
+        pivot = row + int(np.argmax(np.abs(rows[row:, column])))
+        if abs(rows[pivot, column]) <= _RANK * float(np.max(np.abs(rows), initial=0.0)):
+            continue
+        rows[[row, pivot]] = rows[[pivot, row]]
+        rows[row] /= rows[row, column]
+        for other in range(len(rows)):
+            if other != row:
+                rows[other] -= rows[other, column] * rows[row]
+        row += 1
+    rows = np.where(np.abs(rows) < _ROUND, 0.0, rows)
+    return np.asarray(rows)

@@ -1,0 +1,152 @@
+"""Quantities of a scene that may be conserved, as expressions: momenta, the energy function, total momenta, boosts.
+
+Total momenta are those of Noether's theorem for motions of the whole scene as a rigid body: a velocity field
+``v + omega x r`` that is added to all velocities changes L by ``P . v + L . omega`` to first order. Of scenes in
+magnetic fields these are the canonical momenta ``m v + e A``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+from atwood.expr import Expression, affine_coefficients, substitute
+from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import Lagrangian, lagrangian_of
+from atwood.forms.places import to_maximal
+from atwood.late import dataclass
+from atwood.mechanics.kinematics.orientation import spin_in_world
+from atwood.mechanics.outputs.observables import add_up
+from atwood.topology.spanning_forest import Attachment
+
+__all__ = ["Motions", "Quantities"]
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Total momenta and first moments of mass, along the axes that the scene has.
+
+    Attributes
+    ----------
+    axes
+        Names of the axes.
+    momentum
+        Total momentum along each, kg*m/s.
+    turns
+        Names of the axes of rotation: x, y, z in space; none in the plane, where there is one, counter-clockwise.
+    angular_momentum
+        Total angular momentum about the origin, kg*m^2/s.
+    moments
+        ``sum m r`` along each axis, kg*m; empty where momenta are not those of masses alone.
+    """
+
+    axes: tuple[str, ...]
+    momentum: tuple[Expression, ...]
+    turns: tuple[str, ...]
+    angular_momentum: tuple[Expression, ...]
+    moments: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Quantities:
+    """The quantities of an assembly that may be conserved, on the symbols of its Lagrangian.
+
+    Attributes
+    ----------
+    assembly
+        The scene; generalized coordinates are those of its reduced form.
+    found
+        Its Lagrangian in these.
+    """
+
+    assembly: Assembly
+    found: Lagrangian
+
+    @cached_property
+    def momenta(self) -> tuple[Expression, ...]:
+        """The momenta ``dL/dq'``; of an angular velocity, the angular momentum in the axes of the body."""
+        return self.found.momenta
+
+    @cached_property
+    def energy_function(self) -> Expression:
+        """The energy function ``h = sum p q' - L`` (Goldstein, equation 2.53)."""
+        found = self.found
+        pairs = zip(self.momenta, found.velocities, strict=True)
+        return add_up([found.graph.zero, *(p * u for p, u in pairs)]) - found.lagrangian
+
+    @cached_property
+    def total_energy(self) -> Expression:
+        """T + V."""
+        return self.found.kinetic + self.found.potential
+
+    @cached_property
+    def motions(self) -> Motions:
+        """Total momenta along the axes of the scene."""
+        assembly, space = self.assembly, self.assembly.mechanism.space
+        whole = lagrangian_of(assembly, "dae")
+        forest, graph = assembly.maximal.forest, whole.graph
+        p = whole.momenta
+        count = len(space.basis)
+        momentum = [graph.zero] * count
+        spins = [graph.zero] * (3 if space.name == "space" else int(space.name == "plane"))
+        kinematics = assembly.maximal.kinematics
+        for one in forest.attachments:
+            if len(one.speeds) == count:
+                own, r = [p[k] for k in one.speeds], [whole.coordinates[k] for k in one.coordinates]
+                momentum = [a + b for a, b in zip(momentum, own, strict=True)]
+                spins = [a + b for a, b in zip(spins, _about_origin(r, own), strict=True)]
+            if one.spin:
+                axes = kinematics.placements.axes[one.body]
+                turned = spin_in_world([p[k] for k in one.spin], axes)
+                spins = [a + b for a, b in zip(spins, turned, strict=True)]
+        for turn in forest.orientations:
+            if turn.coordinate is not None and space.name == "plane":
+                spins[0] = spins[0] + p[turn.coordinate]
+        free = [one for one in forest.attachments if len(one.speeds) == count]
+        moments = _first_moments(whole, momentum, free, assembly.parameters)
+        every = self._in_generalized([*momentum, *spins, *moments])
+        turns = {"space": ("x", "y", "z"), "plane": ("",)}.get(space.name, ())
+        n, m = count, count + len(spins)
+        return Motions(space.axis_names, tuple(every[:n]), turns, tuple(every[n:m]), tuple(every[m:]))
+
+    def _in_generalized(self, values: Sequence[Expression]) -> list[Expression]:
+        """Return expressions of maximal coordinates in terms of generalized ones and their velocities."""
+        assembly, maximal = self.assembly, self.assembly.maximal
+        places, speeds = (group.expressions for group in to_maximal(assembly).outputs)
+        where: dict[Expression, Expression | float] = dict(zip(maximal.coordinates, places, strict=True))
+        where |= dict(zip(maximal.speeds, speeds, strict=True))
+        return substitute(substitute(list(values), where), self._turned)
+
+    @property
+    def _turned(self) -> Mapping[Expression, Expression]:
+        pairs = zip(self.found.equations.speeds, self.found.speeds, strict=True)
+        return {u: value for u, value in pairs if u is not value}
+
+    def on_speeds(self, values: Sequence[Expression]) -> list[Expression]:
+        """Return expressions of velocities in terms of the speeds that states have: angular ones in body axes."""
+        found = self.found
+        own = zip(found.velocities, found.moves, found.equations.speeds, strict=True)
+        rates = found.equations.rates
+        where = {v: rates[place] for v, place, u in own if v is not u and place is not None}
+        return substitute(list(values), where) if where else list(values)
+
+
+def _about_origin(r: Sequence[Expression], p: Sequence[Expression]) -> list[Expression]:
+    """Return r x p; in the plane x, z its component counter-clockwise as seen on the page."""
+    if len(r) == 3:
+        return [r[1] * p[2] - r[2] * p[1], r[2] * p[0] - r[0] * p[2], r[0] * p[1] - r[1] * p[0]]
+    return [r[0] * p[1] - r[1] * p[0]] if len(r) == 2 else []
+
+
+def _first_moments(
+    whole: Lagrangian, momentum: Sequence[Expression], free: Sequence[Attachment], parameters: Sequence[Expression]
+) -> list[Expression]:
+    """Return ``sum m r`` along each axis; nothing where momentum is not the sum of masses times velocities."""
+    found = []
+    for k, total in enumerate(momentum):
+        taken = affine_coefficients(total, [whole.velocities[one.speeds[k]] for one in free], parameters)
+        if taken is None or not taken[1].is_zero:
+            return []
+        places = [whole.coordinates[one.coordinates[k]] for one in free]
+        found.append(add_up([whole.graph.zero, *(m * r for m, r in zip(taken[0], places, strict=True))]))
+    return found

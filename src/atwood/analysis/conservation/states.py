@@ -1,0 +1,206 @@
+"""Quantities and their rates along the motion, at random states of a scene.
+
+States are consistent: constraints hold on positions and velocities, and the balance of forces gives the accelerations.
+What switches decide, and relations of time, is chosen at random, too (`atwood.analysis.freeing`), so that a push that
+comes later and a stop that nothing touches yet are not overlooked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from atwood.analysis.freeing import loosen
+from atwood.arrays import FloatArray
+from atwood.codegen import compile_program
+from atwood.errors import AtwoodError, SolveError
+from atwood.expr import Expression, OutputGroup, Program, vjp
+from atwood.expr.core.relations import Relation, TimeRelations
+from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
+from atwood.linalg.matrices import from_entries, to_array
+from atwood.simulation.dynamics.balance import BalanceValues, balance_of, solve_balance
+from atwood.simulation.dynamics.columns import mass_at
+from atwood.simulation.dynamics.orientation_coordinates import from_regular
+from atwood.simulation.dynamics.rank import independent_rows
+from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.initialization.start import find_start
+
+__all__ = ["RandomStates", "State"]
+
+_SEED = 19180726
+"""Of the random states: the same for every call, so that what is said of a scene does not change."""
+
+_REACHES = (1.0, 0.3, 0.1)
+"""How far states are from the start, in sizes of the scene and radians; nearer where constraints are not met there."""
+
+_MET = 1e-9
+"""Relative to the sizes of the scene: how well constraints hold at a state."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Quantities at one state.
+
+    Attributes
+    ----------
+    t, q, u
+        The state.
+    values
+        The quantities.
+    rates
+        Their derivatives by time along the motion.
+    terms
+        What these are sums of, in absolute value: rounding is relative to it.
+    generators
+        The displacements that they generate: speeds w with ``M w = dC/du`` that constraints let be, shape (quantities,
+        speeds).
+    """
+
+    t: float
+    q: FloatArray
+    u: FloatArray
+    values: FloatArray
+    rates: FloatArray
+    terms: FloatArray
+    generators: FloatArray
+
+
+class _Relations(TimeRelations):
+    """Relations of time without time itself: its smooth functions are what they are at the time of a state."""
+
+    def __init__(self, found: Sequence[Relation]) -> None:
+        self.found = list(found)
+
+    @property
+    def roots(self) -> tuple[Expression, ...]:
+        """The symbols of the relations."""
+        return tuple(one.symbol for one in self.found)
+
+
+class RandomStates:
+    """Quantities of a scene at random states.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    quantities
+        Expressions of time, generalized coordinates and speeds of the reduced form.
+    """
+
+    def __init__(self, assembly: Assembly, quantities: Sequence[Expression]) -> None:
+        self.assembly, self._count = assembly, len(quantities)
+        self._equations = e = assembly.reduced
+        self._balance = balance_of(assembly, "reduced")
+        by = [e.time, *e.coordinates, *e.speeds]
+        slopes = [entry for one in quantities for entry in vjp([one], [e.graph.one], by)]
+        own = self._balance.program
+        outputs = (
+            *own.program.outputs,
+            OutputGroup("rates", e.rates),
+            OutputGroup("quantities", tuple(quantities)),
+            OutputGroup("derivatives", tuple(slopes)),
+        )
+        program = Program(f"{assembly.flat.name} conserved", own.program.inputs, assembly.parameters, outputs)
+        moving = {*e.coordinates, *e.speeds}
+        self._free = loosen(program, _Relations(assembly.relations), moving)
+        self._kernel = compile_program(self._free.program)
+        self._probe = compile_program(self._free.probe)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether neither a relation of time nor a switch decides anything."""
+        return self._free.is_plain
+
+    def draw(self, count: int) -> list[State]:
+        """Return quantities at so many random states, fewer where laws have no value at most places.
+
+        Parameters
+        ----------
+        count
+            How many.
+
+        Raises
+        ------
+        StartError
+            If the scene has no consistent start.
+        """
+        start = find_start(self.assembly)
+        random = np.random.default_rng(_SEED)
+        sizes = motion_scales(self._equations, start.length)
+        q0 = from_regular(self.assembly, start.coordinates)
+        pace = self._pace(start.time, q0, start.speeds, sizes)
+        span = max(self.assembly.flat.t_end - start.time, 1.0 / pace)
+        found: list[State] = []
+        for trial in range(6 * count):
+            reach = _REACHES[trial * len(_REACHES) // (6 * count)]
+            t = start.time + span * float(random.uniform())
+            step = reach * sizes * random.uniform(-1.0, 1.0, len(sizes))
+            u = pace * sizes * random.uniform(-1.0, 1.0, len(sizes))
+            try:
+                q = self._balance.kinematic_map.moved(t, q0, step)
+                q, u = self._balance.project(t, q, u, sizes)
+                if self._is_met(t, q, u, sizes, pace):
+                    found.append(self._at(t, q, u, sizes, random, len(found)))
+            except (AtwoodError, ArithmeticError, np.linalg.LinAlgError):
+                continue
+            if len(found) == count:
+                break
+        return found
+
+    def _pace(self, t: float, q: FloatArray, u: FloatArray, sizes: FloatArray) -> float:
+        """Return how fast things happen, 1/s."""
+        try:
+            kept = self._kept(t, q, u, sizes)
+            a, _ = self._balance.accelerate(t, q, u, kept)
+        except (AtwoodError, ArithmeticError, np.linalg.LinAlgError):
+            a = np.zeros_like(u)
+        fast = [float(np.max(np.abs(u) / sizes, initial=0.0)), float(np.max(np.sqrt(np.abs(a) / sizes), initial=0.0))]
+        return max(fast) or 1.0
+
+    def _kept(self, t: float, q: FloatArray, u: FloatArray, sizes: FloatArray) -> np.ndarray | None:
+        """Return which constraints are independent; None for all of none."""
+        if not self._balance.constraints:
+            return None
+        jacobian = to_array(self._balance.constraints_at(t, q, u).jacobian)
+        return np.asarray(independent_rows(jacobian * sizes, self._balance.errors.of_jacobian(t, q, sizes)), dtype=int)
+
+    def _is_met(self, t: float, q: FloatArray, u: FloatArray, sizes: FloatArray, pace: float) -> bool:
+        if not self._balance.constraints:
+            return True
+        now = self._balance.constraints_at(t, q, u)
+        jacobian = to_array(now.jacobian)
+        rows = np.maximum(np.abs(jacobian) @ sizes, 1e-300)
+        rates = np.abs(jacobian @ u + now.explicit_rate)
+        off = np.max(np.abs(now.value) / rows, initial=0.0), np.max(rates / rows / pace, initial=0.0)
+        return bool(max(off) <= _MET)
+
+    def _at(
+        self, t: float, q: FloatArray, u: FloatArray, sizes: FloatArray, random: np.random.Generator, number: int
+    ) -> State:
+        known, n, own = self.assembly.parameter_values, len(u), self._balance.program
+        if not self._free.is_plain:
+            probed = self._probe.bind(known)([t], q, u)
+            known = np.concatenate([known, self._free.choose(probed, random, number)])
+        values = [np.asarray(one, dtype=float) for one in self._kernel.bind(known)([t], q, u)]
+        if not all(np.all(np.isfinite(one)) for one in values):
+            raise SolveError("a law has no value here", where=self.assembly.flat.name)
+        mass, bias, value, rate, gamma, entries, explicit_rate, rates, quantities, slopes = values
+        if own.mass_product is None:
+            matrix = from_entries(own.mass_rows, own.mass_columns, mass, (n, n), True)
+        else:
+            matrix = mass_at(self.assembly, "reduced", t, q, u)
+        jacobian = from_entries(own.jacobian_rows, own.jacobian_columns, entries, (own.constraints, n), True)
+        now = BalanceValues(matrix, bias, value, rate, gamma, jacobian, explicit_rate)
+        kept = self._kept(t, q, u, sizes)
+        a, _ = solve_balance(now, kept, t)
+        along = np.concatenate([[1.0], rates, a])
+        slopes = slopes.reshape(self._count, -1)
+        still = np.zeros_like(gamma)
+        flows = [solve_balance(replace(now, bias=-one, gamma=still), kept, t)[0] for one in slopes[:, -n:]]
+        return State(
+            t, q, u, quantities, slopes @ along, np.abs(slopes) @ np.abs(along), np.reshape(flows, (self._count, n))
+        )
