@@ -130,6 +130,32 @@ def test_a_source_against_a_resistance(domain: str, form: str, space: str) -> No
     assert result.energy.max_drift < 1e-7
 
 
+@pytest.mark.parametrize("domain", BOTH)
+def test_a_resistance_takes_a_constant_power_or_force_at_its_level(domain: str) -> None:
+    """``2 w' = -P/w`` gives ``w^2 = w0^2 - P t``, and ``2 w' = -c`` a straight line; below the limit both decay."""
+    drive = Drive(domain)
+    a, b, c = (drive.body(name, 2.0) for name in "abc")
+    drive.join("power", "resistance", a, power=3.0, smooth_below=0.5)
+    drive.join("dry", "resistance", b, constant=4.0, smooth_below=0.5)
+    drive.join("half", "resistance", c, constant=4.0, smooth_below=0.5, level=0.5)
+    for name in "abc":
+        drive.scene.start[f"{name}.{drive.rate}"] = 2.5
+    result = simulate(drive.scene, t_end=2.0, rtol=1e-10)
+    t = result.time
+
+    def straight(slope: float) -> np.ndarray:
+        """Return the speed under a constant deceleration, and its decay from 0.5 on."""
+        since = t - 2.0 / slope
+        return np.where(since < 0.0, 0.5 - slope * since, 0.5 * np.exp(-slope * np.maximum(since, 0.0) / 0.5))
+
+    late = (2.5**2 - 0.5**2) / 3.0
+    expected = np.where(t < late, np.sqrt(np.maximum(2.5**2 - 3.0 * t, 0.25)), 0.5 * np.exp(-6.0 * (t - late)))
+    assert_allclose(result[f"a.{drive.rate}"], expected, atol=1e-6)
+    assert_allclose(result[f"b.{drive.rate}"], straight(2.0), atol=1e-6)
+    assert_allclose(result[f"c.{drive.rate}"], straight(1.0), atol=1e-6)
+    assert result.energy.max_drift < 1e-6
+
+
 @pytest.mark.parametrize(("domain", "form", "space"), combinations())
 def test_a_source_between_two_bodies_follows_a_command(domain: str, form: str, space: str) -> None:
     drive = Drive(domain, space)

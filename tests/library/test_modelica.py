@@ -22,6 +22,8 @@ from scipy.linalg import expm
 from atwood import Result, simulate
 
 from ..references.modelica.building import Example
+from ..references.modelica.rotational import compare_braking_torque
+from ..references.modelica.translational import compare_braking_force
 
 ROOT = Path(__file__).parents[2]
 DOMAINS = ("elementary", "constraints", "loops", "rotors", "rotational", "translational")
@@ -107,6 +109,25 @@ def test_where_they_differ_most_the_exact_solution_is_met() -> None:
         place, speed = driven(np.full((1, 1), 1e4), np.full((1, 1), damping), np.ones(1), frequency, result.time[-1])
         assert result[f"{mass}.displacement"][-1] == pytest.approx(place - 0.5, abs=1e-10)
         assert result[f"{mass}.speed"][-1] == pytest.approx(speed, abs=1e-8)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize(
+    ("scene", "rate"), [(compare_braking_force(), "speed"), (compare_braking_torque(), "angular_velocity")]
+)
+def test_brakes_without_published_trajectories_meet_closed_forms(scene, rate: str, form: str) -> None:
+    """`CompareBrakingForce` and `CompareBrakingTorque`: from a speed of 100 at a deceleration of 100."""
+    times = np.array([0.1, 0.25, 0.4, 0.6, 0.9, 1.0])
+    result = simulate(scene, t_end=1.0, form=form, rtol=1e-9, outputs=times)
+    at = np.searchsorted(result.time, times)
+    exact = {
+        "sign": np.where(times < 0.99, 100.0 - 100.0 * times, np.exp(-100.0 * (times - 0.99))),
+        "linear": 100.0 * np.exp(-times),
+        "quadratic": 100.0 / (1.0 + times),
+        "inverse": 100.0 * np.sqrt(np.maximum(1.0 - 2.0 * times, 0.0)),
+    }
+    for name, speed in exact.items():
+        assert result[f"{name}.{rate}"][at] == pytest.approx(speed, abs=1e-4), name
 
 
 def test_each_example_has_figures_and_stands_in_the_table() -> None:

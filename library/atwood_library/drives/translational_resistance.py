@@ -1,20 +1,37 @@
-"""TranslationalResistance: a force against the speed, linear and quadratic in it."""
+"""TranslationalResistance: a force against the speed, as a function of it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from atwood import Component, CoordinateLoad, Scalar, Slide, connector, force, observable, parameter
+from atwood import Component, CoordinateLoad, Scalar, Slide, connector, force, observable, parameter, signal
 from atwood_library.interfaces.along_coordinates import between, push, resistance
 
 
 class TranslationalResistance(Component):
-    """A force against the speed of one displacement past another, or past the ground, linear and quadratic in it."""
+    """A force against the speed of one displacement past another, or past the ground, as a function of the speed v.
 
-    synonyms = ("LinearSpeedDependentForce", "QuadraticSpeedDependentForce")
+    It is ``level (linear v + quadratic v |v| + constant v/|v| + power/v)``. Below `smooth_below` the last two are
+    proportional to the speed, and meet there what they are above it: they slow down and hold nothing, as dry friction
+    would. The input `level` is a command or a load.
+    """
+
+    synonyms = (
+        "LinearSpeedDependentForce",
+        "QuadraticSpeedDependentForce",
+        "InverseSpeedDependentForce",
+        "SignForce",
+        "RollingResistance",
+    )
 
     linear: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of speed.")
     quadratic: float = parameter(0.0, unit="N*s^2/m^2", minimum=0.0, doc="Force for the square of a unit of speed.")
+    constant: float = parameter(0.0, unit="N", minimum=0.0, doc="Force at any speed.")
+    power: float = parameter(0.0, unit="W", minimum=0.0, doc="Power that is taken at any speed.")
+    smooth_below: float = parameter(
+        1e-3, unit="m/s", above=0.0, doc="Speed below which what does not vanish with the speed is proportional to it."
+    )
+    level: float = signal(1.0, doc="What all of it is multiplied by.")
     against: str = parameter("ground", choices=("flange", "ground"), doc="What it acts against.")
     a: Slide = connector(Slide, "The displacement that it acts against.", when={"against": ("flange",)})
     b: Slide = connector(Slide, "The displacement that it acts on.")
@@ -27,4 +44,4 @@ class TranslationalResistance(Component):
     @observable(unit="N", doc="Force against the speed.")
     def force(self) -> Scalar:
         """Return the force."""
-        return resistance(between(self)[1], self.linear, self.quadratic)
+        return resistance(self, between(self)[1])

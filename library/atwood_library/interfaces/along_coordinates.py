@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from atwood import CoordinateLoad, Scalar, maximum, minimum, select
+from atwood import CoordinateLoad, Scalar, is_zero, maximum, minimum, select
 
 __all__ = ["between", "gap_contact", "push", "resistance"]
 
@@ -37,9 +37,23 @@ def gap_contact(beyond: Scalar, rate: Scalar, damping: float, stiffness: float) 
     return maximum(minimum(damping * rate, spring), -spring)
 
 
-def resistance(rate: Scalar, linear: float, quadratic: float) -> Scalar:
-    """Return a force or a torque that grows with a rate and with its square, of the sign of the rate."""
-    return linear * rate + quadratic * rate * select(rate < 0.0, -rate, rate)
+def resistance(part: Any, rate: Scalar) -> Scalar:
+    """Return a force or a torque of the sign of a rate, as a function of the rate.
+
+    Parameters
+    ----------
+    part
+        A part with the parameters `linear`, `quadratic`, `constant`, `power` and `smooth_below`, and the input `level`.
+    rate
+        The rate.
+    """
+    total = part.linear * rate + part.quadratic * rate * select(rate < 0.0, -rate, rate)
+    limit = part.smooth_below
+    if not is_zero(part.constant):
+        total = total + part.constant * maximum(minimum(rate / limit, 1.0), -1.0)
+    if not is_zero(part.power):
+        total = total + part.power * rate / maximum(rate * rate, limit * limit)
+    return part.level * total
 
 
 def push(part: Any, value: Scalar) -> Iterator[CoordinateLoad]:

@@ -12,6 +12,7 @@ from atwood_library import (
     RackAndPinion,
     RotationalCoupling,
     RotationalGap,
+    RotationalResistance,
     RotationalSource,
     RotationalSpringDamper,
     Sine,
@@ -21,7 +22,7 @@ from atwood_library import (
 
 from .building import Example, Signal, made
 
-__all__ = ["EXAMPLES"]
+__all__ = ["EXAMPLES", "compare_braking_torque"]
 
 
 def first() -> Scene:
@@ -62,6 +63,21 @@ def backlash() -> Scene:
         },
         gravity=0.0,
     )  # fmt: skip
+
+
+def compare_braking_torque() -> Scene:
+    """Return four rotors that are slowed down, each by another law."""
+    laws = {
+        "sign": {"constant": 100.0, "smooth_below": 1.0},
+        "linear": {"linear": 1.0},
+        "quadratic": {"quadratic": 0.01},
+        "inverse": {"power": 1e4, "smooth_below": 1.0},
+    }
+    parts = {name: Inertia() for name in laws} | {
+        f"{name}_brake": RotationalResistance(**law) for name, law in laws.items()
+    }
+    start = {f"{name}.{what}": value for name in laws for what, value in (("angle", 0.0), ("angular_velocity", 100.0))}
+    return made(parts, ", ".join(f"{name}.flange - {name}_brake.b" for name in laws), start, gravity=0.0)
 
 
 def generation_of_fmus() -> Scene:

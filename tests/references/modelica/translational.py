@@ -6,23 +6,28 @@ that lengths are parts of the natural extensions.
 
 from __future__ import annotations
 
-from math import pi
+from collections.abc import Callable
+from math import atan, cos, pi, sin
 
-from atwood import Scene
+from atwood import Component, Scalar, Scene, select
 from atwood_library import (
+    Inertia,
     Mass1D,
+    RackAndPinion,
     Ramp,
+    RotationalSource,
     Sine,
     TranslationalCoupling,
     TranslationalGap,
     TranslationalMotion,
+    TranslationalResistance,
     TranslationalSource,
     TranslationalSpringDamper,
 )
 
 from .building import Example, Signal, made
 
-__all__ = ["EXAMPLES"]
+__all__ = ["EXAMPLES", "compare_braking_force"]
 
 
 def accelerate() -> Scene:
@@ -195,6 +200,67 @@ def sign_convention() -> Scene:
     return made({name: Mass1D() for name in names} | forces, joined, start, gravity=0.0)
 
 
+def compare_braking_force() -> Scene:
+    """Return four masses that are slowed down, each by another law."""
+    laws = {
+        "sign": {"constant": 100.0, "smooth_below": 1.0},
+        "linear": {"linear": 1.0},
+        "quadratic": {"quadratic": 0.01},
+        "inverse": {"power": 1e4, "smooth_below": 1.0},
+    }
+    parts = {name: Mass1D() for name in laws} | {
+        f"{name}_brake": TranslationalResistance(**law) for name, law in laws.items()
+    }
+    start = {f"{name}.{what}": value for name in laws for what, value in (("displacement", 0.0), ("speed", 100.0))}
+    return made(parts, ", ".join(f"{name}.slide - {name}_brake.b" for name in laws), start, gravity=0.0)
+
+
+def _steps(*levels: tuple[float, float]) -> Callable[[Scalar], Scalar]:
+    """Return a function of time that jumps: times and what it is from then on; zero before."""
+    before = (0.0, *(value for _, value in levels))
+
+    def value(t: Scalar) -> Scalar:
+        total: Scalar = 0.0
+        for (since, level), last in zip(levels, before, strict=False):
+            total = total + select(t < since, 0.0, level - last)
+        return total
+
+    return value
+
+
+def vehicle() -> Scene:
+    """Return a vehicle, and one with a trailer, on a road that rises for a while."""
+    gravity, mass, radius, slope = 9.80665, 100.0, 0.25, atan(0.05)
+    rolling = 0.01 * mass * gravity
+    nominal = (0.5 * 1.0 * 1.18 * (25.0 / 3.5) ** 2 / 2.0 + rolling) * radius
+    torque = [(5.0, 5.6), (10.8, 1.0), (20.0, 2.8), (25.0, 1.0), (50.0, -5.0), (55.0, 0.0)]
+    parts: dict[str, Component] = {"coupling": TranslationalCoupling()}
+    joined = "vehicle1.slide - coupling.a, trailer.slide - coupling.b\n"
+    for name, factor in (("vehicle", 1.0), ("vehicle1", 2.0), ("trailer", 0.0)):
+        parts |= {
+            name: Mass1D(mass=mass),
+            f"{name}_air": TranslationalResistance(quadratic=0.5 * 1.2 / 2.0),
+            f"{name}_road": TranslationalResistance(
+                constant=rolling, level=_steps((0.0, 1.0), (20.0, cos(slope)), (25.0, 1.0))
+            ),
+            f"{name}_hill": TranslationalSource(value=_steps((20.0, -mass * gravity * sin(slope)), (25.0, 0.0))),
+        }
+        joined += f"{name}.slide - {name}_air.b - {name}_road.b - {name}_hill.b\n"
+        if factor:
+            parts |= {
+                f"{name}_wheel": Inertia(moment=0.0),
+                f"{name}_rolling": RackAndPinion(radius=radius),
+                f"{name}_drive": RotationalSource(
+                    value=_steps(*((t, factor * nominal * level) for t, level in torque))
+                ),
+            }
+            joined += (
+                f"{name}_wheel.flange - {name}_rolling.pinion - {name}_drive.b, {name}.slide - {name}_rolling.rack\n"
+            )
+    start = {f"{name}.{what}": 0.0 for name in ("vehicle", "vehicle1") for what in ("displacement", "speed")}
+    return made(parts, joined, start, gravity=0.0)
+
+
 def why_arrows() -> Scene:
     """Return two masses on springs, whichever way their arrows point."""
     names = ("mass1", "mass2")
@@ -272,6 +338,7 @@ EXAMPLES = {
     ),
     "Sensors": Example(sensors, _moving("mass")),
     "SignConvention": Example(sign_convention, _moving("mass1", "mass2", "mass3")),
+    "Vehicle": Example(vehicle, _moving("vehicle", "vehicle1", "trailer")),
     "WhyArrows": Example(
         why_arrows, {**_moving("mass1"), "inertia2.s": "mass2.displacement", "inertia2.v": "mass2.speed"}
     ),
