@@ -83,7 +83,6 @@ LONG_FILES = {
     "model/declare/fields.py",
     "model/declare/laws.py",
     "model/local/laws.py",
-    "pipeline.py",
     "simulation/events/modes.py",
     "simulation/events/sampling.py",
     "simulation/problem/problem.py",

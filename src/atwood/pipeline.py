@@ -13,30 +13,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
-from atwood.consistency.check import check_laws, check_names
 from atwood.errors import StartError, UsageError
-from atwood.expr import Expression, Graph
-from atwood.expr.core.relations import TimeRelations
+from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import check_level
 from atwood.forms.places import to_maximal
-from atwood.forms.source import Kind, Source
-from atwood.forms.starting import with_places
-from atwood.mechanics.build import Mechanism, check_closures, make_gravity
-from atwood.mechanics.constraints.idle_spin import hold_idle_spins
-from atwood.mechanics.constraints.values import holds_velocities
-from atwood.mechanics.dynamics.carried_inertia import inertia_asked_for
-from atwood.mechanics.dynamics.inertia import check_tensors
-from atwood.mechanics.kinematics.orientation import body_offsets
+from atwood.forms.reassembly import modes_of
+from atwood.forms.source import Source
+from atwood.forms.starting import with_constants_of_start
+from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.compose.composite import Model
-from atwood.model.declare.carried_inertia import Carried
 from atwood.model.local.flatten import FlatScene, flatten
-from atwood.model.local.laws import LocalPart, ParameterTable, localize
-from atwood.model.values.space import Space, make_space
 from atwood.progress import told
 from atwood.result.result import Result
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
@@ -62,15 +53,9 @@ from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.run import Run, run, run_out_of_time
 from atwood.stages import stage, watching
 from atwood.tolerances import tolerances
-from atwood.topology.bodies import Bodies, find_bodies
-from atwood.topology.graph import MechanismGraph, build_graph
-from atwood.topology.line_signs import find_line_signs
 from atwood.topology.orientation_coordinates import Orientation, check_orientation
 
 __all__ = ["Assembly", "assemble", "assemble_flat", "assembly_of", "simulate"]
-
-LineSigns = Mapping[tuple[str, str, str], float]
-"""On a line, the sign of each length: of (part, one connector, the other)."""
 
 SCENE = instance("a scene, or an assembly of one", Model, Assembly)
 
@@ -116,7 +101,7 @@ def assemble(
     with stage("flatten"):
         flat, own = flatten(scene, name), scene.copy()
     made = assemble_flat(flat, form=form, level=level, orientation=orientation)
-    return replace(made, source=Source(_assemble_like, _find_places, own))
+    return replace(made, source=Source(_find_places, own))
 
 
 def assemble_flat(
@@ -143,20 +128,14 @@ def assemble_flat(
     """
     check_orientation(orientation, form, flat.space)
     check_level(level, form)
-    all_modes = {
-        path: str(part.values.get(part.component.mode_parameter, part.component.modes[0]))
-        for path, part in flat.parts.items()
-        if part.component.modes
-    }
-    all_modes.update(modes or {})
+    all_modes = modes_of(flat) | dict(modes or {})
     with stage("mechanism"):
         mechanism = read_mechanism(flat, all_modes, line_signs)
     chosen: Any = form
     level = level if form == "dae" else ""
-    source, orientation_coordinates = Source(_assemble_like, _find_places), Orientation(orientation)
+    source, orientation_coordinates = Source(_find_places), Orientation(orientation)
     made = Assembly(flat, mechanism, chosen, level, all_modes, source, orientation=orientation_coordinates)
-    # Where parts have modes, another mode could begin with other constants, and everything stays as it is.
-    return made if all_modes or not holds_velocities(mechanism) else with_places(made, _find_places(made))
+    return with_constants_of_start(made)
 
 
 def _find_places(assembly: Assembly) -> dict[str, dict[Expression, float]]:
@@ -169,100 +148,6 @@ def _find_places(assembly: Assembly) -> dict[str, dict[Expression, float]]:
         "reduced": {**time, **dict(zip(reduced.coordinates, start.coordinates.tolist(), strict=True))},
         "dae": {**time, **dict(zip(maximal.coordinates, (float(x) for x in q), strict=True))},
     }
-
-
-def _assemble_like(
-    flat: FlatScene,
-    like: Kind,
-    modes: Mapping[str, str] | None = None,
-    line_signs: LineSigns | None = None,
-) -> Assembly:
-    kind, level = like.orientation.kind, like.level or "ggl"
-    return assemble_flat(flat, form=like.form, level=level, orientation=kind, modes=modes, line_signs=line_signs)
-
-
-def read_mechanism(flat: FlatScene, modes: Mapping[str, str], known_line_signs: LineSigns | None = None) -> Mechanism:
-    """Read the laws of all parts and find nodes, joints and bodies.
-
-    Parameters
-    ----------
-    flat
-        The scene.
-    modes
-        Mode of each part that has modes.
-    known_line_signs
-        On a line, the sign of lengths, where it is known already.
-
-    Raises
-    ------
-    TopologyError
-        If rigid parts contradict each other.
-    """
-    ground = _lay_ground(flat)
-    space = ground.space
-    check_names(flat.parts)
-    found = _read_laws(flat, modes, ground, known_line_signs)
-    check_laws(flat.parts, space)
-    line_signs = known_line_signs if space.name == "line" else None
-    if space.name == "line" and not known_line_signs:  # lengths are signed by where their ends are, which bodies say
-        line_signs = _find_line_signs(flat, ground, found)
-        found = _read_laws(flat, modes, ground, line_signs)
-    if any(local.asks for local in found.locals_.values()):  # laws that read the inertia of the body they are on
-        carried = inertia_asked_for(found.network, found.bodies, found.locals_, space)
-        found = _read_laws(flat, modes, ground, line_signs, carried)
-    gravity = make_gravity(ground.table, flat.gravity, flat.gravity_direction)
-    told = None if known_line_signs else line_signs
-    parts = ground.table, ground.time, space, gravity, *found, flat.links, told
-    mechanism = Mechanism(*parts, t_start=flat.t_start)
-    check_closures(mechanism)
-    check_tensors(mechanism.locals_, ground.table.values, space)
-    return hold_idle_spins(mechanism)
-
-
-class _Ground(NamedTuple):
-    """What laws are written with."""
-
-    time: Expression
-    space: Space
-    table: ParameterTable
-    relations: TimeRelations
-
-
-class _Reading(NamedTuple):
-    """The laws of all parts on symbols of their own, and the nodes and bodies that they make."""
-
-    locals_: Mapping[str, LocalPart]
-    network: MechanismGraph
-    bodies: Bodies
-
-
-def _lay_ground(flat: FlatScene) -> _Ground:
-    graph = Graph()
-    time = graph.symbol("t")
-    graph.relations = relations = TimeRelations(time)
-    space = make_space(flat.space, flat.line_axis)
-    return _Ground(time, space, ParameterTable(graph, space=space.name), relations)
-
-
-def _read_laws(
-    flat: FlatScene,
-    modes: Mapping[str, str],
-    ground: _Ground,
-    line_signs: LineSigns | None = None,
-    carried: Mapping[tuple[str, str], Carried] | None = None,
-) -> _Reading:
-    """Read all laws, with the signs of lengths and the inertia that they may ask for."""
-    with ground.relations.reading():
-        locals_ = localize(flat, ground.space, ground.time, ground.table, modes, line_signs, carried)
-    network = build_graph(flat, locals_)
-    return _Reading(locals_, network, find_bodies(network, locals_))
-
-
-def _find_line_signs(flat: FlatScene, ground: _Ground, found: _Reading) -> LineSigns:
-    """Return the signs of lengths on a line, as far as start values tell."""
-    locals_, network, bodies = found
-    offsets = {body.index: body_offsets(body, ground.space)[0] for body in bodies.bodies}
-    return find_line_signs(flat, network, bodies, locals_, offsets, ground.table.values, ground.space)
 
 
 def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str | None) -> Assembly:

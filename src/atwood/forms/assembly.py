@@ -28,17 +28,18 @@ from atwood.forms.program import (
     rates_program,
     state_groups,
 )
+from atwood.forms.reassembly import follow, other_mode, with_flat
 from atwood.forms.reduced import reduced_form
 from atwood.forms.restoring import recipe
 from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
 from atwood.forms.source import Source, no_start_quantity
-from atwood.forms.starting import moved_to
 from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism, build_equations
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import discrete_states_of
 from atwood.mechanics.outputs.observables import Observable, Reaction, energies, list_reactions
 from atwood.mechanics.outputs.reading import observe
+from atwood.mechanics.read import LineSigns
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.model.local.parts import DiscreteState
 from atwood.model.local.states import declared_starts
@@ -61,7 +62,6 @@ _BY_HAND = 12
 # What all assemblies of one structure share.
 _ROWS: Key[tuple[Expression, ...]] = Key("equations of motion as by hand")
 _DISCRETE_STATES: Key[tuple[DiscreteState, ...]] = Key("discrete states")
-_OTHER_MODE: Key[Assembly] = Key("the scene in another mode")
 _FORM: Key[FormProgram] = Key("programs of the form")
 _BALANCE: Key[BalanceProgram] = Key("balance of forces")
 _RATES: Key[RatesProgram] = Key("rates of the coordinates")
@@ -307,66 +307,18 @@ class Assembly:
         return replace(self, given_values=rows)
 
     def with_flat(self, flat: FlatScene, source: Source | None = None) -> Assembly:
-        """Return the assembly of a scene with other values: with the same programs if it has the same structure.
-
-        Parameters
-        ----------
-        flat
-            The scene, taken apart.
-        source
-            Where it comes from.
-        """
-        source = source or self.source
-        found, reason = self.follow(flat, source)
-        if found is not None:
-            return found
-        if source is None:
-            raise UsageError(f"its structure changes: {reason}", where=flat.name, advice="Assemble it anew.")
-        return replace(source.assemble(flat, self), source=source, why_new=reason)
+        """Return the assembly of a scene with other values; see `atwood.forms.reassembly.with_flat`."""
+        return with_flat(self, flat, source)
 
     def follow(self, flat: FlatScene, source: Source | None = None) -> tuple[Assembly | None, str]:
-        """Return the assembly of a scene with other values, with the same programs; None, and why, if it needs others.
-
-        Parameters
-        ----------
-        flat, source
-            See `with_flat`.
-        """
-        mechanism, reason = moved_to(self, flat)
-        if mechanism is None:
-            return None, reason
-        fresh: dict[str, Any] = {"source": source, "why_new": "", "given_relations": None, "held": None}
-        return replace(self, flat=flat, mechanism=mechanism, **fresh), ""
+        """Return the same for values that keep the structure; see `atwood.forms.reassembly.follow`."""
+        return follow(self, flat, source)
 
     def other_mode(
-        self,
-        modes: Mapping[str, str],
-        line_signs: Mapping[tuple[str, str, str], float],
-        orientation: Orientation | None = None,
+        self, modes: Mapping[str, str], line_signs: LineSigns, orientation: Orientation | None = None
     ) -> Assembly:
-        """Return the scene in other modes, with lengths on a line signed as given; what was made before is used again.
-
-        Parameters
-        ----------
-        modes, line_signs
-            Mode of each part that has modes; on a line, the sign of lengths.
-        orientation
-            In which coordinates orientations are; the same if not given.
-        """
-        if self.source is None:
-            raise UsageError("it was assembled from leaves, so that it has no other modes", where=self.flat.name)
-        source, orientation_coordinates = self.source, orientation or self.orientation
-
-        def make() -> Assembly:
-            made = source.assemble(self.flat, self, modes, line_signs)
-            return replace(made, source=source, shared=Shared(self.shared.family), orientation=orientation_coordinates)
-
-        about = tuple(sorted(modes.items())), tuple(sorted(line_signs.items())), orientation_coordinates
-        known = self.shared.family.get(_OTHER_MODE, make, *about)
-        mechanism, _ = moved_to(known, self.flat)
-        if mechanism is None:
-            return make()
-        return replace(known, flat=self.flat, mechanism=mechanism, source=source, why_new="")
+        """Return the scene in other modes; see `atwood.forms.reassembly.other_mode`."""
+        return other_mode(self, modes, line_signs, orientation)
 
     # -- programs -------------------------------------------------------------------------------------------------
 

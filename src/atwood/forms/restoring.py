@@ -14,25 +14,17 @@ from atwood.errors import UsageError
 from atwood.forms.kept import Key
 from atwood.forms.shared import Shared
 from atwood.forms.source import Source
+from atwood.forms.starting import with_constants_of_start
+from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.local.flatten import FlatScene
 from atwood.topology.orientation_coordinates import Orientation
 
 if TYPE_CHECKING:
-    from atwood.forms.assembly import Assembly
+    from atwood.forms.assembly import Assembly, FormName
 
 __all__ = ["recipe"]
 
 _RESTORED: Key[Assembly] = Key("the first assembly of a pickle")
-
-Signs = Mapping[tuple[str, str, str], float]
-
-
-class _Kind(NamedTuple):
-    """In which form a scene is assembled."""
-
-    form: str
-    level: str
-    orientation: Orientation
 
 
 class _Recipe(NamedTuple):
@@ -40,21 +32,26 @@ class _Recipe(NamedTuple):
 
     Attributes
     ----------
-    flat, source, kind
-        The scene, how it is assembled, and in which form.
+    kind
+        The class of assemblies.
+    flat, source, form, level, orientation
+        The scene, where it comes from, and in which form it is.
     modes, line_signs
-        See `atwood.forms.source.Assemble`; no line_signs where the start tells them.
+        Mode of each part that has modes; on a line, the sign of lengths, None where the start tells them.
     relations, held, why_new
         See `Assembly.given_relations`, `Assembly.held` and `Assembly.why_new`.
     coordinates
         Names of the coordinates, which must come out again.
     """
 
+    kind: type[Assembly]
     flat: FlatScene
     source: Source
-    kind: _Kind
+    form: FormName
+    level: str
+    orientation: Orientation
     modes: Mapping[str, str]
-    line_signs: Signs | None
+    line_signs: LineSigns | None
     relations: tuple[float, ...] | None
     held: tuple[float, ...] | None
     why_new: str
@@ -76,15 +73,18 @@ def recipe(assembly: Assembly) -> tuple[Callable[..., Assembly], tuple[Shared, _
     """
     if assembly.source is None:
         raise UsageError("it was assembled from leaves and cannot be pickled", where=assembly.flat.name)
-    mechanism, kind = assembly.mechanism, _Kind(assembly.form, assembly.level, assembly.orientation)
+    mechanism = assembly.mechanism
     line_signs: dict[tuple[str, str, str], float] | None = None
     if mechanism.space.name == "line" and mechanism.line_signs is None:  # they come from a start that has been found
         known = {path: local.binding.line_signs or {} for path, local in mechanism.locals_.items()}
         line_signs = {(path, *pair): sign for path, pairs in known.items() for pair, sign in pairs.items()}
     parts = (
+        type(assembly),
         assembly.flat,
         assembly.source,
-        kind,
+        assembly.form,
+        assembly.level,
+        assembly.orientation,
         assembly.modes,
         line_signs,
         assembly.given_relations,
@@ -117,8 +117,8 @@ def _restored(shared: Shared, made_from: _Recipe) -> Assembly:
 
 
 def _assembled(made_from: _Recipe) -> Assembly:
-    flat, source, kind, modes, line_signs, *_ = made_from
-    made = replace(source.assemble(flat, kind, modes, line_signs), source=source)
-    if made.orientation == kind.orientation:
-        return made
-    return made.other_mode(modes, line_signs or {}, kind.orientation)
+    kind, flat, source, form, level, orientation, modes, line_signs, *_ = made_from
+    mechanism = read_mechanism(flat, modes, line_signs)
+    first = kind(flat, mechanism, form, level, modes, source, orientation=Orientation(orientation.kind))
+    made = with_constants_of_start(first)
+    return made if made.orientation == orientation else made.other_mode(modes, line_signs or {}, orientation)

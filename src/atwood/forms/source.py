@@ -1,53 +1,25 @@
-"""Where an assembly comes from: its scene, and how scenes are assembled."""
+"""Where an assembly comes from: its scene, and what finds its start."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from atwood.errors import StartError, UsageError, suggestion, suggestion_in_parts
 from atwood.expr import Expression
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene
-from atwood.model.local.flatten import FlatScene
-from atwood.topology.orientation_coordinates import Orientation
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
     from atwood.mechanics.outputs.observables import Observable
 
-__all__ = ["Assemble", "Kind", "Source", "no_start_quantity"]
+__all__ = ["Places", "Source", "no_start_quantity"]
 
 
-class Kind(Protocol):
-    """In which form a scene is assembled; an `Assembly` says it of itself."""
-
-    @property
-    def form(self) -> str:
-        """``"reduced"`` or ``"dae"``."""
-
-    @property
-    def level(self) -> str:
-        """Level of the dae form; empty for the reduced form."""
-
-    @property
-    def orientation(self) -> Orientation:
-        """In which coordinates the reduced form has orientations in space."""
-
-
-class Assemble(Protocol):
-    """Assembles a scene that was taken apart, in the form of another assembly."""
-
-    def __call__(
-        self,
-        flat: FlatScene,
-        like: Kind,
-        modes: Mapping[str, str] | None = None,
-        line_signs: Mapping[tuple[str, str, str], float] | None = None,
-    ) -> Assembly:
-        """Return the assembly."""
-        ...
+Places = Mapping[str, Mapping[Expression, float]]
+"""Where a scene starts, by form and by the symbols of its coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,16 +28,14 @@ class Source:
 
     Attributes
     ----------
-    assemble
-        How scenes are assembled.
-    places
-        Gives where a scene starts, as `atwood.mechanics.kinematics.mechanism.Mechanism` has it.
+    find_places
+        Finds where a scene starts. Constants of integration have their values from there, and so do equations with
+        such constants; starts are found with equations, in rooms above this one.
     scene
         A copy of the scene, which nobody else changes; None if there were only its leaves.
     """
 
-    assemble: Assemble
-    places: Callable[[Assembly], Mapping[str, Mapping[Expression, float]]]
+    find_places: Callable[[Assembly], Places]
     scene: Model | None = None
 
     def changed(self, values: Mapping[str, Any], start: Mapping[str, Any], guess: Mapping[str, Any]) -> Model:

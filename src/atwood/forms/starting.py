@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from atwood.expr import Expression
 from atwood.forms.kept import Key
 from atwood.forms.shared import DECIDED, Shared, decided_alike, with_values_of
+from atwood.mechanics.constraints.values import holds_velocities
 from atwood.mechanics.kinematics.mechanism import Mechanism, started_at
 from atwood.model.local.flatten import FlatScene
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = ["moved_to", "starting", "with_places"]
+__all__ = ["moved_to", "starting", "with_constants_of_start"]
 
 _STARTING: Key[Shared] = Key("what the scene shares as its start is found")
 
@@ -38,17 +37,19 @@ def starting(assembly: Assembly) -> Assembly:
     return replace(assembly, mechanism=before, source=None, why_new="", shared=shared)
 
 
-def with_places(assembly: Assembly, places: Mapping[str, Mapping[Expression, float]]) -> Assembly:
-    """Return a scene with what its start makes of its constraints on velocities.
+def with_constants_of_start(assembly: Assembly) -> Assembly:
+    """Return a scene with what its start makes of its constraints on velocities: some are integrals with a constant.
+
+    Where parts have modes, another mode could begin with other constants, and everything stays as it is.
 
     Parameters
     ----------
     assembly
-        The scene as its start was found.
-    places
-        See `atwood.mechanics.kinematics.mechanism.Mechanism`.
+        The scene as its start is found; it is returned itself where nothing depends on the start.
     """
-    shared = _beside(assembly.shared)
+    if assembly.modes or assembly.source is None or not holds_velocities(assembly.mechanism):
+        return assembly
+    places, shared = assembly.source.find_places(assembly), _beside(assembly.shared)
     shared.get(_STARTING, lambda: assembly.shared)
     made = replace(assembly, mechanism=replace(assembly.mechanism, places=places), shared=shared)
     constants = {**made.reduced.constants, **made.maximal.constants}
@@ -93,7 +94,7 @@ def moved_to(assembly: Assembly, flat: FlatScene) -> tuple[Mechanism | None, str
         if assembly.source is None:
             return None, "the start gives constants of integration"
         there = replace(before, flat=flat, mechanism=mechanism, given_relations=None)
-        places = assembly.source.places(there)
+        places = assembly.source.find_places(there)
     assert places is not None
     values = {**own.table.values, **mechanism.table.values}
     made = replace(own, table=replace(own.table, values=values), locals_=mechanism.locals_)

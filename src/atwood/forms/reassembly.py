@@ -1,0 +1,128 @@
+"""The assembly of a scene with other values, in other modes or in other coordinates, from one that there is.
+
+What keeps the structure goes on with the same equations, programs and code; anything else is assembled anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from atwood.errors import UsageError
+from atwood.forms.kept import Key
+from atwood.forms.shared import Shared
+from atwood.forms.source import Source
+from atwood.forms.starting import moved_to, with_constants_of_start
+from atwood.mechanics.read import LineSigns, read_mechanism
+from atwood.model.local.flatten import FlatScene
+from atwood.stages import stage
+from atwood.topology.orientation_coordinates import Orientation
+
+if TYPE_CHECKING:
+    from atwood.forms.assembly import Assembly
+
+__all__ = ["assembled_anew", "follow", "modes_of", "other_mode", "with_flat"]
+
+_OTHER_MODE: Key[Assembly] = Key("the scene in another mode")
+
+_FRESH: dict[str, Any] = {"why_new": "", "given_relations": None, "held": None}
+"""What other values start with: the relations and discrete states that hold at their start."""
+
+
+def modes_of(flat: FlatScene) -> dict[str, str]:
+    """Return the mode in which each part that has modes begins."""
+    return {
+        path: str(part.values.get(part.component.mode_parameter, part.component.modes[0]))
+        for path, part in flat.parts.items()
+        if part.component.modes
+    }
+
+
+def assembled_anew(
+    assembly: Assembly, flat: FlatScene, modes: Mapping[str, str] | None = None, line_signs: LineSigns | None = None
+) -> Assembly:
+    """Return a scene assembled in the form and the coordinates of another, with equations of its own.
+
+    Parameters
+    ----------
+    assembly
+        The other.
+    flat
+        The scene, taken apart.
+    modes, line_signs
+        Mode of each part that has modes, the one it begins in where none is given; on a line, the sign of lengths.
+    """
+    all_modes = modes_of(flat) | dict(modes or {})
+    with stage("mechanism"):
+        mechanism = read_mechanism(flat, all_modes, line_signs)
+    fresh = {**_FRESH, "given_values": None, "shared": Shared(), "orientation": Orientation(assembly.orientation.kind)}
+    return with_constants_of_start(replace(assembly, flat=flat, mechanism=mechanism, modes=all_modes, **fresh))
+
+
+def with_flat(assembly: Assembly, flat: FlatScene, source: Source | None = None) -> Assembly:
+    """Return the assembly of a scene with other values: with the same programs if it has the same structure.
+
+    Parameters
+    ----------
+    assembly
+        An assembly of the scene.
+    flat
+        The scene with the other values, taken apart.
+    source
+        Where it comes from; where the assembly comes from if not given.
+    """
+    source = source or assembly.source
+    found, reason = follow(assembly, flat, source)
+    if found is not None:
+        return found
+    if source is None:
+        raise UsageError(f"its structure changes: {reason}", where=flat.name, advice="Assemble it anew.")
+    return replace(assembled_anew(replace(assembly, source=source), flat), why_new=reason)
+
+
+def follow(assembly: Assembly, flat: FlatScene, source: Source | None = None) -> tuple[Assembly | None, str]:
+    """Return the assembly of a scene with other values, with the same programs; None, and why, if it needs others.
+
+    Parameters
+    ----------
+    assembly, flat, source
+        See `with_flat`.
+    """
+    mechanism, reason = moved_to(assembly, flat)
+    if mechanism is None:
+        return None, reason
+    return replace(assembly, flat=flat, mechanism=mechanism, source=source, **_FRESH), ""
+
+
+def other_mode(
+    assembly: Assembly,
+    modes: Mapping[str, str],
+    line_signs: LineSigns,
+    orientation: Orientation | None = None,
+) -> Assembly:
+    """Return a scene in other modes, with lengths on a line signed as given; what was made before is used again.
+
+    Parameters
+    ----------
+    assembly
+        An assembly of the scene.
+    modes, line_signs
+        Mode of each part that has modes; on a line, the sign of lengths.
+    orientation
+        In which coordinates orientations are; the same if not given.
+    """
+    if assembly.source is None:
+        raise UsageError("it was assembled from leaves, so that it has no other modes", where=assembly.flat.name)
+    coordinates = orientation or assembly.orientation
+
+    def make() -> Assembly:
+        made = assembled_anew(assembly, assembly.flat, modes, line_signs)
+        return replace(made, shared=Shared(assembly.shared.family), orientation=coordinates)
+
+    about = tuple(sorted(modes.items())), tuple(sorted(line_signs.items())), coordinates
+    known = assembly.shared.family.get(_OTHER_MODE, make, *about)
+    mechanism, _ = moved_to(known, assembly.flat)
+    if mechanism is None:
+        return make()
+    return replace(known, flat=assembly.flat, mechanism=mechanism, source=assembly.source, why_new="")

@@ -1,0 +1,111 @@
+"""From a scene taken apart into leaves to its mechanism: the laws of all parts, and the joints and bodies they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from atwood.consistency.check import check_laws, check_names
+from atwood.expr import Expression, Graph
+from atwood.expr.core.relations import TimeRelations
+from atwood.mechanics.constraints.idle_spin import hold_idle_spins
+from atwood.mechanics.dynamics.carried_inertia import inertia_asked_for
+from atwood.mechanics.dynamics.inertia import check_tensors
+from atwood.mechanics.kinematics.mechanism import Mechanism, check_closures, make_gravity
+from atwood.mechanics.kinematics.orientation import body_offsets
+from atwood.model.declare.carried_inertia import Carried
+from atwood.model.local.flatten import FlatScene
+from atwood.model.local.laws import LocalPart, ParameterTable, localize
+from atwood.model.values.space import Space, make_space
+from atwood.topology.bodies import Bodies, find_bodies
+from atwood.topology.graph import MechanismGraph, build_graph
+from atwood.topology.line_signs import find_line_signs
+
+__all__ = ["LineSigns", "read_mechanism"]
+
+LineSigns = Mapping[tuple[str, str, str], float]
+"""On a line, the sign of each length: of (part, one connector, the other)."""
+
+
+def read_mechanism(flat: FlatScene, modes: Mapping[str, str], known_line_signs: LineSigns | None = None) -> Mechanism:
+    """Read the laws of all parts and find nodes, joints and bodies.
+
+    Parameters
+    ----------
+    flat
+        The scene.
+    modes
+        Mode of each part that has modes.
+    known_line_signs
+        On a line, the sign of lengths, where it is known already.
+
+    Raises
+    ------
+    TopologyError
+        If rigid parts contradict each other.
+    """
+    ground = _lay_ground(flat)
+    space = ground.space
+    check_names(flat.parts)
+    found = _read_laws(flat, modes, ground, known_line_signs)
+    check_laws(flat.parts, space)
+    line_signs = known_line_signs if space.name == "line" else None
+    if space.name == "line" and not known_line_signs:  # lengths are signed by where their ends are, which bodies say
+        line_signs = _find_line_signs(flat, ground, found)
+        found = _read_laws(flat, modes, ground, line_signs)
+    if any(local.asks for local in found.locals_.values()):  # laws that read the inertia of the body they are on
+        carried = inertia_asked_for(found.network, found.bodies, found.locals_, space)
+        found = _read_laws(flat, modes, ground, line_signs, carried)
+    gravity = make_gravity(ground.table, flat.gravity, flat.gravity_direction)
+    told = None if known_line_signs else line_signs
+    parts = ground.table, ground.time, space, gravity, *found, flat.links, told
+    mechanism = Mechanism(*parts, t_start=flat.t_start)
+    check_closures(mechanism)
+    check_tensors(mechanism.locals_, ground.table.values, space)
+    return hold_idle_spins(mechanism)
+
+
+class _Ground(NamedTuple):
+    """What laws are written with."""
+
+    time: Expression
+    space: Space
+    table: ParameterTable
+    relations: TimeRelations
+
+
+class _Reading(NamedTuple):
+    """The laws of all parts on symbols of their own, and the nodes and bodies that they make."""
+
+    locals_: Mapping[str, LocalPart]
+    network: MechanismGraph
+    bodies: Bodies
+
+
+def _lay_ground(flat: FlatScene) -> _Ground:
+    graph = Graph()
+    time = graph.symbol("t")
+    graph.relations = relations = TimeRelations(time)
+    space = make_space(flat.space, flat.line_axis)
+    return _Ground(time, space, ParameterTable(graph, space=space.name), relations)
+
+
+def _read_laws(
+    flat: FlatScene,
+    modes: Mapping[str, str],
+    ground: _Ground,
+    line_signs: LineSigns | None = None,
+    carried: Mapping[tuple[str, str], Carried] | None = None,
+) -> _Reading:
+    """Read all laws, with the signs of lengths and the inertia that they may ask for."""
+    with ground.relations.reading():
+        locals_ = localize(flat, ground.space, ground.time, ground.table, modes, line_signs, carried)
+    network = build_graph(flat, locals_)
+    return _Reading(locals_, network, find_bodies(network, locals_))
+
+
+def _find_line_signs(flat: FlatScene, ground: _Ground, found: _Reading) -> LineSigns:
+    """Return the signs of lengths on a line, as far as start values tell."""
+    locals_, network, bodies = found
+    offsets = {body.index: body_offsets(body, ground.space)[0] for body in bodies.bodies}
+    return find_line_signs(flat, network, bodies, locals_, offsets, ground.table.values, ground.space)
