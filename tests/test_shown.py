@@ -16,7 +16,7 @@ import atwood.study
 from atwood.result.trajectories import Group
 from atwood.showing import LINES, WIDTH, fitted, html_table
 from atwood_library import Ground, PointMass, Rod
-from atwood_library.scenes import Chain, DoublePendulum, FourBar, HeavyTop
+from atwood_library.scenes import Chain, DoublePendulum, FourBar, HeavyTop, SimplePendulum
 
 FACADES = (atwood, atwood.checking, atwood.plotting, atwood.reporting, atwood.solids, atwood.study)
 PUBLIC = {one for room in FACADES for one in (getattr(room, name) for name in room.__all__) if isinstance(one, type)}
@@ -90,6 +90,7 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "hamiltonian": atwood.hamiltonian(DoublePendulum()),
         "tangent flow": atwood.tangent_flow(DoublePendulum(), t_end=0.2, outputs=2),
         "exponents": atwood.lyapunov_exponents(DoublePendulum(), t_end=0.5),
+        "portrait": atwood.phase_portrait(SimplePendulum(), speeds=(-1.0, 1.0)),
         "section": atwood.poincare_section(DoublePendulum(), "rod1.angle crosses 0", ["rod2.angle"]),
         "linear": atwood.linearize(scene, at=hanging, inputs=[], outputs=["bob[0].position.x"]),
         "dynamics": atwood.dynamics(scene),

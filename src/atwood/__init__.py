@@ -117,6 +117,7 @@ if TYPE_CHECKING:
     from atwood.plotting.drawing import animate, plot_mechanism
     from atwood.plotting.mode_shapes import plot_mode
     from atwood.plotting.plots.linear import plot_bode, plot_branches, plot_nyquist, plot_root_locus
+    from atwood.plotting.plots.phase import plot_phase_portrait, plot_section
     from atwood.plotting.plots.precision import plot_comparison
     from atwood.plotting.plots.quantities import plot
     from atwood.plotting.plots.sweep import plot_sweep
@@ -130,9 +131,12 @@ if TYPE_CHECKING:
     from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
     from atwood.theory.flow import (
         LyapunovExponents,
+        PhasePortrait,
         PoincareSection,
+        RestPoint,
         TangentFlow,
         lyapunov_exponents,
+        phase_portrait,
         poincare_section,
         tangent_flow,
     )
@@ -206,7 +210,9 @@ __all__ += [
     "LyapunovExponents",
     "NormalModes",
     "PartOfEquations",
+    "PhasePortrait",
     "PoincareSection",
+    "RestPoint",
     "RootLocus",
     "Symmetry",
     "TangentFlow",
@@ -220,6 +226,7 @@ __all__ += [
     "linearize",
     "lyapunov_exponents",
     "normal_modes",
+    "phase_portrait",
     "poincare_section",
     "root_locus",
     "tangent_flow",
@@ -236,7 +243,9 @@ __all__ += [
     "plot_mechanism",
     "plot_mode",
     "plot_nyquist",
+    "plot_phase_portrait",
     "plot_root_locus",
+    "plot_section",
     "plot_sweep",
 ]
 
@@ -329,7 +338,9 @@ _LATER = {
     "MechanismReport": "atwood.reporting",
     "NormalModes": "atwood.theory.linearization",
     "PartOfEquations": "atwood.theory.equations",
+    "PhasePortrait": "atwood.theory.flow",
     "PoincareSection": "atwood.theory.flow",
+    "RestPoint": "atwood.theory.flow",
     "Result": "atwood.result.result",
     "RootLocus": "atwood.theory.linearization",
     "SavedResult": "atwood.result.files",
@@ -355,6 +366,7 @@ _LATER = {
     "load_sweep": "atwood.study",
     "lyapunov_exponents": "atwood.theory.flow",
     "normal_modes": "atwood.theory.linearization",
+    "phase_portrait": "atwood.theory.flow",
     "plot": "atwood.plotting",
     "plot_bode": "atwood.plotting.plots.linear",
     "plot_branches": "atwood.plotting.plots.linear",
@@ -362,7 +374,9 @@ _LATER = {
     "plot_mechanism": "atwood.plotting",
     "plot_mode": "atwood.plotting.mode_shapes",
     "plot_nyquist": "atwood.plotting.plots.linear",
+    "plot_phase_portrait": "atwood.plotting.plots.phase",
     "plot_root_locus": "atwood.plotting.plots.linear",
+    "plot_section": "atwood.plotting.plots.phase",
     "plot_sweep": "atwood.plotting",
     "poincare_section": "atwood.theory.flow",
     "report": "atwood.reporting",

@@ -50,3 +50,18 @@ def test_mistakes_are_answered(arguments: list[str], said: str) -> None:
     done = CliRunner().invoke(main, arguments)
     assert done.exit_code != 0
     assert said in done.output
+
+
+def test_phase_draws_and_tells_states_of_rest(tmp_path: Path) -> None:
+    picture = tmp_path / "phase.png"
+    found = run("phase", "simple-pendulum", "--coordinates", "-180:180deg", "--plot", str(picture))
+    assert "centre" in found
+    assert "saddle" in found
+    assert picture.stat().st_size > 10_000
+    data = json.loads(run("phase", "oscillators", "--set", "kind=inverted", "--json"))
+    assert [one["kind"] for one in data["rest_points"]] == ["saddle"]
+    assert len(data["separatrices"]) == 4
+    assert "at rest everywhere" in run("phase", "oscillators", "--set", "kind=free")
+    refused = CliRunner().invoke(main, ["phase", "simple-pendulum", "--speeds", "3"])
+    assert refused.exit_code != 0
+    assert "Write FROM:TO" in refused.output

@@ -67,6 +67,7 @@ def main() -> None:
     atwood equilibria pendulum-on-cart   where it can stay at rest, and whether it does
     atwood modes double-pendulum         frequencies and shapes of small oscillations
     atwood linearize pendulum-on-cart    its linear model, for control
+    atwood phase simple-pendulum         its motions over coordinate and speed
     atwood check my_parts.py             whether components of one's own are sound
     """  # noqa: D301 - click reads the backspace, not the two letters
 
@@ -362,6 +363,21 @@ def equilibria_command(scene: str, **options: Any) -> None:
     from atwood.cli.linear import show_equilibria
 
     show_equilibria(scene, **options)
+
+
+@main.command("phase", short_help="Draw the phase portrait of a scene.", epilog=_SCENE_HELP)
+@click.argument("scene")
+@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Parameter. Can be repeated.")
+@click.option("--coordinates", metavar="FROM:TO", help="Range of the coordinate, with units; chosen if not given.")
+@click.option("--speeds", metavar="FROM:TO", help="Range of its rate, with units; chosen if not given.")
+@click.option("--plot", type=_FILE, help="Where to save the picture (.png, .svg, .pdf).")
+@click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output.")
+@reporting_errors
+def phase_command(scene: str, **options: Any) -> None:
+    """Find the states of rest and the separatrices of SCENE, and draw its motions over coordinate and speed."""
+    from atwood.cli.phase import show_phase_portrait
+
+    show_phase_portrait(scene, **options)
 
 
 @main.command("check", short_help="Check components of one's own.")

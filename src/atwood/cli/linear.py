@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from atwood.cli.output import print_json, warn, writer
-from atwood.cli.scenes import pairs, prepare, warn_of_radians
+from atwood.cli.scenes import pairs, prepare, read_bounds, warn_of_radians
 from atwood.errors import UsageError
 
 if TYPE_CHECKING:
@@ -216,22 +216,4 @@ def _show_branches(
 
 
 def _region(region: Sequence[str]) -> dict[str, Any]:
-    bounds: dict[str, Any] = {}
-    for path, text in pairs(region, "--region"):
-        low, colon, high = text.partition(":")
-        if not colon:
-            raise UsageError(
-                f"{text!r} is no region", where=path, advice="Write --region PATH=FROM:TO, as rod.angle=-90deg:90deg."
-            )
-        unit = "".join(character for character in high if character.isalpha())
-        bounds[path] = (_number(low, unit), _number(high, unit))
-    return bounds
-
-
-def _number(text: str, unit: str) -> float | str:
-    """Return one end of a region: text where it has a unit, which the other end may lack."""
-    text = text.strip()
-    try:
-        return float(text) if not unit else f"{float(text)} {unit}"
-    except ValueError:
-        return text
+    return {path: read_bounds(text, path) for path, text in pairs(region, "--region")}

@@ -1,0 +1,332 @@
+"""`phase_portrait`: all motions of one degree of freedom in a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from atwood.analysis.dynamics import Dynamics
+from atwood.analysis.flow.plane_field import Field, Window, separatrices, spaced_curves
+from atwood.arguments import Kind, optional, takes
+from atwood.arrays import FloatArray
+from atwood.errors import UsageError
+from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
+from atwood.model.compose.composite import Model
+from atwood.model.values.units import parse_quantity, parse_unit
+from atwood.pipeline import SCENE, assemble
+from atwood.showing import count_of, fitted
+from atwood.simulation.dynamics.scales import scene_length
+from atwood.simulation.events.modes import find_event_functions
+
+__all__ = ["PhasePortrait", "RestPoint", "phase_portrait"]
+
+_LOOKS = 2001
+"""Points of rest are looked for between so many coordinates."""
+
+_NOTHING = 1e-10
+"""Relative to the largest: accelerations and rates below are zero, to what a scene is evaluated."""
+
+
+@dataclass(frozen=True)
+class RestPoint:
+    """A state of rest.
+
+    Attributes
+    ----------
+    coordinate
+        Where, m or rad.
+    kind
+        ``"centre"``, ``"saddle"``, ``"stable focus"``, ``"unstable focus"``, ``"stable node"``, ``"unstable node"`` or
+        ``"degenerate"``.
+    eigenvalues
+        Of the linear equations there, 1/s.
+    """
+
+    coordinate: float
+    kind: str
+    eigenvalues: tuple[complex, complex]
+
+
+@dataclass(frozen=True, eq=False)
+class PhasePortrait:
+    """The motions of a scene with one degree of freedom, as curves over coordinate and speed.
+
+    Attributes
+    ----------
+    coordinate, speed
+        Names of both.
+    units
+        Of coordinate and speed.
+    window
+        Their ranges.
+    rest_points
+        States of rest in the window, ascending.
+    everywhere_at_rest
+        Whether every coordinate is a state of rest, as of a free particle.
+    curves
+        Motions, each of shape (points, 2), in the direction in which they are run through.
+    separatrices
+        Those into and out of saddles.
+    scene
+        Name of the scene.
+    """
+
+    coordinate: str
+    speed: str
+    units: tuple[str, str]
+    window: Window
+    rest_points: tuple[RestPoint, ...]
+    everywhere_at_rest: bool
+    curves: tuple[FloatArray, ...]
+    separatrices: tuple[FloatArray, ...]
+    scene: str
+
+    def to_data(self) -> dict[str, Any]:
+        """Return it as plain data, for JSON."""
+        return {
+            "scene": self.scene,
+            "coordinate": self.coordinate,
+            "speed": self.speed,
+            "units": list(self.units),
+            "window": [list(self.window.across), list(self.window.up)],
+            "everywhere_at_rest": self.everywhere_at_rest,
+            "rest_points": [
+                {
+                    "coordinate": one.coordinate,
+                    "kind": one.kind,
+                    "eigenvalues": [[value.real, value.imag] for value in one.eigenvalues],
+                }
+                for one in self.rest_points
+            ],
+            "curves": [one.tolist() for one in self.curves],
+            "separatrices": [one.tolist() for one in self.separatrices],
+        }
+
+    def __repr__(self) -> str:
+        points = ", ".join(f"{one.kind} at {one.coordinate:.4g}" for one in self.rest_points) or "no point of rest"
+        if self.everywhere_at_rest:
+            points = "at rest everywhere"
+        curves = count_of(len(self.curves), "curve")
+        return fitted(f"<PhasePortrait of {self.scene}, {self.speed} over {self.coordinate}: {points}; {curves}>")
+
+
+Bounds = tuple[float | str, float | str]
+"""From low to high: numbers in SI units, or text with a unit."""
+
+
+def _read_bounds(value: Any) -> Bounds:
+    low, high = (one if isinstance(one, str) else float(one) for one in value)
+    return low, high
+
+
+_BOUNDS = optional(Kind("a range from low to high, such as (-3.0, 3.0) or ('-90 deg', '90 deg')", _read_bounds))
+
+
+@takes(scene=SCENE, coordinates=_BOUNDS, speeds=_BOUNDS)
+def phase_portrait(
+    scene: Model | Assembly,
+    *,
+    coordinates: Bounds | None = None,
+    speeds: Bounds | None = None,
+) -> PhasePortrait:
+    """Return the phase portrait of a scene with one degree of freedom: curves, points of rest, separatrices.
+
+    Points of rest are found between evenly spaced coordinates, and told apart by the eigenvalues of the linear
+    equations there (Arnold, Ordinary Differential Equations, section 21). Separatrices begin along the eigenvectors of
+    saddles.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of its reduced form.
+    coordinates, speeds
+        What is looked at, m or rad, and these by seconds, or text with units such as ``"180 deg"``; chosen by the
+        points of rest and the start if not given.
+
+    Returns
+    -------
+    PhasePortrait
+        The portrait; `atwood.plot_phase_portrait` draws it.
+
+    Raises
+    ------
+    UsageError
+        If the scene has not one degree of freedom, depends on time, or changes its mode.
+    """
+    assembly = scene if isinstance(scene, Assembly) else assemble(scene)
+    functions = Dynamics(assembly)
+    _refuse(assembly, functions)
+
+    def field(points: FloatArray) -> FloatArray:
+        accelerations = functions.forward_dynamics(points[:, :1], points[:, 1:])
+        return np.stack([points[:, 1], accelerations[:, 0]], axis=1)
+
+    q, u = (float(one[0]) for one in functions.start())
+    unit, name = functions.equations.names[0].unit, functions.coordinates[0]
+    length = 1.0 if unit == "rad" else scene_length(assembly)
+    across = _coordinates(field, q, unit, length) if coordinates is None else _range(coordinates, unit, "coordinates")
+    places, everywhere = _places_of_rest(field, across)
+    rest_points = tuple(_rest_point(field, place, across) for place in places)
+    rest = np.array([[place, 0.0] for place in places]).reshape(-1, 2)
+    up = _speeds(field, across, rest_points, u) if speeds is None else _range(speeds, f"{unit}/s", "speeds")
+    window = Window(across, up)
+    saddles = [
+        (np.array([one.coordinate, 0.0]), _matrix(field, one.coordinate, across))
+        for one in rest_points
+        if one.kind == "saddle"
+    ]
+    special = separatrices(field, saddles, window, rest)
+    return PhasePortrait(
+        coordinate=name,
+        speed=functions.speeds[0],
+        units=(unit, f"{unit}/s"),
+        window=window,
+        rest_points=rest_points,
+        everywhere_at_rest=everywhere,
+        curves=tuple(spaced_curves(field, window, rest, special)),
+        separatrices=tuple(special),
+        scene=assembly.flat.name,
+    )
+
+
+def _refuse(assembly: Assembly, functions: Dynamics) -> None:
+    where, e = assembly.flat.name, functions.equations
+    if assembly.form != "reduced" or len(e.speeds) != 1 or e.rates != e.speeds or e.constraints:
+        free = count_of(max(len(e.speeds) - len(e.constraints), 0), "degree")
+        raise UsageError(
+            "a phase portrait is of one coordinate and its rate",
+            where=where,
+            advice=f"This has {count_of(len(e.coordinates), 'coordinate')} and {free} of freedom; `poincare_section` "
+            "shows motions of more.",
+        )
+    if _depends_on_time(functions):
+        raise UsageError(
+            "its equations depend on time, so that curves over coordinate and speed cross each other",
+            where=where,
+            advice="Leave the drive away, or look at it once a period with `poincare_section`.",
+        )
+    watched = [one for one in find_event_functions(assembly) if one.target not in ("", "stop")]
+    if watched:
+        raise UsageError(
+            f"it changes its mode where {watched[0].part}: {watched[0].message}",
+            where=where,
+            advice="A phase portrait is of motions in one mode.",
+        )
+
+
+def _range(given: Bounds, unit: str, where: str) -> tuple[float, float]:
+    low, high = (parse_quantity(str(one), parse_unit(unit), where) for one in given)
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise UsageError(f"from {low:g} to {high:g} is no range", where=where, advice="Give the lower end first.")
+    return low, high
+
+
+def _depends_on_time(functions: Dynamics) -> bool:
+    """Return whether accelerations at random states differ by more than rounding from one time to others."""
+    random = np.random.default_rng(1788)
+    q, u = functions.start()
+    points = np.concatenate([q, u])[None, :] + 3.0 * random.normal(size=(50, 2))
+    found = [functions.forward_dynamics(points[:, :1], points[:, 1:], t=t) for t in (0.0, 0.37, 2.9, 71.3)]
+    return not all(np.allclose(one, found[0], rtol=1e-7, atol=1e-9 * float(np.max(np.abs(found[0])))) for one in found)
+
+
+def _coordinates(field: Field, start: float, unit: str, length: float) -> tuple[float, float]:
+    """Return the range in which a scene is looked at: three half turns about a stable state, or what lies about it."""
+    if unit == "rad":
+        some = np.array([[0.1, 0.3], [1.3, -0.4], [2.9, 0.2]])
+        here, there = field(some)[:, 1], field(some + np.array([2.0 * np.pi, 0.0]))[:, 1]
+        if np.any(here) and np.allclose(here, there, rtol=1e-7, atol=1e-7 * (1e-300 + float(np.max(np.abs(here))))):
+            places, everywhere = _places_of_rest(field, (start - np.pi, start + np.pi * (1.0 + 1e-9)))
+            stable = [one for one in places if not everywhere and _rest_point(field, one, (0.0, 1.0)).kind != "saddle"]
+            middle = min(stable, key=lambda one: abs(one - start)) if stable else start
+            return middle - 1.5 * np.pi, middle + 1.5 * np.pi
+    reach = 4.0 * max(length, abs(start))
+    places, everywhere = _places_of_rest(field, (start - reach, start + reach))
+    known = np.array([start, *([] if everywhere else places)])
+    if not everywhere and len(places) == 1:
+        middle, half = places[0], 1.6 * max(abs(start - places[0]), 0.3 * length)
+    else:
+        middle, half = 0.5 * float(np.min(known) + np.max(known)), max(0.8 * float(np.ptp(known)), length)
+    return middle - half, middle + half
+
+
+def _places_of_rest(field: Field, across: tuple[float, float]) -> tuple[list[float], bool]:
+    """Return where accelerations at rest vanish, and whether they do so everywhere."""
+    grid = np.linspace(*across, _LOOKS)
+    still = np.stack([grid, np.zeros_like(grid)], axis=1)
+    values = field(still)[:, 1]
+    moved = field(still + np.array([0.0, 1e-3 * (across[1] - across[0])]))[:, 1]
+    largest = float(np.max(np.abs(values)))
+    if largest <= _NOTHING * float(np.max(np.abs(moved), initial=0.0)) or largest == 0.0:
+        return [], True
+
+    def at(place: float) -> float:
+        return float(field(np.array([[place, 0.0]]))[0, 1])
+
+    found = list(grid[np.abs(values) <= 1e-14 * largest])
+    for k in np.nonzero(values[:-1] * values[1:] < 0.0)[0]:
+        found.append(float(brentq(at, grid[k], grid[k + 1], xtol=1e-15 * (across[1] - across[0]), rtol=1e-15)))
+    width = across[1] - across[0]
+    kept: list[float] = []
+    for place in sorted(found):
+        if not kept or place - kept[-1] > width / _LOOKS:
+            kept.append(float(place) if abs(place) > _ROUNDING * width else 0.0)
+    return kept, False
+
+
+_ROUNDING = 1e-13
+"""Relative to the window: coordinates below are zero."""
+
+
+def _matrix(field: Field, place: float, across: tuple[float, float]) -> FloatArray:
+    """Return the derivative of the field at a point of rest, by central differences of sixth order."""
+    shifts, weights = np.array([-3, -2, -1, 1, 2, 3]), np.array([-1, 9, -45, 45, -9, 1]) / 60.0
+    step = 2e-3 * (across[1] - across[0])
+    pace = np.sqrt(
+        max(abs(float(weights @ field(np.stack([place + step * shifts, 0 * shifts], 1))[:, 1]) / step), 1e-30)
+    )
+    by_q = weights @ field(np.stack([place + step * shifts, 0.0 * shifts], axis=1)) / step
+    by_u = weights @ field(np.stack([place + 0.0 * shifts, step * pace * shifts], axis=1)) / (step * pace)
+    return np.stack([by_q, by_u], axis=1)
+
+
+def _rest_point(field: Field, place: float, across: tuple[float, float]) -> RestPoint:
+    first, second = (complex(one) for one in np.linalg.eigvals(_matrix(field, place, across)))
+    size = max(abs(first), abs(second))
+    tiny = 1e-7 * size
+    if size == 0.0 or min(abs(first), abs(second)) <= tiny:
+        kind = "degenerate"
+    elif abs(first.imag) > tiny:
+        kind = "centre" if abs(first.real) <= tiny else f"{'stable' if first.real < 0.0 else 'unstable'} focus"
+    elif first.real * second.real < 0.0:
+        kind = "saddle"
+    else:
+        kind = f"{'stable' if first.real < 0.0 else 'unstable'} node"
+    return RestPoint(place, kind, (first, second))
+
+
+def _speeds(
+    field: Field, across: tuple[float, float], rest_points: Sequence[RestPoint], start: float
+) -> tuple[float, float]:
+    """Return the range of speeds: that of the separatrices and half as much again, or that of the slowest swing."""
+    width = across[1] - across[0]
+    rates = [max(abs(value) for value in one.eigenvalues) for one in rest_points]
+    if rates:
+        high = 0.55 * width * max(rates)
+    else:
+        accelerations = field(np.stack([np.linspace(*across, 11), np.zeros(11)], axis=1))[:, 1]
+        high = max(float(np.sqrt(np.max(np.abs(accelerations)) * width)), 2.0 * abs(start)) or width
+    saddles = [one.coordinate for one in rest_points if one.kind == "saddle"]
+    if saddles:
+        tall = Window(across, (-20.0 * high, 20.0 * high))
+        rest = np.array([[one.coordinate, 0.0] for one in rest_points])
+        found = separatrices(
+            field, [(np.array([one, 0.0]), _matrix(field, one, across)) for one in saddles], tall, rest
+        )
+        if len(rest_points) > 1:
+            high = 1.6 * max(float(np.max(np.abs(curve[:, 1]))) for curve in found)
+    return -high, high
