@@ -20,8 +20,7 @@ from by_hand_runs import IdaRun, tuned
 from mechanisms import Mechanism, chain, double_pendulum, pendulum
 from timing import best_of, options, print_table, ratio, save
 
-from atwood.integrators.ida import native as ida_native
-from atwood.integrators.ida import sundae as ida_sundae
+from atwood.integrators.ida import native as ida_native, sundae as ida_sundae
 from atwood.integrators.protocol import Status
 
 GOAL, GOAL_PYTHON = 1.2, 8.0

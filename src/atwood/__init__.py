@@ -29,60 +29,27 @@ from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
 from atwood.functions import (  # these stay out of __all__: who imports all names has cos of another library mostly
     absolute as absolute,
-)
-from atwood.functions import (
     acos as acos,
-)
-from atwood.functions import (
     asin as asin,
-)
-from atwood.functions import (
     atan as atan,
-)
-from atwood.functions import (
     atan2 as atan2,
-)
-from atwood.functions import (
     cos as cos,
-)
-from atwood.functions import (
     cosh as cosh,
-)
-from atwood.functions import (
     exp as exp,
-)
-from atwood.functions import external, is_zero, select, solve_linear
-from atwood.functions import (
+    external,
     floor as floor,
-)
-from atwood.functions import (
     hypot as hypot,
-)
-from atwood.functions import (
+    is_zero,
     log as log,
-)
-from atwood.functions import (
     maximum as maximum,
-)
-from atwood.functions import (
     minimum as minimum,
-)
-from atwood.functions import (
+    select,
     sign as sign,
-)
-from atwood.functions import (
     sin as sin,
-)
-from atwood.functions import (
     sinh as sinh,
-)
-from atwood.functions import (
+    solve_linear,
     sqrt as sqrt,
-)
-from atwood.functions import (
     tan as tan,
-)
-from atwood.functions import (
     tanh as tanh,
 )
 from atwood.model.compose.composite import Model, connect

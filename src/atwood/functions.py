@@ -20,11 +20,11 @@ from atwood.expr.core.functions import (
     sign,
     sin,
     sinh,
+    solve as solve_linear,  # a law would read `solve` as anything
     sqrt,
     tan,
     tanh,
 )
-from atwood.expr.core.functions import solve as solve_linear  # a law would read `solve` as anything
 
 __all__ = [
     "absolute",

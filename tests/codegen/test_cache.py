@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from atwood import expr as ex
-from atwood.codegen import cache as disk
-from atwood.codegen import compile_native
+from atwood.codegen import cache as disk, compile_native
 
 
 def small(name="demo"):

@@ -16,8 +16,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from atwood.errors import KernelEvaluationError, StartError, UsageError
-from atwood.integrators.ida import native as ida_native
-from atwood.integrators.ida import sundae as ida_sundae
+from atwood.integrators.ida import native as ida_native, sundae as ida_sundae
 from atwood.integrators.protocol import (
     Budget,
     ImplicitProblem,

@@ -9,8 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ellipj, ellipk
 
-from atwood import Component, Point, Scalar, Scene, connector, parameter, potential, simulate
-from atwood import expr as ex
+from atwood import Component, Point, Scalar, Scene, connector, expr as ex, parameter, potential, simulate
 from atwood.errors import StartError, UnsupportedError, UsageError
 from atwood.expr.series.taylor import taylor_programs
 from atwood.integrators.explicit_problem import ExplicitProblem

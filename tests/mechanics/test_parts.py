@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from atwood import Component, Scalar, Scene, connector, observable, parameter
-from atwood import Point as PointConnector
+from atwood import Component, Point as PointConnector, Scalar, Scene, connector, observable, parameter
 from atwood.pipeline import simulate
 from atwood_library import (
     Damper,

@@ -2,8 +2,7 @@ import copy
 import pickle
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import atwood as aw
 from atwood.model.local.flatten import flatten

@@ -5,8 +5,7 @@ import math
 import sys
 
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 import atwood as aw
 from atwood.expr import Graph, evaluate, select

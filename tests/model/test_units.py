@@ -1,8 +1,7 @@
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from atwood import DeclarationError, ParameterError
 from atwood.model.values.units import parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of

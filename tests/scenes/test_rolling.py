@@ -10,11 +10,9 @@ import pytest
 import atwood_library as lib
 from atwood import AtwoodError, ParameterError, Result, Scene, StartError, report, simulate
 from atwood.pipeline import assemble
-from atwood_library.scenes import RollingBall
-from atwood_library.scenes import RollingDisc as RollingDiscScene
+from atwood_library.scenes import RollingBall, RollingDisc as RollingDiscScene
 
-from ..references.rolling import RollingDisc as ExactDisc
-from ..references.rolling import TurntableBall, hoop, uniform_disc
+from ..references.rolling import RollingDisc as ExactDisc, TurntableBall, hoop, uniform_disc
 
 G = 9.81
 ANGLES, RATES = (0.4, 1.0, 0.2), (2.0, 0.3, 3.0)

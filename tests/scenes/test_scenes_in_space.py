@@ -23,11 +23,9 @@ from atwood_library.scenes import (
 
 from ..references.bricard import Bricard as ExactBricard
 from ..references.foucault import PolarFoucault
-from ..references.free_body import FreeBody as ExactBody
-from ..references.free_body import PlateSeparatrix
+from ..references.free_body import FreeBody as ExactBody, PlateSeparatrix
 from ..references.governor import StiffGovernor
-from ..references.linkages import SpatialSliderCrank as ExactSliderCrank
-from ..references.linkages import universal_joint
+from ..references.linkages import SpatialSliderCrank as ExactSliderCrank, universal_joint
 from ..references.pendulum import FourBarRow as ExactRow
 from ..references.spherical_pendulum import SphericalPendulum as ExactPendulum
 from ..references.top import LagrangeTop as ExactTop

@@ -9,8 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from atwood import Result, Scene, assemble, simulate, sweep
-from atwood import clock as clock_module
+from atwood import Result, Scene, assemble, clock as clock_module, simulate, sweep
 from atwood.clock import Clock, TimeIsUp, check_time, more_time, time_left, within_time
 from atwood.errors import ResultError, SolveError
 from atwood.integrators import explicit_session

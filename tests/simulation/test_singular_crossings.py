@@ -21,8 +21,7 @@ from atwood_library.scenes import FourBar, FourBarRow, SimplePendulum, SliderCra
 
 from ..helpers.mechanisms import double_four_bar, parallel_four_bar
 from ..helpers.runs import FORMS, prepare
-from ..references.pendulum import FourBarRow as ExactRow
-from ..references.pendulum import PlanePendulum
+from ..references.pendulum import FourBarRow as ExactRow, PlanePendulum
 
 needs_sundials = pytest.mark.skipif(not sundials_library.available(), reason="the SUNDIALS libraries are not here")
 

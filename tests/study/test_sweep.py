@@ -24,8 +24,7 @@ from atwood import (
     sweep,
 )
 from atwood.simulation.problem.options import RunOptions
-from atwood.study.sweeps import batch as sweep_batch
-from atwood.study.sweeps import runs as sweep_runs
+from atwood.study.sweeps import batch as sweep_batch, runs as sweep_runs
 from atwood.study.sweeps.cases import make_cases
 from atwood_library import Ground, PointMass, Rod, Rope
 from atwood_library.scenes import SCENES, Chain, DoublePendulum, FourBar

@@ -18,9 +18,7 @@ from atwood.arguments import Kind, Refused, check, each, show, takes
 from atwood.errors import AtwoodError, KernelEvaluationError, UsageError
 from atwood.expr.core import algebra
 from atwood.expr.core.graph import Expression, Graph
-from atwood.expr.core.operations import ExternalFunction, solve_floats
-from atwood.expr.core.operations import floor as _floor_of_float
-from atwood.expr.core.operations import sign as _sign_of_float
+from atwood.expr.core.operations import ExternalFunction, floor as _floor_of_float, sign as _sign_of_float, solve_floats
 
 Scalar: TypeAlias = Any
 """A ``float``, an :class:`Expression`, or a ``sympy.Expr``: what laws compute with."""

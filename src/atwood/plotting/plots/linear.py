@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from atwood.arguments import FILE, TEXT, instance, number, optional, takes
-from atwood.arguments import each as several
+from atwood.arguments import FILE, TEXT, each as several, instance, number, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
 from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
