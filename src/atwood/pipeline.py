@@ -29,6 +29,7 @@ from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.progress import told
+from atwood.result.conserved import MONITOR, Monitor
 from atwood.result.result import Result
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
 from atwood.simulation.initialization.start import Start, find_start
@@ -190,6 +191,7 @@ def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str |
     progress=PROGRESS,
     until=CONDITIONS,
     record=CONDITIONS,
+    monitor=MONITOR,
     **LIMITS,
 )
 def simulate(
@@ -211,6 +213,7 @@ def simulate(
     progress: Callable[[float], object] | bool | None = None,
     until: Any = None,
     record: Any = None,
+    monitor: Monitor | None = None,
 ) -> Result:
     """Simulate a scene from its start to its end.
 
@@ -255,6 +258,9 @@ def simulate(
         comparison that becomes true, or what passes zero; or a list of these. It stops at `t_end` at the latest.
     record
         The same, where the run goes on; `Result.events` has when. It changes nothing in the run.
+    monitor
+        What `atwood.conserved(scene)` returns: `Result.conserved` then has these quantities along the run, and by how
+        much they drift.
 
     Returns
     -------
@@ -296,7 +302,10 @@ def simulate(
                 ),
             )
             made = _solve(assembly, options, clock)
-    return Result(replace(made, timings=stopwatch.in_order()))
+    result = Result(replace(made, timings=stopwatch.in_order()))
+    if monitor is not None and made.segments:
+        result.conserved = monitor.along(result)
+    return result
 
 
 def _solve(assembly: Assembly, options: RunOptions, clock: Clock) -> Run:

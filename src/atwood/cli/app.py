@@ -176,6 +176,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
     help="Stop where a quantity passes a value, as 'rod1.angle crosses 30 deg' (or rises above, falls below).",
 )
 @click.option("--record", multiple=True, metavar="CONDITION", help="Note when that happens, and go on.")
+@click.option("--conserved", is_flag=True, help="Show by how much what the scene conserves drifts along the run.")
 @click.option("--timings", is_flag=True, help="Show what each stage from the scene to the motion took.")
 @click.option("--plot", type=_FILE, help="Save a plot; the suffix says how (.png, .svg, .pdf).")
 @click.option("--draw", type=_FILE, help="Save a picture of the mechanism (.png, .svg, .pdf), or its motion (.gif).")

@@ -46,6 +46,7 @@ class RunRequest:
     structure: bool = False
     until: tuple[str, ...] = ()
     record: tuple[str, ...] = ()
+    conserved: bool = False
     plot: Path | None = None
     draw: Path | None = None
     view: str | None = None
@@ -89,6 +90,11 @@ def _run(request: RunRequest) -> Result:
         from atwood.plotting.camera import check_view
 
         check_view(assembly.mechanism.space.name, request.view)
+    monitor = None
+    if request.conserved:
+        from atwood.theory.symmetries import conserved
+
+        monitor = conserved(assembly)
     t_start, t_end = assembly.flat.t_start, assembly.flat.t_end if request.t_end is None else request.t_end
     try:
         with progress_bar(request.progress, name, t_start, t_end) as progress:
@@ -104,6 +110,7 @@ def _run(request: RunRequest) -> Result:
                 structure=request.structure,
                 until=request.until or None,
                 record=request.record or None,
+                monitor=monitor,
                 solver=request.solver,
                 progress=progress,
             )

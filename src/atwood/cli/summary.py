@@ -109,6 +109,8 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     if result.run.options.solver == "auto":
         yield "chosen", result.run.why
     yield "energy", _energy(result)
+    if result.conserved is not None:
+        yield "conserved", result.conserved.describe()
     if plan.balance.constraints:
         missed = result.constraint_max
         held = max(missed["held_position"], missed["held_velocity"])

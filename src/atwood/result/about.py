@@ -86,6 +86,7 @@ def describe_run(result: Result) -> dict[str, Any]:
             "exchanged": ledger.exchanged,
             "uncertainty": ledger.uncertainty,
         },
+        **({} if result.conserved is None else {"conserved": result.conserved.to_dict()}),
         "constraint_max": max(missed["position"], missed["velocity"]),
         "constraint_held": max(missed["held_position"], missed["held_velocity"]),
         "asked": {

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arguments import FILE, instance, takes
+from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import ResultError
 from atwood.expr import depends_on
@@ -20,6 +20,7 @@ from atwood.integrators.protocol import Statistics
 from atwood.model.declare.quantities import PATHS, Quantity
 from atwood.result.accounts import account
 from atwood.result.angles import unwrap
+from atwood.result.conserved import ConservedLedger
 from atwood.result.energy import EnergyLedger
 from atwood.result.trajectories import Trajectories
 from atwood.result.work import find_ledger
@@ -54,15 +55,17 @@ class Result(Trajectories):
     ----------
     run
         What the solver gave.
+    conserved
+        Conserved quantities along it; see `simulate(..., monitor=)`.
     """
 
-    @takes(run=instance("a run, as solve.run makes it", Run))
-    def __init__(self, run: Run) -> None:
-        self.run = run
+    @takes(run=instance("a run, as solve.run makes it", Run), conserved=optional(instance("a ledger", ConservedLedger)))
+    def __init__(self, run: Run, conserved: ConservedLedger | None = None) -> None:
+        self.run, self.conserved = run, conserved
         self._cache: dict[str, FloatArray] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Result, (self.run,)
+        return Result, (self.run, self.conserved)
 
     # -- what it is of --------------------------------------------------------------------------------------------
 
@@ -377,8 +380,7 @@ class Result(Trajectories):
         return save_result(self, file, paths)
 
     def _about(self) -> Mapping[str, Any]:
-        flat = self.assembly.flat
-        return {"scene": flat.name, "form": self.form, "level": self.level, "status": self.status}
+        return {"scene": self.assembly.flat.name, "form": self.form, "level": self.level, "status": self.status}
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         form = f"{self.form} form" + (f" ({self.level})" if self.level else "")
@@ -389,10 +391,10 @@ class Result(Trajectories):
         times = self.time
         yield "time", f"{times[0]:g} to {times[-1]:g} s, {count_of(len(times), 'output time')}"
         yield "solver", f"{self.solver} ({count_of(self.statistics.steps, 'step')})"
-        names = [one.name for one in self.assembly.own_equations.names]
-        yield "coordinates", listed(names)
-        told = [f"{one.message or one.part} at {one.time:.6g} s" for one in self.events]
-        if told:
-            yield "events", listed(told, 4)
+        yield "coordinates", listed(one.name for one in self.assembly.own_equations.names)
+        if self.conserved is not None:
+            yield "conserved", self.conserved.describe()
+        if self.events:
+            yield "events", listed((f"{one.message or one.part} at {one.time:.6g} s" for one in self.events), 4)
         if self.singular_crossings:
             yield "singular positions", listed((f"{one.time:.6g} s" for one in self.singular_crossings), 4)

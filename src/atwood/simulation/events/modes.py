@@ -41,7 +41,15 @@ from atwood.tolerances import tolerances
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode, EventData
 
-__all__ = ["EventProbe", "EventRecord", "enter_mode", "find_event_functions", "generalized_speeds", "plastic_impact"]
+__all__ = [
+    "EventProbe",
+    "EventRecord",
+    "enter_mode",
+    "find_event_functions",
+    "generalized_speeds",
+    "generalized_state",
+    "plastic_impact",
+]
 
 _EVENT_FUNCTIONS: Key[tuple[EventFunction, ...]] = Key("event functions")
 _NEEDS: Key[_Needs] = Key("what event functions read")
@@ -304,7 +312,8 @@ def enter_mode(
         big_q = met
     if after.form == "dae":
         return after, big_q, big_u
-    q, u = _to_reduced(assembly, after, t, (q, u), (big_q, big_u), length, event)
+    q, u, miss = generalized_state(assembly, after, t, (q, u), (big_q, big_u), length)
+    _check_in_place(event, miss)
     return *switch_coordinates(after, q, reassemble), u
 
 
@@ -424,16 +433,32 @@ def _solve_impact(
     return found[:n] * sizes, found[n:]
 
 
-def _to_reduced(
+def generalized_state(
     before: Assembly,
     after: Assembly,
     t: float,
     own: tuple[FloatArray, FloatArray],
     maximal: tuple[FloatArray, FloatArray],
     length: float,
-    event: EventRecord,
-) -> tuple[FloatArray, FloatArray]:
-    """Find the generalized coordinates, with quaternions, that give the same maximal coordinates and speeds."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the generalized coordinates and speeds, with quaternions, that give the same maximal ones.
+
+    Parameters
+    ----------
+    before, after
+        The scene that a state is of, and that whose generalized coordinates are sought.
+    t
+        Time.
+    own, maximal
+        The state in the coordinates of its own form, and in maximal ones.
+    length
+        Extent of the scene, m.
+
+    Returns
+    -------
+    coordinates, speeds, miss
+        The state, and by how much it misses the maximal coordinates, each in its own size.
+    """
     equations = after.regular
     reduced_map, maximal_map = kinematic_map_of(after, "regular"), kinematic_map_of(after, "dae")
     program, rows, columns = _maximal_places(after)
@@ -462,8 +487,7 @@ def _to_reduced(
         q = reduced_map.moved(t, q, step)
         if float(np.max(np.abs(step), initial=0.0)) < 1e-14 * max(1.0, float(np.max(np.abs(q), initial=0.0))):
             break
-    _check_in_place(event, miss)
-    return q, generalized_speeds(after, t, q, maximal[1], scales)
+    return q, generalized_speeds(after, t, q, maximal[1], scales), miss
 
 
 def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatArray, sizes: FloatArray) -> FloatArray:

@@ -14,15 +14,18 @@ from atwood.analysis.formulas import latex, objects, text
 from atwood.analysis.formulas.notation import notation_of
 from atwood.analysis.formulas.objects import Sympy
 from atwood.analysis.formulas.tree import Sum
-from atwood.arguments import each, instance, optional, takes
+from atwood.arguments import Kind, each, instance, optional, takes
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
+from atwood.result.conserved import ConservedLedger, ConservedValues
+from atwood.result.result import Result
 from atwood.showing import fitted, html_table, listed
 from atwood.simulation.problem.arguments import ORIENTATION
+from atwood.theory.symmetries.monitor import along_run
 from atwood.theory.symmetries.stated import Symmetry, check_symmetry
 
 __all__ = ["Conserved", "ConservedQuantity", "conserved"]
@@ -170,6 +173,29 @@ class Conserved(Sequence[ConservedQuantity]):
     def __contains__(self, key: object) -> bool:
         return key in self.quantities or any(one.name == key for one in self.quantities)
 
+    def along(self, result: Result) -> ConservedLedger:
+        """Return the quantities along a run, and how far they drift.
+
+        Parameters
+        ----------
+        result
+            The run, in either form.
+
+        Raises
+        ------
+        UsageError
+            If it is a run of another scene.
+        """
+        if not self.quantities:
+            return ConservedLedger(())
+        source = self.quantities[0].formulas
+        quantities = Quantities(source.assembly, source.expressions)
+        values, sizes = along_run(quantities, [one.finding.value for one in self], result)
+        rows = zip(self, values, sizes, strict=True)
+        return ConservedLedger(
+            tuple(ConservedValues(one.name, one.kind, one.unit, row, float(size)) for one, row, size in rows)
+        )
+
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the quantities."""
@@ -195,12 +221,17 @@ class Conserved(Sequence[ConservedQuantity]):
         return html_table(f"Conserved: {self.scene}", heads, rows, "; ".join(self.notes))
 
 
-SYMMETRIES = each(instance("a Symmetry", Symmetry), "symmetries, as a list", single=True)
+def _listed(value: Any) -> Any:
+    return _SYMMETRIES.read([value] if isinstance(value, Symmetry) else value)
+
+
+_SYMMETRIES = each(instance("a Symmetry", Symmetry), "symmetries, as a list")
+SYMMETRIES = Kind("a Symmetry, or a list of them", _listed)
 
 
 @takes(scene=SCENE, symmetries=SYMMETRIES, orientation=optional(ORIENTATION))
 def conserved(
-    scene: Model | Assembly, symmetries: Sequence[Symmetry] = (), *, orientation: str | None = None
+    scene: Model | Assembly, symmetries: Symmetry | Sequence[Symmetry] = (), *, orientation: str | None = None
 ) -> Conserved:
     """Return what is conserved along all motions of a scene.
 
@@ -237,7 +268,8 @@ def conserved(
     notation = notation_of(assembly, found)
     quantities = Quantities(assembly, found)
     prover, formulas = Prover(quantities, notation), EquationFormulas(assembly, found, notation)
-    stated = [check_symmetry(one, quantities, prover, formulas) for one in symmetries]
+    every: Any = symmetries
+    stated = [check_symmetry(one, quantities, prover, formulas) for one in every]
     findings = find_conserved(assembly, quantities, prover)
     made = [ConservedQuantity(one, formulas) for one in (*findings.items, *stated)]
     return Conserved(made, findings.notes, assembly.flat.name)
