@@ -100,7 +100,10 @@ def behaviour(dataclass):
         yield type(caught.value), str(caught.value).rpartition(".")[2]
 
 
-def test_behaves_as_the_standard_library():
+@pytest.mark.parametrize("few", [0, 1, 24, 1000])
+def test_behaves_as_the_standard_library(few, monkeypatch):
+    """Whether the constructor of a class is written at once, on the way, or not at all."""
+    monkeypatch.setattr(late, "_FEW", few)
     for ours, theirs in zip(behaviour(late.dataclass), behaviour(dataclasses.dataclass), strict=True):
         assert ours == theirs
 

@@ -1,9 +1,10 @@
 """Dataclasses whose methods are written when they are first used.
 
 `dataclasses.dataclass` writes and compiles several methods of each class when its module is imported, a third of a
-millisecond a class: for all classes of Atwood that takes as long as to import NumPy. A process uses few of them. Here
-one method, the constructor, is written when a class gets its first instance; all classes share the others. The standard
-library is asked when somebody asks for the fields of a class, as its `replace`, `fields` and `asdict` do.
+millisecond a class: for all classes of Atwood that takes as long as to import NumPy. A process uses few of them, and
+makes few instances of most of these. Here one method, the constructor, is written when a class has got some instances;
+all classes share the others, and what sets the fields of the first instances. The standard library is asked when
+somebody asks for the fields of a class, as its `replace`, `fields` and `asdict` do.
 """
 
 from __future__ import annotations
@@ -32,6 +33,11 @@ _TAKEN = ("__dataclass_fields__", "__dataclass_params__", "__match_args__")
 
 _METHODS = ("__init__", "__repr__", "__eq__", "__hash__")
 
+_FEW = 24
+"""For so many instances a class shares what sets their fields: to write a constructor takes as long as some fifty."""
+
+_MISSING = dataclasses.MISSING
+
 _WRITING = RLock()
 
 
@@ -45,7 +51,7 @@ class _Later:
         if self.name in _TAKEN:
             self.completion.take()
         else:
-            self.completion.complete()
+            self.completion.write()
         return getattr(owner, self.name)
 
 
@@ -57,29 +63,66 @@ class _Completion:
         self.cls, self.frozen, self.done = cls, frozen, False
         self.first: Any = None
         self.construct: Any = None
+        self.made_so_far = 0
         self.given = {name: own[name] for name in own.get("__annotations__", ()) if name in own}
         for name, value in self.given.items():  # as instances and readers of the class see the defaults
             if isinstance(value, dataclasses.Field):
-                if value.default is dataclasses.MISSING:
+                if value.default is _MISSING:
                     delattr(cls, name)
                 else:
                     setattr(cls, name, value.default)
         self.made = {name for name in _METHODS if name not in own}
 
     def complete(self) -> None:
-        """Write the constructor, and find out what is compared and shown."""
+        """Find out which fields there are, and which of them are compared, shown and given."""
         with _WRITING:
             if self.done:
                 return
             found = self.fields()
+            self.found = found
             self.values = _reader([name for name, one in found.items() if one.compare])
             self.shown = [name for name, one in found.items() if one.repr]
-            self.construct = _constructor(self.cls, found, self.frozen)
+            self.given_names = [name for name, one in found.items() if one.init]
+            self.has_more = hasattr(self.cls, "__post_init__")
+            self.done = True
+
+    def write(self) -> None:
+        """Write the constructor."""
+        self.complete()
+        with _WRITING:
+            if self.construct is not None:
+                return
+            construct = _constructor(self.cls, self.found, self.frozen)
             if vars(self.cls).get("__init__") is self.first:  # and not what checks its arguments before
-                self.cls.__init__ = self.construct
+                self.cls.__init__ = construct
             if "__signature__" in vars(self.cls):
                 del self.cls.__signature__
-            self.done = True
+            self.construct = construct
+
+    def make(self, one: Any, args: tuple[Any, ...], keywords: dict[str, Any]) -> None:
+        """Set the fields of one of the first instances; of what does not fit the constructor complains."""
+        self.complete()
+        self.made_so_far += 1
+        given = dict(zip(self.given_names, args, strict=False)) | keywords
+        if self.made_so_far > _FEW or len(given) != len(args) + len(keywords) or not self._put(one, given):
+            self.write()
+            self.construct(one, *args, **keywords)
+        elif self.has_more:
+            one.__post_init__()
+
+    def _put(self, one: Any, given: dict[str, Any]) -> bool:
+        """Set fields; return whether no value is missing, and there is a field for each."""
+        put = object.__setattr__ if self.frozen else setattr
+        for name, field in self.found.items():
+            if name in given and field.init:
+                put(one, name, given.pop(name))
+            elif field.default_factory is not _MISSING:
+                put(one, name, field.default_factory())
+            elif field.default is _MISSING and field.init:
+                return False
+            elif field.init:
+                put(one, name, field.default)
+        return not given
 
     def fields(self) -> dict[str, Any]:
         """Return the fields by name, those of the bases first, without what makes them fields of a class."""
@@ -95,7 +138,7 @@ class _Completion:
         found = {}
         for name, kind in vars(self.cls).get("__annotations__", {}).items():
             if "ClassVar" not in str(kind):
-                given = self.given.get(name, dataclasses.MISSING)
+                given = self.given.get(name, _MISSING)
                 found[name] = given if isinstance(given, dataclasses.Field) else dataclasses.field(default=given)
         return found
 
@@ -133,11 +176,11 @@ def _constructor(cls: Any, fields: dict[str, Any], frozen: bool) -> Any:
     known: dict[str, Any] = {"_set": object.__setattr__, "_from_factory": _FROM_FACTORY}
     arguments, lines = ["self"], []
     for name, one in fields.items():
-        value, makes = name, one.default_factory is not dataclasses.MISSING
+        value, makes = name, one.default_factory is not _MISSING
         if makes:
             known[f"_make_{name}"] = one.default_factory
             value = f"_make_{name}() if {name} is _from_factory else {name}" if one.init else f"_make_{name}()"
-        elif one.default is not dataclasses.MISSING:
+        elif one.default is not _MISSING:
             known[f"_default_{name}"] = one.default
         if one.init:
             default = "=_from_factory" if makes else f"=_default_{name}" if f"_default_{name}" in known else ""
@@ -176,8 +219,10 @@ def _declare(cls: Any, frozen: bool, eq: bool) -> Any:
     completion = cls._completion = _Completion(cls, frozen)
 
     def construct(self: Any, *args: Any, **keywords: Any) -> None:
-        completion.complete()
-        completion.construct(self, *args, **keywords)
+        if completion.construct is None:
+            completion.make(self, args, keywords)
+        else:  # where something stands before it, such as a check of its arguments
+            completion.construct(self, *args, **keywords)
 
     completion.first = construct
 

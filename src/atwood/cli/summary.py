@@ -164,8 +164,10 @@ def main_quantities(result: Result) -> list[str]:
     shown = assembly.mechanism.bodies.bodies
     masses = [f"{body.name}.position.{axis}" for body in shown if not body.is_fixed for axis in "xyz"]
     tensions = [path for path in result.paths if path.endswith(".tension")]
-    forces = [one.path for one in assembly.reactions if one.path not in tensions and np.any(result.array(one.path))]
+    forces = [one.path for one in assembly.reactions if one.path not in tensions]
     masses = [path for path in masses if path in result]
+    result.table([*names, *tensions, *forces, *masses])  # all in one pass, since each needs a program
+    forces = [path for path in forces if np.any(result.array(path))]
     moving = [path for path in masses if np.ptp(result.array(path)) > 0.0]
     chosen = [*names[:8], *tensions[:6], *moving, *names[8:], *tensions[6:], *forces, *masses]
     return list(dict.fromkeys(chosen))
