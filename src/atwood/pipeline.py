@@ -40,6 +40,7 @@ from atwood.simulation.problem.arguments import (
     LEVEL,
     LIMITS,
     NAME,
+    ORDER,
     ORIENTATION,
     OUTPUTS,
     PROGRESS,
@@ -48,6 +49,7 @@ from atwood.simulation.problem.arguments import (
     SOLVER,
     STRUCTURE,
     T_END,
+    refuse_idle_settings,
 )
 from atwood.simulation.problem.conditions import Condition
 from atwood.simulation.problem.options import RunOptions
@@ -186,6 +188,8 @@ def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str |
     outputs=OUTPUTS,
     max_step=optional(number("a number of seconds above 0", above=0.0)),
     solver=SOLVER,
+    order=ORDER,
+    step=optional(number("a number of seconds above 0", above=0.0)),
     samples=SAMPLES,
     structure=STRUCTURE,
     progress=PROGRESS,
@@ -208,6 +212,8 @@ def simulate(
     max_seconds: float | None = None,
     max_step: float | None = None,
     solver: str = "auto",
+    order: int | None = None,
+    step: float | None = None,
     samples: int = 400,
     structure: bool = False,
     progress: Callable[[float], object] | bool | None = None,
@@ -245,6 +251,11 @@ def simulate(
         scikit-sundae with the equations as Python, the reference. ``"explicit"``: a Runge-Kutta method of order 8(5,3),
         and ``"taylor"``: Taylor series, for the reduced form without closed loops. ``"auto"``: IDA for what is
         constrained or stiff, or turns out so; else an explicit method. `Result.solver` says which, and why.
+        ``"gauss"``: a symplectic method with equal steps, whose energy error does not grow, for scenes that have a
+        Hamiltonian.
+    order, step
+        Of ``"gauss"``: the order, 2, 4, 6, 8, 10 or 12 (8 if not given), and the step, s. A step that is not given is
+        chosen so that the first steps are within the tolerances.
     samples
         The run is sampled at least so often, whatever is shown of it: for the work that is put in, and for angles to
         count their turns. More are taken where functions of time change faster, unless this is 1.
@@ -279,6 +290,7 @@ def simulate(
         If the solver fails.
     """
     clock = Clock(max_seconds)
+    refuse_idle_settings(solver, order, step)
     with watching() as stopwatch:
         assembly = assembly_of(scene, form=form, level=level, orientation=orientation)
         flat = assembly.flat
@@ -294,6 +306,8 @@ def simulate(
                 progress=watch,
                 max_step=max_step,
                 solver=solver,
+                order=order,
+                step=step,
                 samples=samples,
                 structure=structure,
                 conditions=(

@@ -46,11 +46,11 @@ def pendulum() -> Comparison:
 
 
 def test_every_form_and_level_has_its_rows(pendulum: Comparison) -> None:
-    ida, explicit = "SUNDIALS IDA", "Dormand-Prince 8(5,3)"
+    ida, explicit, gauss = "SUNDIALS IDA", "Dormand-Prince 8(5,3)", "Gauss, symplectic"
     kinds = {(row.form, row.level, row.solver) for row in pendulum.rows}
     levels = {("dae", level, ida) for level in ("ggl", "index1-projected", "index1")}
-    assert kinds == {("reduced", "", ida), ("reduced", "", explicit), *levels}
-    assert len(pendulum.rows) == 15
+    assert kinds == {("reduced", "", ida), ("reduced", "", explicit), ("reduced", "", gauss), *levels}
+    assert len(pendulum.rows) == 18
     assert not [row.reason for row in pendulum.rows if row.reason]
 
 
@@ -83,7 +83,7 @@ def test_plain_index_1_shows_its_drift(pendulum: Comparison) -> None:
 
 def test_it_is_text_and_data(pendulum: Comparison) -> None:
     data = json.loads(json.dumps(pendulum.to_dict(), allow_nan=False))
-    assert len(data["rows"]) == 15
+    assert len(data["rows"]) == 18
     assert data["scene"] == "pendulum"
     assert "dae (index1-projected)" in str(pendulum)
     assert pendulum.verdict in str(pendulum)
@@ -95,7 +95,7 @@ def test_a_closed_form_is_the_reference() -> None:
     assert found.reference.kind == "closed form"
     assert list(found.reference.quantities) == ["mass.displacement"]
     assert {row.form for row in found.rows} == {"reduced", "dae"}
-    assert len(found.rows) == 3  # the explicit method comes on top; without constraints, all levels are one
+    assert len(found.rows) == 4  # two methods come on top; without constraints, all levels are one
     assert all(0.0 < (row.error or 0.0) < 1e-4 for row in found.rows)
 
 
@@ -117,7 +117,7 @@ def test_a_failed_run_stays_in_the_table(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(compare_module, "run_form", fail)
     found = compare(Pendulum(), rtols=(1e-4, 1e-6), forms=("reduced",))
-    assert [row.reason for row in found.rows] == ["", "the step became too small"] * 2
+    assert [row.reason for row in found.rows] == ["", "the step became too small"] * 3
     assert found.rows[1].error is None
     assert "the step became too small" in str(found)
     assert json.loads(json.dumps(found.to_dict(), allow_nan=False))["rows"][1]["steps"] is None

@@ -140,7 +140,7 @@ def info_command(
 
 _FORM = click.Choice(["reduced", "dae"])
 _LEVEL = click.Choice(["ggl", "index1", "index1-projected"])
-_SOLVER = click.Choice(["auto", "ida", "ida-sundae", "explicit", "taylor"])
+_SOLVER = click.Choice(["auto", "ida", "ida-sundae", "explicit", "taylor", "gauss"])
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
 
@@ -168,6 +168,8 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--max-steps", type=click.IntRange(min=1), help="Stop after so many steps.")
 @click.option("--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after so many seconds.")
 @click.option("--max-step", type=click.FloatRange(min=0.0, min_open=True), help="The largest step, s.")
+@click.option("--order", type=click.Choice(["2", "4", "6", "8", "10", "12"]), help="With --solver gauss: its order.")
+@click.option("--step", type=click.FloatRange(min=0.0, min_open=True), help="With --solver gauss: its step, s.")
 @click.option("--structure", is_flag=True, help="Nothing needs to move: it is a truss.")
 @click.option(
     "--until",

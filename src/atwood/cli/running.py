@@ -43,6 +43,8 @@ class RunRequest:
     max_steps: int | None = None
     max_seconds: float | None = None
     max_step: float | None = None
+    order: str | None = None
+    step: float | None = None
     structure: bool = False
     until: tuple[str, ...] = ()
     record: tuple[str, ...] = ()
@@ -112,6 +114,8 @@ def _run(request: RunRequest) -> Result:
                 record=request.record or None,
                 monitor=monitor,
                 solver=request.solver,
+                order=None if request.order is None else int(request.order),
+                step=request.step,
                 progress=progress,
             )
     except AtwoodError as error:

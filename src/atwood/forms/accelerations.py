@@ -189,21 +189,49 @@ def _candidates(assembly: Assembly, method: Method | None, is_tree: bool) -> Ite
 
 def _by_mass_matrix(equations: Equations, rows: Sequence[Expression], numeric: bool) -> tuple[Method, list[Expression]]:
     """Return the accelerations from ``M a + bias = 0``."""
-    n = len(rows)
     found = jacobian(list(rows), list(equations.accelerations))
     bias = substitute(list(rows), dict.fromkeys(equations.accelerations, 0.0))
     full = {(r, c): e for r, c, e in zip(found.rows, found.columns, found.entries, strict=True)}
     entries = {place: entry for place, entry in full.items() if place[0] <= place[1]}
-    order = minimum_degree(list(entries), n, [i for i in range(n) if (i, i) in full and full[i, i].is_parametric])
-    if numeric or fill_of(list(entries), order) > _LARGEST_FILL or any((i, i) not in full for i in range(n)):
-        zero = equations.graph.zero
-        matrix = [[entries.get((min(r, c), max(r, c)), zero) for c in range(n)] for r in range(n)]
-        return "numeric", solve(matrix, [-b for b in bias])
-    steps = eliminate(SymmetricSystem(entries, bias, [1] * n), order)
+    if numeric or _is_full(entries, len(rows)):
+        return "numeric", _solve_numerically(entries, [-b for b in bias])
+    return "mass matrix", [-value for value in _solve_in_order(entries, bias)]
+
+
+def solve_symmetric(entries: Mapping[tuple[int, int], Expression], right: Sequence[Expression]) -> list[Expression]:
+    """Return the solution of a positive definite system, written out where that is not too long.
+
+    Parameters
+    ----------
+    entries
+        The matrix by row and column, on and above the diagonal.
+    right
+        The right-hand side.
+    """
+    return (_solve_numerically if _is_full(entries, len(right)) else _solve_in_order)(entries, right)
+
+
+def _order(entries: Mapping[tuple[int, int], Expression], n: int) -> Sequence[int]:
+    return minimum_degree(list(entries), n, [i for i in range(n) if (i, i) in entries and entries[i, i].is_parametric])
+
+
+def _is_full(entries: Mapping[tuple[int, int], Expression], n: int) -> bool:
+    """Return whether a matrix is left to a loop when the program runs."""
+    return fill_of(list(entries), _order(entries, n)) > _LARGEST_FILL or any((i, i) not in entries for i in range(n))
+
+
+def _solve_numerically(entries: Mapping[tuple[int, int], Expression], right: Sequence[Expression]) -> list[Expression]:
+    n, zero = len(right), right[0].graph.zero
+    matrix = [[entries.get((min(r, c), max(r, c)), zero) for c in range(n)] for r in range(n)]
+    return solve(matrix, list(right))
+
+
+def _solve_in_order(entries: Mapping[tuple[int, int], Expression], right: Sequence[Expression]) -> list[Expression]:
+    steps = eliminate(SymmetricSystem(entries, right, [1] * len(right)), _order(entries, len(right)))
     known: dict[int, Expression] = {}
     for step in reversed(steps):
         known[step.unknown] = back_substitute(step, known)
-    return "mass matrix", [-known[i] for i in range(n)]
+    return [known[i] for i in range(len(right))]
 
 
 # -- the augmented system -----------------------------------------------------------------------------------------

@@ -36,7 +36,7 @@ from atwood.mechanics.outputs.observables import add_up, part_energies
 from atwood.model.local.laws import LocalPart
 from atwood.topology.spanning_forest import Coordinate
 
-__all__ = ["Contribution", "Lagrangian", "lagrangian_of", "rows_by_part"]
+__all__ = ["Contribution", "Lagrangian", "lagrangian_along_speeds", "lagrangian_of", "rows_by_part"]
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ def lagrangian_of(assembly: Assembly, form: FormName | None = None) -> Lagrangia
         If orientations are in three coordinates that are no Euler angles.
     """
     equations = assembly.in_coordinates(form or assembly.form)
-    made = _along_speeds(assembly, equations)
+    made = lagrangian_along_speeds(assembly, equations)
     return _along_angles(made) if any(c.kind.startswith("euler-") for c in equations.orientation_coordinates) else made
 
 
@@ -245,8 +245,16 @@ def rows_by_part(found: Lagrangian) -> dict[str, tuple[Expression, ...]]:
     return rows
 
 
-def _along_speeds(assembly: Assembly, equations: Equations) -> Lagrangian:
-    """Return it with the speeds of the equations as velocities."""
+def lagrangian_along_speeds(assembly: Assembly, equations: Equations) -> Lagrangian:
+    """Return a scene in the terms of Lagrange's equations with the speeds of its equations as velocities.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    equations
+        Its equations in the coordinates that are wanted.
+    """
     mechanism, number = assembly.mechanism, {q: i for i, q in enumerate(equations.rates)}
     signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
     parts = (_contribution(assembly, equations, path, signals) for path in mechanism.locals_)

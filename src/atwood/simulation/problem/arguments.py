@@ -35,6 +35,7 @@ __all__ = [
     "LEVEL",
     "LIMITS",
     "NAME",
+    "ORDER",
     "ORIENTATION",
     "OUTPUTS",
     "PROGRESS",
@@ -44,6 +45,7 @@ __all__ = [
     "STRUCTURE",
     "T_END",
     "check_span",
+    "refuse_idle_settings",
 ]
 
 FORMS = ("reduced", "dae")
@@ -103,12 +105,44 @@ LIMITS = {
     "max_steps": optional(whole("a whole number of steps, at least 1", 1, 10**18)),
     "max_seconds": optional(number("a number of seconds above 0", above=0.0)),
 }
+_ORDERS = (2, 4, 6, 8, 10, 12)
+
+
+def _order(value: Any) -> int:
+    found = int(whole("", 2, 12).read(value))
+    if found not in _ORDERS:
+        raise Refused
+    return found
+
+
 SAMPLES = whole(f"a whole number of samples, 1 to {_MOST:,}", 1, _MOST)
+ORDER = optional(Kind(f"one of {', '.join(map(str, _ORDERS))}", _order))
 STRUCTURE = FLAG
 PROGRESS = optional(either(FLAG, CALLBACK))
 _WATCHED = "a condition such as 'rod1.angle crosses 0', a function of quantities, or a list of these"
 _ONE = either(Kind(_WATCHED, _condition), CALLBACK)
 CONDITIONS = optional(Kind(_WATCHED, lambda value: either(CALLBACK, each(_ONE, _WATCHED)).read(value)))
+
+
+def refuse_idle_settings(solver: str, order: int | None, step: float | None) -> None:
+    """Refuse an order or a step for a solver that chooses these itself.
+
+    Parameters
+    ----------
+    solver, order, step
+        What was asked for.
+
+    Raises
+    ------
+    UsageError
+        If it is so.
+    """
+    for name, value in (("order", order), ("step", step)):
+        if value is not None and solver != "gauss":
+            raise UsageError(
+                f"{name}={value!r} is for the solver 'gauss'; {solver!r} chooses its own",
+                advice="Give solver='gauss', or rtol for the accuracy.",
+            )
 
 
 def check_span(begin: float, end: float, max_step: float | None = None) -> None:

@@ -21,6 +21,7 @@ SOLVERS = {
     "ida-sundae": "SUNDIALS IDA through scikit-sundae",
     "explicit": "Dormand-Prince 8(5,3)",
     "taylor": "Taylor series",
+    "gauss": "Gauss, symplectic",
 }
 """What can solve a scene, and what it is called."""
 
@@ -55,6 +56,8 @@ class RunOptions:
         Called with the time before each step of the solver.
     conditions
         What is looked for along the run, besides the events of parts.
+    order, step
+        Of a method with fixed steps: its order, and the step, s.
     """
 
     t_end: float
@@ -71,6 +74,8 @@ class RunOptions:
     structure: bool = False
     on_step: Callable[[float], object] | None = None
     conditions: tuple[Condition, ...] = ()
+    order: int | None = None
+    step: float | None = None
 
     def out_of_time(self, t: float) -> str:
         """Return what is said of a run that its limit of time ended, at a time of its own."""

@@ -207,6 +207,8 @@ def open_explicit_session(
     """
     if solver == "taylor":
         return _open_taylor(request, t, y)
+    if solver == "gauss":
+        return _open_gauss(request, t, y)
     session = request.kept.begin_again(request, t, y, leave)
     if session is None:
         session = _open_steps(request, t, y, leave)
@@ -238,6 +240,15 @@ def _open_taylor(request: SolverRequest, t: float, y: FloatArray) -> ExplicitSes
     problem = _explicit_problem(request, "taylor")
     series = taylor_problem(request.plan.assembly, request.end, has_events=bool(request.probe.directions))
     return open_taylor(problem, series, request.settings(t, LOOSEST), t, y, request.budget)
+
+
+def _open_gauss(request: SolverRequest, t: float, y: FloatArray) -> ExplicitSession:
+    from atwood.simulation.problem.gauss_scene import GaussSettings, open_gauss
+
+    options = request.options
+    settings = GaussSettings(options.order, options.step, request.end, request.plan.tolerances(1.0))
+    problem = _explicit_problem(request, "gauss")
+    return open_gauss(request.plan.assembly, problem, request.settings(t), settings, t, y, request.budget)
 
 
 def _explicit_problem(request: SolverRequest, solver: str) -> ExplicitProblem:

@@ -10,6 +10,7 @@ import numpy as np
 
 from atwood.arguments import each, instance, takes, whole
 from atwood.errors import AtwoodError
+from atwood.forms.canonical import is_canonical
 from atwood.forms.dae import LEVELS
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
@@ -87,7 +88,8 @@ class ComparisonRow:
     def label(self) -> str:
         """Form and level in words, and the method where it is not the one that both forms share."""
         form = f"{self.form} ({self.level})" if self.level else self.form
-        return f"{form}, explicit" if self.solver == SOLVERS["explicit"] else form
+        other = next((key for key in ("explicit", "gauss") if self.solver == SOLVERS[key]), "")
+        return f"{form}, {other}" if other else form
 
 
 @dataclass(frozen=True)
@@ -259,7 +261,8 @@ def compare(
 def _kinds(assembled: Assembled, forms: Sequence[str], levels: Sequence[str]) -> Iterator[tuple[str, str, str]]:
     """Yield forms with their levels and solvers; without constraints the levels of the dae form are all one.
 
-    IDA solves every form, so that form and method are told apart; the explicit method comes on top where it can.
+    IDA solves every form, so that form and method are told apart; the explicit method comes on top where it can, and
+    the symplectic one where the scene has a Hamiltonian.
     """
     shared = implicit_solver()
     assembly = assembled("dae", "ggl")
@@ -267,6 +270,8 @@ def _kinds(assembled: Assembled, forms: Sequence[str], levels: Sequence[str]) ->
         yield "reduced", "", shared
         if assembly.reduced.coordinates and not assembly.reduced.constraints:
             yield "reduced", "", "explicit"
+            if is_canonical(assembly):
+                yield "reduced", "", "gauss"
     if "dae" in forms:
         has_constraints = bool(assembly.maximal.constraints)
         yield from (("dae", level, shared) for level in (levels if has_constraints else levels[:1]))

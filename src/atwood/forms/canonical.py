@@ -1,0 +1,167 @@
+"""Hamilton's equations of a scene as a program, in coordinates that may be of any kind.
+
+Let the rates of the coordinates be ``q' = f(q, u, t)``, affine in the speeds u. With a momentum P for each coordinate,
+``H(q, P, t) = max_u [P f(q, u, t) - L(q, u, t)]`` has the equations
+
+    q' = f,    P' = dL/dq - d(P f)/dq,    with u from  d(P f)/du = dL/du
+
+(Pontryagin's form of the Legendre transform). Where rates are speeds, that is Goldstein's equation 8.18. For a
+quaternion there are four momenta for three speeds: H on the larger space has the scene's motions as solutions, with the
+size of the quaternion and its product with the momentum constant. Both are quadratic, so that methods of Gauss keep
+them exactly (Hairer, Lubich and Wanner, Geometric Numerical Integration, theorem IV.2.1). Nothing is singular, and no
+forces of constraints are needed. H itself is never written out: only L is differentiated.
+"""
+
+from __future__ import annotations
+
+from atwood.errors import UnsupportedError, UsageError
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute, vjp
+from atwood.forms.accelerations import solve_symmetric
+from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
+from atwood.forms.lagrangian import Lagrangian, lagrangian_along_speeds
+from atwood.forms.program import rates_are_speeds
+from atwood.late import dataclass
+
+__all__ = ["CanonicalPrograms", "canonical_programs", "is_canonical"]
+
+_CANONICAL: Key[CanonicalPrograms] = Key("canonical equations")
+
+
+@dataclass(frozen=True, eq=False)
+class CanonicalPrograms:
+    """Hamilton's equations of a scene.
+
+    Attributes
+    ----------
+    equations
+        Program of (t, q, P), and of speeds if `moving_mass`, with q', P' and the speeds; these are left out where they
+        are q'. With a moving mass the speeds are those after a step of Newton's method from those that were given.
+    momenta
+        Program of (t, q, u) with dL/du, and the derivatives of the rates by the speeds, row by row.
+    moving_mass
+        Whether the second derivatives of L by the speeds depend on these.
+    plain
+        Whether rates are speeds, so that P is dL/du.
+    """
+
+    equations: Program
+    momenta: Program
+    moving_mass: bool
+    plain: bool
+
+
+def canonical_programs(assembly: Assembly) -> CanonicalPrograms:
+    """Return Hamilton's equations of a scene in the reduced form.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+
+    Raises
+    ------
+    UnsupportedError
+        If it has no Hamiltonian, or forces act that do not follow from it.
+    """
+    return assembly.shared.get(_CANONICAL, lambda: _make(assembly))
+
+
+def is_canonical(assembly: Assembly) -> bool:
+    """Return whether a scene is a Hamiltonian system in its coordinates, and no law calls a function in Python."""
+    if assembly.reduced.constraints or not assembly.reduced.coordinates:
+        return False
+    try:
+        found = canonical_programs(assembly)
+    except (UnsupportedError, UsageError):
+        return False
+    return not any(node.operation == "external" for node in found.equations.nodes)
+
+
+def _refuse(assembly: Assembly, found: Lagrangian) -> None:
+    """Refuse a scene that is no Hamiltonian system."""
+    equations, name = assembly.reduced, assembly.flat.name
+    advice = "Use the solver 'explicit' or 'ida'."
+    if equations.solved_speeds or any(not one.holonomic for one in equations.constraints):
+        raise UnsupportedError("it rolls, and its flow is not canonical", where=name, advice=advice)
+    if equations.constraints:
+        what = "closed loops leave constraints among its coordinates, whose momenta are not free"
+        raise UnsupportedError(what, where=equations.constraints[0].key[0], advice=advice)
+    if equations.states:
+        raise UnsupportedError("parts have states of their own, which have no momenta", where=name, advice=advice)
+    for part in found.parts:
+        if not part.rayleigh.is_zero or any(not force.is_zero for force in part.forces):
+            raise UnsupportedError(
+                "its forces do not follow from a Hamiltonian, and its flow is not canonical",
+                where=part.path,
+                advice=advice,
+            )
+
+
+def _make(assembly: Assembly) -> CanonicalPrograms:
+    equations = assembly.reduced
+    found = lagrangian_along_speeds(assembly, equations)
+    _refuse(assembly, found)
+    graph, q, u = found.graph, list(found.coordinates), list(found.velocities)
+    plain = rates_are_speeds(equations)
+    p = [graph.symbol(f"P:{one.name}") for one in found.names]
+    rates, lagrangian = list(found.rates), found.lagrangian
+    momenta = vjp([lagrangian], [graph.one], u)
+    mass = jacobian(momenta, u)
+    entries = {(i, j): one for i, j, one in zip(mass.rows, mass.columns, mass.entries, strict=True)}
+    entries = {place: one for place, one in entries.items() if place[0] <= place[1] and not one.is_zero}
+    idle = [one.name for i, one in enumerate(found.velocity_names) if (i, i) not in entries]
+    if idle:
+        raise UnsupportedError(
+            "it has no inertia, so that momenta do not determine velocities and there is no Hamiltonian",
+            where=idle[0],
+            advice="Use the solver 'explicit' or 'ida'.",
+        )
+    moving = any(depends_on(one, u) for one in entries.values())
+    wanted = p if plain else vjp(rates, p, u)
+    if moving:
+        gaps = [a - b for a, b in zip(wanted, momenta, strict=True)]
+        solution = [v + step for v, step in zip(u, solve_symmetric(entries, gaps), strict=True)]
+    else:
+        still = dict.fromkeys(u, 0.0)
+        gaps = [a - b for a, b in zip(wanted, substitute(momenta, still), strict=True)]
+        solution = solve_symmetric(entries, gaps)
+    pushes = vjp([lagrangian], [graph.one], q)
+    if not plain:
+        pushes = [one - other for one, other in zip(pushes, vjp(rates, p, q), strict=True)]
+    there = dict(zip(u, solution, strict=True))
+    outputs = substitute([*rates, *pushes], there)
+    n, name = len(q), assembly.flat.name
+    groups = [InputGroup("t", (found.time,)), InputGroup("q", tuple(q)), InputGroup("p", tuple(p))]
+    given = [OutputGroup("rates", tuple(outputs[:n])), OutputGroup("pushes", tuple(outputs[n:]))]
+    if moving:
+        groups.append(InputGroup("u", tuple(u)))
+    if moving or not plain:
+        given.append(OutputGroup("speeds", tuple(solution)))
+    parameters = assembly.parameters
+    return CanonicalPrograms(
+        Program(f"{name} (Hamilton's equations)", tuple(groups), parameters, tuple(given)),
+        _momenta_program(found, momenta, f"{name} (momenta)", parameters, plain),
+        moving,
+        plain,
+    )
+
+
+def _momenta_program(
+    found: Lagrangian, momenta: list[Expression], name: str, parameters: tuple[Expression, ...], plain: bool
+) -> Program:
+    """Return the program of (t, q, u) with the momenta along the speeds, and how rates follow from speeds."""
+    u, n = list(found.velocities), len(found.coordinates)
+    outputs = [OutputGroup("momenta", tuple(momenta))]
+    if not plain:
+        entries = [found.graph.zero] * (n * len(u))
+        slopes = jacobian(list(found.rates), u)
+        for row, column, entry in zip(slopes.rows, slopes.columns, slopes.entries, strict=True):
+            entries[row * len(u) + column] = entry
+        outputs.append(OutputGroup("rates by speeds", tuple(entries)))
+    groups = (
+        InputGroup("t", (found.time,)),
+        InputGroup("q", found.coordinates),
+        InputGroup("u", found.velocities),
+    )
+    return Program(name, groups, parameters, tuple(outputs))

@@ -1,0 +1,268 @@
+"""The methods of Gauss as machine code: no Python runs between outputs."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from ctypes import c_double, c_int, c_int64, c_void_p
+
+import numpy as np
+
+from atwood.codegen.llvm.build import build_code, default_options
+from atwood.codegen.llvm.module import CodeOptions, Part
+from atwood.errors import KernelEvaluationError, SolveError, UnsupportedError
+from atwood.expr import Program
+from atwood.integrators.event_location import State
+from atwood.integrators.explicit_problem import CompiledRates, Counts, Outcome
+from atwood.integrators.gauss.code import FUNCTIONS, gauss_code
+from atwood.integrators.gauss.layout import COUNTS, NUMBERS, POINTERS, Layout
+from atwood.integrators.gauss.tableau import tableau
+from atwood.integrators.protocol import FloatArray
+
+__all__ = ["CompiledGauss", "GaussStepper"]
+
+_UNLIMITED = 2**62
+_NO_VALUE = 3
+_HALVINGS, _LOOKED_AT, _CLOSE = 60, 40, 0.2
+"""So many steps are tried, on so many steps of the motion each, until an error is so near to what is allowed."""
+
+_SHAPES = {
+    "run": (c_void_p,),
+    "interpolate": (c_void_p, c_double, c_void_p, c_void_p),
+    "sample": (c_void_p, c_void_p, c_int64, c_void_p, c_void_p),
+    "begin": (c_void_p,),
+    "trial": (c_void_p, c_double, c_double, c_void_p, c_void_p),
+    "speeds": (c_void_p, c_double, c_void_p, c_void_p),
+}
+
+
+class CompiledGauss:
+    """Hamilton's equations with the steps of a method, for any parameter values and any step.
+
+    Parameters
+    ----------
+    equations
+        Program of (t, q, p), or of (t, q, p, u), with q' and p', and with the speeds where these are not q'.
+    speeds
+        How many speeds there are.
+    order
+        Of the method, one of `atwood.integrators.gauss.tableau.ORDERS`.
+
+    Raises
+    ------
+    UnsupportedError
+        If the equations call functions in Python.
+    """
+
+    def __init__(self, equations: Program, speeds: int, order: int) -> None:
+        if any(node.operation == "external" for node in equations.nodes):
+            raise UnsupportedError(
+                "its laws call functions in Python, which the methods of Gauss cannot",
+                where=equations.name,
+                advice="Use the solver 'ida'.",
+            )
+        n = len(equations.inputs[1].symbols)
+        self.order = order
+        self.layout = Layout(n, speeds, order // 2, len(equations.outputs) > 2, len(equations.inputs) > 3)
+        part = Part("kernel", equations)
+        level = max(2, default_options([part]).level) if equations.size < _LARGE else default_options([part]).level
+        options = CodeOptions(level=level, sincos=default_options([part]).sincos)
+        self._built = build_code([part], options, more=gauss_code(self.layout, tableau(order)), exports=FUNCTIONS)
+        addresses = self._built.code.addresses
+        self.functions = {name: ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in _SHAPES.items()}
+        self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(addresses["kernel_prologue"])
+        self._derived = len(equations.prologue)
+
+    def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
+        """Return the array of a session, and what it leads to."""
+        values = np.array(parameter_values, dtype=np.float64)
+        derived, scratch = np.empty(max(self._derived, 1)), np.empty(max(self._built.scratch, 1))
+        self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
+        memory = np.zeros(self.layout.places["end"])
+        memory[:2].view(np.uint64)[:] = derived.ctypes.data, scratch.ctypes.data
+        return memory, (self._built, derived, scratch)
+
+
+_LARGE = 3_000
+"""Equations of more nodes are compiled with less effort."""
+
+
+class GaussStepper:
+    """Takes the steps of a method of Gauss, all equally long; outputs in between are steps of their own.
+
+    The state that it is given and gives is (q, u); what it integrates is (q, p).
+
+    Parameters
+    ----------
+    compiled
+        The method.
+    parameter_values
+        Values of the parameters of its equations.
+    momenta
+        ``momenta(t, q, u)``: what p is there.
+    rates
+        The rates of (q, u), which events and outputs read.
+    step
+        The step, s.
+    sizes
+        How large coordinates and momenta are in the scene.
+    """
+
+    def __init__(
+        self,
+        compiled: CompiledGauss,
+        parameter_values: FloatArray,
+        momenta: Callable[[float, FloatArray, FloatArray], FloatArray],
+        rates: CompiledRates,
+        step: float,
+        sizes: FloatArray,
+    ) -> None:
+        self._compiled, self._momenta, self._rates = compiled, momenta, rates
+        layout = compiled.layout
+        self._memory, self._keep = compiled.memory(parameter_values)
+        self._memory[2:4].view(np.uint64)[:] = rates.function, rates.data
+        places, n = layout.places, layout.size
+        self._places, self._session = places, c_void_p(self._memory.ctypes.data)
+        self._numbers = self._memory[places["numbers"] : places["numbers"] + len(NUMBERS)]
+        self._counts = self._memory[places["counts"] : places["counts"] + len(COUNTS)].view(np.int64)
+        self._y = self._memory[places["y"] : places["y"] + n]
+        self._numbers[_STEP] = step
+        self._memory[places["per_size"] : places["per_size"] + n] = 1.0 / sizes
+        self._width = layout.coordinates + layout.speeds
+        self._functions = compiled.functions
+
+    @property
+    def counts(self) -> Counts:
+        """What it has done so far, over all starts."""
+        steps, failures, evaluations, undefined = (int(self._counts[k]) for k in _COUNTED)
+        return Counts(steps, failures, evaluations, undefined)
+
+    @property
+    def step(self) -> float:
+        """The step, s."""
+        return float(self._numbers[_STEP])
+
+    def take_step(self, step: float) -> None:
+        """Take steps of another length from the next start on."""
+        self._numbers[_STEP] = step
+
+    def start(self, t: float, y: FloatArray) -> bool:
+        """Start anew from a state; return whether its equations have a value there."""
+        layout = self._compiled.layout
+        n, m = layout.coordinates, layout.speeds
+        q, u = y[:n], y[n:]
+        self._y[:n], self._y[n:] = q, self._momenta(t, q, u)
+        for area in ("main", "aside"):
+            at = self._places[f"{area}.U"]
+            self._memory[at : at + layout.stages * m] = np.tile(u, layout.stages)
+        self._numbers[_T] = t
+        return bool(np.isfinite(self._y).all()) and self._functions["begin"](self._session) == 0
+
+    def run(self, t_stop: float, steps: int) -> Outcome:
+        """Take steps until one ends at or after a time, but no more than so many."""
+        self._numbers[_STOP] = t_stop
+        self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
+        return Outcome(self._checked(self._functions["run"](self._session)))
+
+    def state(self) -> State:
+        """Return time, values and rates at the end of the last step."""
+        return self.interpolate(float(self._numbers[_T]))
+
+    def interpolate(self, t: float) -> State:
+        """Return the state at a time within the last step, by a step that ends there."""
+        y, yp = np.empty((2, self._width))
+        if self._functions["interpolate"](self._session, t, y.ctypes.data, yp.ctypes.data):
+            raise KernelEvaluationError(f"there is no step to t = {t:.9g} within one that there is")
+        return t, y, yp
+
+    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
+        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        y, yp = np.empty((2, len(times), self._width))
+        self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
+        tables = (array.ctypes.data for array in (y, yp))
+        outcome = self._functions["sample"](self._session, times.ctypes.data, len(times), *tables)
+        filled = int(self._counts[_FILLED])
+        if outcome == _NO_VALUE:
+            raise KernelEvaluationError(f"there is no step to t = {times[filled]:.9g} within one that there is")
+        return y[:filled], yp[:filled], Outcome(self._checked(outcome))
+
+    def _checked(self, outcome: int) -> int:
+        if outcome == Outcome.TOO_SMALL:
+            raise KernelEvaluationError(
+                f"the equations of a step of {self.step:.3g} s have no solution that iteration finds: give a smaller "
+                "step"
+            )
+        return outcome
+
+    def find_step(self, t: float, y: FloatArray, end: float, tolerances: FloatArray, relative: float) -> float:
+        """Return a step whose error is within tolerances along the first steps of a motion, and take it from here on.
+
+        The error is that of a step against two of half its length.
+
+        Parameters
+        ----------
+        t, y
+            The start.
+        end
+            The time of the end, s.
+        tolerances, relative
+            Absolute tolerances of q and u, and the relative one.
+
+        Raises
+        ------
+        SolveError
+            If no step is accurate enough.
+        """
+        step, best, too_long = (end - t) / 4.0, 0.0, np.inf
+        order = self._compiled.order
+        for _ in range(_HALVINGS):
+            error = self._error(t, y, min(step, end - t), end, tolerances, relative)
+            factor = 0.9 * max(error, 1e-300) ** (-1.0 / (order + 1)) if np.isfinite(error) else 0.6
+            if error <= 1.0:
+                best = step
+                step *= min(2.0, factor)
+                if error > _CLOSE or step > min(0.95 * too_long, end - t):
+                    break
+            else:
+                too_long = step
+                step = max(step * min(0.9, max(0.1, factor)), 0.5 * (best + step) if best else 0.0)
+        if best:
+            self._numbers[_STEP] = best
+            return best
+        raise SolveError(f"no step is as accurate as asked for from t = {t:.9g} on", advice="Give a step, or rtol.")
+
+    def _error(
+        self, t: float, y: FloatArray, step: float, end: float, tolerances: FloatArray, relative: float
+    ) -> float:
+        """Return the largest error of the first steps, in units of the tolerances; infinite where there is none."""
+        self._numbers[_STEP] = step
+        if not self.start(t, y):
+            raise KernelEvaluationError(f"the equations have no value at t = {t:.9g}")
+        here, worst = self._y.copy(), 0.0
+        whole, half, other = np.empty((3, len(here)))
+        for k in range(_LOOKED_AT):
+            now = t + k * step
+            if now >= end or worst > 1e3:
+                break
+            middle, short = now + 0.5 * step, 0.5 * step
+            parts = ((now, step, here, whole), (now, short, here, half), (middle, short, half, other))
+            for begin, length, source, target in parts:
+                if self._functions["trial"](self._session, begin, length, source.ctypes.data, target.ctypes.data):
+                    return np.inf
+            ends = []
+            for one in (whole, other):
+                found = np.empty(self._width)
+                if self._functions["speeds"](self._session, now + step, one.ctypes.data, found.ctypes.data):
+                    return np.inf
+                ends.append(found)
+            allowed = tolerances + relative * np.abs(ends[1])
+            worst = max(worst, float(np.max(np.abs(ends[0] - ends[1]) / allowed)))
+            here = other.copy()
+        return worst
+
+
+_T, _STOP, _STEP = map(NUMBERS.index, ("t", "stop", "step"))
+_LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
+_COUNTED = tuple(map(COUNTS.index, ("steps", "failures", "evaluations", "undefined")))
+assert POINTERS[:2] == ("derived", "scratch")
