@@ -30,13 +30,16 @@ if TYPE_CHECKING:
     from atwood_library.drives.rotational_maxwell import RotationalMaxwell as RotationalMaxwell
     from atwood_library.drives.rotational_motion import RotationalMotion as RotationalMotion
     from atwood_library.drives.rotational_resistance import RotationalResistance as RotationalResistance
+    from atwood_library.drives.rotational_sensor import RotationalSensor as RotationalSensor
     from atwood_library.drives.rotational_source import RotationalSource as RotationalSource
     from atwood_library.drives.rotational_spring_damper import RotationalSpringDamper as RotationalSpringDamper
+    from atwood_library.drives.rotor import Rotor as Rotor
     from atwood_library.drives.translational_coupling import TranslationalCoupling as TranslationalCoupling
     from atwood_library.drives.translational_gap import TranslationalGap as TranslationalGap
     from atwood_library.drives.translational_maxwell import TranslationalMaxwell as TranslationalMaxwell
     from atwood_library.drives.translational_motion import TranslationalMotion as TranslationalMotion
     from atwood_library.drives.translational_resistance import TranslationalResistance as TranslationalResistance
+    from atwood_library.drives.translational_sensor import TranslationalSensor as TranslationalSensor
     from atwood_library.drives.translational_source import TranslationalSource as TranslationalSource
     from atwood_library.drives.translational_spring_damper import TranslationalSpringDamper as TranslationalSpringDamper
     from atwood_library.fields.charge import Charge as Charge
@@ -198,8 +201,10 @@ _MODULES = {
     "RotationalMaxwell": "drives.rotational_maxwell",
     "RotationalMotion": "drives.rotational_motion",
     "RotationalResistance": "drives.rotational_resistance",
+    "RotationalSensor": "drives.rotational_sensor",
     "RotationalSource": "drives.rotational_source",
     "RotationalSpringDamper": "drives.rotational_spring_damper",
+    "Rotor": "drives.rotor",
     "SampleAndHold": "blocks.sample_and_hold",
     "SampleDelay": "blocks.sample_delay",
     "SampledFeedback": "blocks.sampled_feedback",
@@ -226,6 +231,7 @@ _MODULES = {
     "TranslationalMaxwell": "drives.translational_maxwell",
     "TranslationalMotion": "drives.translational_motion",
     "TranslationalResistance": "drives.translational_resistance",
+    "TranslationalSensor": "drives.translational_sensor",
     "TranslationalSource": "drives.translational_source",
     "TranslationalSpringDamper": "drives.translational_spring_damper",
     "Tube": "parts.tube",

@@ -198,6 +198,24 @@ def test_a_part_is_replaced_by_keyword_subclass_or_replace():
             bob: Bob = Wheel()
 
 
+def test_a_part_of_a_model_in_a_model_is_replaced_by_its_path():
+    scene, other = Outer(), Outer()
+    new = scene.replace("left.upper.bob", HeavyBob(mass=7.0))
+    assert scene.left.upper.bob is new is scene["left.upper.bob"]
+    assert new.path == "left.upper.bob"
+    other.left.upper.replace("bob", HeavyBob(mass=7.0))
+    assert data_of(scene) == data_of(other)
+    assert data_of(scene.copy()) == data_of(scene)
+    scene.replace("pair[1].bob", HeavyBob())
+    assert scene.pair[1].bob.mass == 5.0
+    with pytest.raises(aw.DeclarationError, match="cannot take the place of a HeavyBob"):
+        scene.replace("left.upper.bob", Bar(length=1.0))
+    with pytest.raises(aw.DeclarationError, match=r"left\.upper\.bob: it has no parts of its own"):
+        scene.replace("left.upper.bob.hand", Bob())
+    with pytest.raises(aw.UsageError, match="Did you mean 'upper'"):
+        scene.replace("left.uper.bob", Bob())
+
+
 def test_what_takes_the_place_of_a_part_must_have_all_its_connected_ends():
     class Deep(aw.Model):
         row: Row = Row(n=3)

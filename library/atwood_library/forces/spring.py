@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from atwood import Component, Point, Scalar, connector, dot, is_zero, observable, parameter, potential
+from collections.abc import Iterable
+
+from atwood import (
+    Component,
+    Point,
+    PointInertia,
+    Scalar,
+    connector,
+    dot,
+    inertia,
+    is_zero,
+    observable,
+    parameter,
+    potential,
+)
 
 
 class Spring(Component):
-    """A massless spring between two points, linear in its extension.
+    """A spring between two points, linear in its extension, massless unless a mass is given.
 
     Potential energy ``1/2 k (d - d0)^2`` with the distance d of its ends (Goldstein, section 1.4). On a line the
-    distance is signed in the order in which the ends start, as in a textbook's row of masses.
+    distance is signed in the order in which the ends start, as in a textbook's row of masses. A mass is spread evenly
+    over the coils, each of which moves as its place between the ends does: ``m (va^2 + va . vb + vb^2)/6``; or it is at
+    one place between them.
     """
 
-    synonyms = ("LineForce",)
+    synonyms = ("LineForce", "Translational spring in space", "LineForceWithMass", "Coil spring")
 
     stiffness: float = parameter(1.0, unit="N/m", minimum=0.0, doc="Force for an extension by one metre.")
     natural_length: float = parameter(0.0, unit="m", minimum=0.0, doc="Length without force.")
@@ -21,12 +37,28 @@ class Spring(Component):
         choices=("restoring", "repelling"),
         doc="Whether it pulls back to its natural length, or pushes away from it as one of negative stiffness.",
     )
+    mass: float = parameter(0.0, unit="kg", minimum=0.0, doc="Mass of the spring.")
+    mass_at: float | None = parameter(
+        None, minimum=0.0, maximum=1.0, doc="Where the mass is, from 0 at a to 1 at b; none if it is spread evenly."
+    )
     a: Point = connector(Point, "One end.")
     b: Point = connector(Point, "The other end.")
 
     def signed_stiffness(self) -> Scalar:
         """Return the stiffness, negative where the spring repels."""
         return self.stiffness if self.acts == "restoring" else -self.stiffness
+
+    @inertia
+    def coils(self) -> Iterable[PointInertia]:
+        """Return the inertia of the coils."""
+        if is_zero(self.mass):
+            return
+        if self.mass_at is None:
+            first, mixed, second = self.mass / 3.0, self.mass / 6.0, self.mass / 3.0
+        else:
+            s, rest = self.mass_at, 1.0 - self.mass_at
+            first, mixed, second = self.mass * (rest * rest), self.mass * (s * rest), self.mass * (s * s)
+        yield PointInertia([self.a, self.b], [[first, mixed], [mixed, second]])
 
     @potential
     def elastic_energy(self) -> Scalar:

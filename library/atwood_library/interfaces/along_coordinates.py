@@ -7,7 +7,7 @@ from typing import Any
 
 from atwood import CoordinateLoad, Scalar, is_zero, maximum, minimum, select
 
-__all__ = ["between", "gap_contact", "push", "resistance"]
+__all__ = ["accelerated", "between", "gap_contact", "push", "resistance"]
 
 
 def between(part: Any) -> tuple[Scalar, Scalar]:
@@ -21,6 +21,13 @@ def between(part: Any) -> tuple[Scalar, Scalar]:
     if part.against == "ground":
         return part.b.value, part.b.rate
     return part.b.value - part.a.value, part.b.rate - part.a.rate
+
+
+def accelerated(part: Any) -> Scalar:
+    """Return the second rate of what `between` returns; only observables may ask for it."""
+    if part.against == "ground":
+        return part.b.acceleration
+    return part.b.acceleration - part.a.acceleration
 
 
 def gap_contact(beyond: Scalar, rate: Scalar, damping: float, stiffness: float) -> Scalar:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from atwood import ParameterError, Scalar, Vector, parameter
+from atwood import ParameterError, Scalar, Vector, as_vector, parameter
 from atwood_library.interfaces.solid import Solid, Tensor
 
-__all__ = ["Shape", "along", "diagonal", "revolved"]
+__all__ = ["Axis", "Shape", "along", "diagonal", "revolved"]
+
+Axis = str | Vector | tuple[float, float, float]
+"""An axis of the frame: ``"x"``, ``"y"`` or ``"z"``, or a unit vector in its axes."""
 
 
 class Shape(Solid):
@@ -77,16 +80,19 @@ class Shape(Solid):
             )
 
 
-def along(axis: str, distance: Scalar) -> Vector:
+def along(axis: Axis, distance: Scalar) -> Vector:
     """Return a vector along an axis of the frame.
 
     Parameters
     ----------
     axis
-        ``"x"``, ``"y"`` or ``"z"``.
+        ``"x"``, ``"y"`` or ``"z"``, or a unit vector.
     distance
         Its component there.
     """
+    if not isinstance(axis, str):
+        vector: Vector = as_vector(axis) * distance
+        return vector
     return Vector(*(distance if name == axis else 0.0 for name in "xyz"))
 
 
@@ -95,14 +101,21 @@ def diagonal(x: Scalar, y: Scalar, z: Scalar) -> Tensor:
     return (x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)
 
 
-def revolved(axis: str, about: Scalar, across: Scalar) -> Tensor:
+def revolved(axis: Axis, about: Scalar, across: Scalar) -> Tensor:
     """Return the tensor of a body of revolution.
 
     Parameters
     ----------
     axis
-        Its axis: ``"x"``, ``"y"`` or ``"z"``.
+        Its axis: ``"x"``, ``"y"`` or ``"z"``, or a unit vector n.
     about, across
-        Its moments about the axis and across it.
+        Its moments about the axis and across it; the tensor is ``across 1 + (about - across) n n``.
     """
-    return diagonal(*(about if name == axis else across for name in "xyz"))
+    if isinstance(axis, str):
+        return diagonal(*(about if name == axis else across for name in "xyz"))
+    n = tuple(as_vector(axis))
+    x, y, z = (
+        tuple((about - across) * (a * b) + (across if i == k else 0.0) for k, b in enumerate(n))
+        for i, a in enumerate(n)
+    )
+    return (x[0], x[1], x[2]), (y[0], y[1], y[2]), (z[0], z[1], z[2])

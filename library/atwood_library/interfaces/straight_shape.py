@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from atwood import Frame, Placement, connector, joint, parameter
-from atwood_library.interfaces.shape import Shape, along
+from atwood_library.interfaces.shape import Axis, Shape, along
 
 
 class StraightShape(Shape):
@@ -11,15 +11,22 @@ class StraightShape(Shape):
 
     length: float = parameter(1.0, unit="m", above=0.0, doc="Length, from a to b.")
     axis: str = parameter("z", choices=("x", "y", "z"), doc="Axis of the frame that it lies along, from a to b.")
+    direction: tuple[float, float, float] | None = parameter(
+        None, direction=True, doc="Any other direction in the frame that it lies along; none for that of `axis`."
+    )
     a: Frame = connector(Frame, "The middle of the end at the negative side of the axis.")
     b: Frame = connector(Frame, "The middle of the end at the positive side of the axis.")
+
+    def lies_along(self) -> Axis:
+        """Return the axis that it lies along."""
+        return self.axis if self.direction is None else self.direction
 
     @joint("frame", "a", rigid=True, spaces=("line", "plane", "space"))
     def near_end(self) -> Placement:
         """Place a in the axes of the frame."""
-        return Placement(along(self.axis, -0.5 * self.length), 0.0, axes="a")
+        return Placement(along(self.lies_along(), -0.5 * self.length), 0.0, axes="a")
 
     @joint("frame", "b", rigid=True, spaces=("line", "plane", "space"))
     def far_end(self) -> Placement:
         """Place b in the axes of the frame."""
-        return Placement(along(self.axis, 0.5 * self.length), 0.0, axes="a")
+        return Placement(along(self.lies_along(), 0.5 * self.length), 0.0, axes="a")

@@ -28,9 +28,9 @@ class Bar(StraightShape):
 
     def gyration(self) -> Tensor:
         """Return the inertia per mass."""
-        return revolved(self.axis, 0.0, self.length * self.length / 12.0)
+        return revolved(self.lies_along(), 0.0, self.length * self.length / 12.0)
 
     def outline(self) -> Outline:
         """Return what it looks like: a round bar of its section."""
         half, r = 0.5 * self.length, math.sqrt(self.area / math.pi)
-        return Outline.revolved(((0.0, -half), (r, -half), (r, half), (0.0, half)), self.axis)
+        return Outline.revolved(((0.0, -half), (r, -half), (r, half), (0.0, half)), self.lies_along())

@@ -24,9 +24,9 @@ class Cylinder(StraightShape):
     def gyration(self) -> Tensor:
         """Return the inertia per mass."""
         square = self.radius * self.radius
-        return revolved(self.axis, square / 2.0, (3.0 * square + self.length * self.length) / 12.0)
+        return revolved(self.lies_along(), square / 2.0, (3.0 * square + self.length * self.length) / 12.0)
 
     def outline(self) -> Outline:
         """Return what it looks like."""
         half, r = 0.5 * self.length, self.radius
-        return Outline.revolved(((0.0, -half), (r, -half), (r, half), (0.0, half)), self.axis)
+        return Outline.revolved(((0.0, -half), (r, -half), (r, half), (0.0, half)), self.lies_along())

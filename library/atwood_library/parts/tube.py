@@ -34,12 +34,12 @@ class Tube(StraightShape):
     def gyration(self) -> Tensor:
         """Return the inertia per mass."""
         squares = self.outer_radius * self.outer_radius + self.inner_radius * self.inner_radius
-        return revolved(self.axis, squares / 2.0, (3.0 * squares + self.length * self.length) / 12.0)
+        return revolved(self.lies_along(), squares / 2.0, (3.0 * squares + self.length * self.length) / 12.0)
 
     def outline(self) -> Outline:
         """Return what it looks like."""
         half, outer, inner = 0.5 * self.length, self.outer_radius, self.inner_radius
         if inner == 0.0:
-            return Outline.revolved(((0.0, -half), (outer, -half), (outer, half), (0.0, half)), self.axis)
+            return Outline.revolved(((0.0, -half), (outer, -half), (outer, half), (0.0, half)), self.lies_along())
         corners = ((inner, -half), (outer, -half), (outer, half), (inner, half))
-        return Outline.revolved(corners, self.axis, is_ring=True)
+        return Outline.revolved(corners, self.lies_along(), is_ring=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from atwood.checking.report import Finding
@@ -144,7 +145,8 @@ def _bound(trial: Trial, units: Units) -> Any:
         if isinstance(one, JointCoordinate):
             value, rate = trial.joint_references.get(name, (0.5, 0.3))
             size = length if isinstance(one, Slide) else 1.0
-            motions[name] = Motion(value=value * size, rate=rate * size / time)
+            second = 0.7 * rate * size / time**2
+            motions[name] = Motion(value=value * size, rate=rate * size / time, second_rate=partial(float, second))
             continue
         held, body = trial.poses[name], trial.bodies[name]
         scaled = Body(body.mass * mass, body.center_of_mass * length, _scaled(body.inertia, mass * length**2))

@@ -12,6 +12,7 @@ from atwood.mechanics.dynamics.forces import (
     Site,
     in_body,
     in_coordinates,
+    in_joint_coordinates,
     is_on_velocities,
     joint_gradients,
     local_gradients,
@@ -72,7 +73,7 @@ def find_constraints(mechanism: Mechanism, forest: SpanningForest, placements: P
     Raises
     ------
     UnsupportedError
-        If one follows the output of another component.
+        If one follows the output of another component, or is one on positions that reads a continuous state.
     """
     positions: list[tuple[str, LocalConstraint]] = []
     velocities: list[tuple[str, LocalConstraint]] = []
@@ -87,7 +88,16 @@ def find_constraints(mechanism: Mechanism, forest: SpanningForest, placements: P
             if (path, constraint.law.name, constraint.index) in forest.solved or constraint.value.is_zero:
                 continue
             one = in_coordinates(local, constraint, placements)
-            (velocities if is_on_velocities(local, one.value) else positions).append((path, one))
+            if is_on_velocities(local, one.value):
+                velocities.append((path, one))
+                continue
+            if depends_on(one.value, [state.symbol for state in local.states]):
+                raise UnsupportedError(
+                    "a constraint on positions cannot follow a continuous state",
+                    where=f"{path}.{constraint.law.name}",
+                    advice="Write it as one on velocities, which may read the state and whose rate is then known.",
+                )
+            positions.append((path, one))
     return LeftOver(tuple(positions), tuple(velocities))
 
 
@@ -150,7 +160,7 @@ def velocity_levels(
         _check_affine(path, local, one)
         mapping = {**local_map(site, local, state.kinematics), **signals}
         rate = put_in_place(one.value, mapping)
-        second = _differentiated(site, local, one.value, state.kinematics, mechanism.time)
+        second = _differentiated(site, local, one.value, state.kinematics, mechanism.time, signals)
         key = (path, one.law.name, one.index)
         integral = integrals.get(key)
         value = None if integral is None else integral.value
@@ -211,9 +221,14 @@ def _first_directions(local: LocalPart, time: Expression) -> dict[Expression, Ex
 
 
 def _differentiated(
-    site: Site, local: LocalPart, value: Expression, kinematics: Kinematics, time: Expression
+    site: Site,
+    local: LocalPart,
+    value: Expression,
+    kinematics: Kinematics,
+    time: Expression,
+    signals: Mapping[Expression, Expression] | None = None,
 ) -> Expression:
-    """Return the time derivative of an expression of local positions, orientations and velocities, put in place."""
+    """Return the time derivative of an expression of local positions, orientations, velocities and states, in place."""
     graph, path = site.graph, local.part.path
     directions = _first_directions(local, time)
     mapping = local_map(site, local, kinematics)
@@ -235,5 +250,9 @@ def _differentiated(
             for w, alpha in zip(symbols.spin, spin_rate, strict=True):
                 directions[w] = graph.symbol(f"{w.name}'")
                 mapping[graph.symbol(f"{w.name}'")] = alpha
+    if depends_on(value, [one.symbol for one in local.states]):
+        rates, _ = in_joint_coordinates(local, kinematics, [one.rate for one in local.states])
+        directions.update((one.symbol, rate) for one, rate in zip(local.states, rates, strict=True))
+        mapping.update(signals or {})
     (rate,) = jvp([value], directions)
     return put_in_place(rate, mapping)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from atwood.expr import Expression, Scalar, live, substitute, vjp
+from atwood.expr import Expression, Scalar, jvp, live, substitute, vjp
 from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.dynamics.carried_inertia import CarriedInertia
@@ -15,7 +15,6 @@ from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map, ra
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.body_points import body_point_of
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world
-from atwood.mechanics.kinematics.positions import Kinematics
 from atwood.model.declare.component import Binding
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.contributions import BodyInertia
@@ -180,7 +179,7 @@ def make_binding(
     mapping = local_map(site, local, kinematics) if local.borrowed else {}
     for name, one in local.part.component.connectors().items():
         if isinstance(one, JointCoordinate):
-            motions[name] = _joint_reference_in_place(local, kinematics, local.binding.motions.get(name), mapping)
+            motions[name] = _joint_reference_in_place(equations, local, local.binding.motions.get(name), mapping)
             continue
         node = site.node(path, name)
         body = site.bodies.body_of[node]
@@ -210,14 +209,19 @@ def make_binding(
 
 
 def _joint_reference_in_place(
-    local: LocalPart, kinematics: Kinematics, joint_reference: Motion | None, mapping: Mapping[Expression, Expression]
+    equations: Equations, local: LocalPart, joint_reference: Motion | None, mapping: Mapping[Expression, Expression]
 ) -> Motion:
     """Return a joint coordinate that a part takes hold of, in terms of the state; nothing at the joint itself."""
     if joint_reference is None:
         return Motion()
     found = [joint_reference.value, *(() if joint_reference.rate is None else (joint_reference.rate,))]
-    value, *rate = substitute(in_joint_coordinates(local, kinematics, found)[0], mapping)
-    return Motion(value=value, rate=rate[0] if rate else None)
+    value, *rates = substitute(in_joint_coordinates(local, equations.kinematics, found)[0], mapping)
+    if not rates:
+        return Motion(value=value)
+    course: dict[Expression, Expression | float] = {equations.time: 1.0}
+    course.update(zip(equations.coordinates, equations.rates, strict=True))
+    course.update(zip(equations.speeds, equations.accelerations, strict=True))
+    return Motion(value=value, rate=rates[0], second_rate=lambda: jvp(rates, course)[0])
 
 
 def _turned(mechanism: Mechanism, equations: Equations, motion: Motion, node: int, body: int) -> Motion:

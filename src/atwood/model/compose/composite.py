@@ -254,7 +254,8 @@ class Model(_State, Component):
         Parameters
         ----------
         name
-            Name of the part, or of one element of an array (``"rod[2]"``).
+            Name of the part, or of one element of an array (``"rod[2]"``); or its dotted path, such as ``"arm.motor"``,
+            for a part of a model in it.
         part
             What takes its place.
 
@@ -265,6 +266,12 @@ class Model(_State, Component):
         """
         where = self.path or type(self).__name__
         check(NAME, name, "name", f"{where}.replace", DeclarationError)
+        around, _, last = name.rpartition(".")
+        if around:
+            inner = self[around]
+            if not isinstance(inner, Model):
+                raise DeclarationError("it has no parts of its own", where=inner.path)
+            return inner.replace(last, part)
         if name not in self._parts:
             raise DeclarationError(f"it has no part {name!r}", where=where, advice=suggestion(name, self._parts))
         old = self._parts[name]

@@ -6,7 +6,7 @@ to zero.  Through quantities are positive *into* the component.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
 from atwood.arguments import ANYTHING, BY_PATH, DOC, NAME, TEXT, Kind, Refused, optional, takes
@@ -53,6 +53,8 @@ class Motion:
         Angular velocity along the frame's own axes, in space; None where it follows from the two above.
     value, rate
         Of a joint's coordinate, for a `Shaft` or a `Slide`.
+    second_rate
+        Gives its second rate, which is derived when it is asked for.
     body
         Inertia of the body that the connector is on.
     """
@@ -67,6 +69,7 @@ class Motion:
     spin: Vector | None = None
     value: Scalar = None
     rate: Scalar = None
+    second_rate: Callable[[], Scalar] | None = None
     body: Carried | None = None
 
 
@@ -238,6 +241,11 @@ class JointCoordinate(Connector):
     def rate(self) -> Scalar:
         """The rate of the coordinate."""
         return self._read("rate")
+
+    @property
+    def acceleration(self) -> Scalar:
+        """The second rate of the coordinate; only observables may read it."""
+        return self._read("second_rate")()
 
 
 class Shaft(JointCoordinate):

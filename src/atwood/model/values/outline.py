@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -30,6 +31,8 @@ class Outline:
         about the axis, m, shape (points, 2): counter-clockwise about what is inside, as seen with the axis on the left.
     axis
         Of a surface of revolution: 0, 1 or 2 for x, y or z.
+    axes
+        Where its x, y and z axes point in the axes of the frame, in columns; None if they are the same.
     is_ring
         Whether the line ends where it begins, as that of a tube does; otherwise it begins and ends on the axis.
     vertices, triangles
@@ -40,6 +43,7 @@ class Outline:
     sides: tuple[float, float, float] = (0.0, 0.0, 0.0)
     profile: tuple[tuple[float, float], ...] = ()
     axis: int = 2
+    axes: Any = None
     is_ring: bool = False
     vertices: Any = None
     triangles: Any = None
@@ -54,11 +58,19 @@ class Outline:
 
     @classmethod
     @takes_names
-    def revolved(cls, profile: Iterable[Sequence[float]], axis: str = "z", is_ring: bool = False) -> Outline:
-        """Return a surface of revolution about an axis of the frame, ``"x"``, ``"y"`` or ``"z"``; see `profile`."""
+    def revolved(cls, profile: Iterable[Sequence[float]], axis: Any = "z", is_ring: bool = False) -> Outline:
+        """Return a surface of revolution about an axis of the frame; see `profile`.
+
+        The axis is ``"x"``, ``"y"`` or ``"z"``, or a direction.
+        """
         line = check(_PROFILE, profile, "profile", "Outline.revolved", DeclarationError)
-        check(one_of(("x", "y", "z")), axis, "axis", "Outline.revolved")
         check(FLAG, is_ring, "is_ring", "Outline.revolved")
+        if not isinstance(axis, str):
+            z = check(_DIRECTION, axis, "axis", "Outline.revolved")
+            side = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+            x = side / np.linalg.norm(side)
+            return cls("revolved", profile=line, is_ring=is_ring).turned(x, np.cross(z, x), z)
+        check(one_of(("x", "y", "z")), axis, "axis", "Outline.revolved")
         return cls("revolved", profile=line, axis="xyz".index(axis), is_ring=is_ring)
 
     @classmethod
@@ -74,6 +86,13 @@ class Outline:
             )
         return cls("mesh", vertices=vertices, triangles=triangles)
 
+    @takes_names
+    def turned(self, x_axis: Any, y_axis: Any, z_axis: Any) -> Outline:
+        """Return the same surface with its axes along three unit vectors, square to each other, of the frame."""
+        named = {"x_axis": x_axis, "y_axis": y_axis, "z_axis": z_axis}
+        columns = [check(_DIRECTION, one, name, "Outline.turned") for name, one in named.items()]
+        return replace(self, axes=np.array(columns).T)
+
 
 _LENGTH = number("a length above 0, m", above=0.0)
 
@@ -86,6 +105,16 @@ def _points(value: Any) -> tuple[tuple[float, float], ...]:
 
 
 _PROFILE = Kind("at least two points, each (distance from the axis, height along it), m", _points)
+
+
+def _direction(value: Any) -> Any:
+    given = np.array([float(one) for one in value])
+    if given.shape != (3,) or not np.all(np.isfinite(given)) or not np.any(given):
+        raise Refused
+    return given / np.linalg.norm(given)
+
+
+_DIRECTION = Kind("a direction: three numbers, not all zero", _direction)
 
 
 def _table(value: Any) -> Any:

@@ -64,7 +64,10 @@ class BodyShape:
         if self.kind == "round":
             return self.axes[:, 2]
         outline = self.lump.outline
-        return self.lump.axes[:, 2 if outline is None else outline.axis]
+        if outline is None or outline.axes is None:
+            return self.lump.axes[:, 2 if outline is None else outline.axis]
+        turned: FloatArray = self.lump.axes @ outline.axes[:, outline.axis]
+        return turned
 
     @property
     def radius(self) -> float:

@@ -46,6 +46,11 @@ def outline_mesh(outline: Outline, around: int = 40) -> Mesh:
     around
         How many corners stand for a circle.
     """
+    made = _own_mesh(outline, around)
+    return made if outline.axes is None else made.placed(np.zeros(3), outline.axes)
+
+
+def _own_mesh(outline: Outline, around: int) -> Mesh:
     if outline.kind == "box":
         return box(outline.sides, cells=_PARTS - 3)
     if outline.kind == "mesh":
