@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from atwood import (
     Frame,
     Placement,
@@ -28,7 +30,13 @@ class Pivot(LoadedHinge):
     a damper, a motor and stops.
     """
 
-    synonyms = ("Revolute", "Hinge", "Pin joint", "Revolute joint", "RevolutePlanarLoopConstraint")
+    synonyms: ClassVar[tuple[str, ...]] = (
+        "Revolute",
+        "Hinge",
+        "Pin joint",
+        "Revolute joint",
+        "RevolutePlanarLoopConstraint",
+    )
 
     axis: tuple[float, float, float] = parameter(
         (0.0, -1.0, 0.0),
