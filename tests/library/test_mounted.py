@@ -106,7 +106,7 @@ def test_round_bodies_along_any_direction() -> None:
     n = np.array([2.0, -1.0, 2.0]) / 3.0
     for part in (lib.Cylinder(mass=2.0), lib.Tube(mass=2.0), lib.Bar(mass=2.0)):
         along = np.diag(np.array(part.tensor(), dtype=float))
-        part.direction = tuple(n)
+        part.axis, part.direction = "direction", tuple(n)
         tensor = np.array(part.tensor(), dtype=float)
         assert_allclose(tensor, along[0] * np.eye(3) + (along[2] - along[0]) * np.outer(n, n), atol=1e-15)
         assert_allclose(part.outline().axes[:, 2], n)

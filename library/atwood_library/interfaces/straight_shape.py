@@ -10,16 +10,18 @@ class StraightShape(Shape):
     """A shape along an axis of its frame, which is at its centre; frames a and b are in the middles of its ends."""
 
     length: float = parameter(1.0, unit="m", above=0.0, doc="Length, from a to b.")
-    axis: str = parameter("z", choices=("x", "y", "z"), doc="Axis of the frame that it lies along, from a to b.")
-    direction: tuple[float, float, float] | None = parameter(
-        None, direction=True, doc="Any other direction in the frame that it lies along; none for that of `axis`."
+    axis: str = parameter(
+        "z", choices=("x", "y", "z", "direction"), doc="Axis of the frame that it lies along, from a to b."
+    )
+    direction: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 1.0), direction=True, doc="With that axis, any direction in the frame."
     )
     a: Frame = connector(Frame, "The middle of the end at the negative side of the axis.")
     b: Frame = connector(Frame, "The middle of the end at the positive side of the axis.")
 
     def lies_along(self) -> Axis:
         """Return the axis that it lies along."""
-        return self.axis if self.direction is None else self.direction
+        return self.direction if self.axis == "direction" else self.axis
 
     @joint("frame", "a", rigid=True, spaces=("line", "plane", "space"))
     def near_end(self) -> Placement:

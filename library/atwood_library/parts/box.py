@@ -16,7 +16,7 @@ from atwood import (
     norm,
     parameter,
 )
-from atwood_library.interfaces.shape import Shape, diagonal
+from atwood_library.interfaces.shape import Shape
 from atwood_library.interfaces.solid import Tensor
 
 
@@ -32,8 +32,8 @@ class Box(Shape):
     length_x: float = parameter(1.0, unit="m", above=0.0, doc="Length along x, from a to b.")
     length_y: float = parameter(1.0, unit="m", above=0.0, doc="Length along y.")
     length_z: float = parameter(1.0, unit="m", above=0.0, doc="Length along z.")
-    direction: tuple[float, float, float] | None = parameter(
-        None, direction=True, doc="Direction in the frame of the edges of length_x, from a to b; none for x."
+    direction: tuple[float, float, float] = parameter(
+        (1.0, 0.0, 0.0), direction=True, doc="Direction in the frame of the edges of length_x, from a to b."
     )
     upward: tuple[float, float, float] = parameter(
         (0.0, 0.0, 1.0),
@@ -50,7 +50,7 @@ class Box(Shape):
     def check_values(self) -> None:
         """Refuse edges that are not square to each other."""
         super().check_values()
-        if self.direction is not None and norm(cross(as_vector(self.upward), as_vector(self.direction))) < 1e-6:
+        if norm(cross(as_vector(self.upward), as_vector(self.direction))) < 1e-6:
             raise ParameterError(
                 "it is parallel to the edges of length_x",
                 where=f"{self.path or type(self).__name__}.upward",
@@ -59,8 +59,6 @@ class Box(Shape):
 
     def edges(self) -> tuple[Vector, Vector, Vector]:
         """Return unit vectors along the edges of length_x, length_y and length_z."""
-        if self.direction is None:
-            return Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0)
         x = as_vector(self.direction)
         y = cross(as_vector(self.upward), x)
         y = y / norm(y)
@@ -70,8 +68,6 @@ class Box(Shape):
         """Return the inertia per mass."""
         x, y, z = (side * side for side in (self.length_x, self.length_y, self.length_z))
         about = (y + z) / 12.0, (z + x) / 12.0, (x + y) / 12.0
-        if self.direction is None:
-            return diagonal(*about)
         edges = [tuple(edge) for edge in self.edges()]
 
         def entry(i: int, k: int) -> Scalar:
@@ -96,4 +92,5 @@ class Box(Shape):
     def outline(self) -> Outline:
         """Return what it looks like."""
         drawn = Outline.box(self.length_x, self.length_y, self.length_z)
-        return drawn if self.direction is None else drawn.turned(*self.edges())
+        x, y, z = self.edges()
+        return drawn if (x.x, z.z) == (1.0, 1.0) else drawn.turned(x, y, z)
