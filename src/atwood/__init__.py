@@ -85,6 +85,7 @@ if TYPE_CHECKING:
     from atwood.plotting.mode_shapes import plot_mode
     from atwood.plotting.plots.linear import plot_bode, plot_branches, plot_nyquist, plot_root_locus
     from atwood.plotting.plots.phase import plot_phase_portrait, plot_section
+    from atwood.plotting.plots.polhodes import plot_polhodes
     from atwood.plotting.plots.precision import plot_comparison
     from atwood.plotting.plots.quantities import plot
     from atwood.plotting.plots.sweep import plot_sweep
@@ -211,6 +212,7 @@ __all__ += [
     "plot_mode",
     "plot_nyquist",
     "plot_phase_portrait",
+    "plot_polhodes",
     "plot_root_locus",
     "plot_section",
     "plot_sweep",
@@ -342,6 +344,7 @@ _LATER = {
     "plot_mode": "atwood.plotting.mode_shapes",
     "plot_nyquist": "atwood.plotting.plots.linear",
     "plot_phase_portrait": "atwood.plotting.plots.phase",
+    "plot_polhodes": "atwood.plotting.plots.polhodes",
     "plot_root_locus": "atwood.plotting.plots.linear",
     "plot_section": "atwood.plotting.plots.phase",
     "plot_sweep": "atwood.plotting",
