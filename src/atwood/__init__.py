@@ -85,10 +85,10 @@ if TYPE_CHECKING:
     from atwood.plotting.mode_shapes import plot_mode
     from atwood.plotting.plots.linear import plot_bode, plot_branches, plot_nyquist, plot_root_locus
     from atwood.plotting.plots.phase import plot_phase_portrait, plot_section
-    from atwood.plotting.plots.polhodes import plot_polhodes
     from atwood.plotting.plots.precision import plot_comparison
     from atwood.plotting.plots.quantities import plot
     from atwood.plotting.plots.sweep import plot_sweep
+    from atwood.plotting.polhodes import plot_polhodes
     from atwood.reporting import MechanismReport, report
     from atwood.result.files import SavedResult, load_result, save_result
     from atwood.result.result import Result
@@ -344,7 +344,7 @@ _LATER = {
     "plot_mode": "atwood.plotting.mode_shapes",
     "plot_nyquist": "atwood.plotting.plots.linear",
     "plot_phase_portrait": "atwood.plotting.plots.phase",
-    "plot_polhodes": "atwood.plotting.plots.polhodes",
+    "plot_polhodes": "atwood.plotting.polhodes",
     "plot_root_locus": "atwood.plotting.plots.linear",
     "plot_section": "atwood.plotting.plots.phase",
     "plot_sweep": "atwood.plotting",

@@ -6,7 +6,7 @@ import pytest
 
 import atwood
 from atwood import UsageError, simulate
-from atwood.plotting.plots.polhodes import polhode
+from atwood.plotting.polhodes import polhode
 from atwood_library import Box, PointMass, Weld
 from atwood_library.scenes import DoublePendulum, FreeSymmetricBody, IntermediateAxis
 
