@@ -111,7 +111,8 @@ def plot_polhodes(result: Result, body: str | None = None, file: str | os.PathLi
         begin, end = _SEEN[:2, k], 1.25 * _SEEN[:2, k]
         axes.plot(*np.stack([begin, end]).T, color=INK, linewidth=1.2)
         label = f"{name} moment\n{moments[k]:.4g} kg m\N{SUPERSCRIPT TWO}"
-        axes.text(*(end + 0.16 * end / np.linalg.norm(end)), label, color=INK, fontsize=8, ha="center", va="center")
+        x, y = (float(one) for one in end + 0.16 * end / np.linalg.norm(end))
+        axes.text(x, y, label, color=INK, fontsize=8, ha="center", va="center")
     axes.set_xlim(-1.5, 1.5)
     axes.set_ylim(-1.35, 1.6)
     title = f"{result.assembly.flat.name}: angular momentum seen from {part}"
