@@ -34,7 +34,7 @@ def test_fixed_parts_count_and_what_has_no_polhodes_is_said() -> None:
     scene = atwood.Scene()
     scene.gravity, scene.t_end, scene.space = 0.0, 1.0, "space"
     box, lump = (
-        scene.add("box", Box(length_x=0.3, length_y=0.3, length_z=0.3, mass=1.0)),
+        scene.add("box", Box(length_x=0.3, length_y=0.4, mass=1.0)),
         scene.add("lump", PointMass(mass=0.5)),
     )
     weld = scene.add("weld", Weld(displacement=(0.1, 0.2, 0.05)))
