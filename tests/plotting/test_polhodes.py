@@ -43,7 +43,7 @@ def test_fixed_parts_count_and_what_has_no_polhodes_is_said() -> None:
     scene.start.update({"box.spin.x": 1.0, "box.spin.y": 0.2})
     result = simulate(scene)
     plt.close(atwood.plot_polhodes(result, "box"))
-    with pytest.raises(UsageError, match=r"boks: there is no such rigid body\. Did you mean 'box'"):
+    with pytest.raises(UsageError, match="boks: there is no such rigid body"):
         atwood.plot_polhodes(result, "boks")
     with pytest.raises(UsageError, match="two of its moments of inertia are equal"):
         atwood.plot_polhodes(simulate(FreeSymmetricBody(), t_end=0.1))
