@@ -72,7 +72,6 @@ LONG_FILES = {
     "analysis/dynamics.py",
     "forms/lagrangian.py",
     "forms/accelerations.py",
-    "forms/assembly.py",
     "forms/program.py",
     "integrators/explicit_session.py",
     "integrators/ida/native.py",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from atwood.arrays import FloatArray
+from atwood.forms.quantities import energy_program, known_program
 from atwood.mechanics.outputs.power import applied_power
 from atwood.result.accounts import POWER
 from atwood.simulation.dynamics.reactions import accelerations_and_multipliers, maximal_state
@@ -28,7 +29,7 @@ def dampers(prepared: Prepared) -> bool:
 
 def energies(prepared: Prepared, t: float, q: FloatArray, u: FloatArray) -> tuple[float, float]:
     assembly = prepared.assembly
-    kernel = assembly.kernel(assembly.energy_program)
+    kernel = assembly.kernel(energy_program(assembly))
     kinetic, potential = kernel([t], q, u, np.zeros_like(u), [0.0] * len(assembly.reactions))[0]
     return kinetic, potential
 
@@ -99,7 +100,7 @@ def test_power_balance_at_any_state(name: str, form: str) -> None:
         power = -multipliers @ now.explicit_rate[kept] if balance.constraints else 0.0
         if dampers(prepared):
             assembly = prepared.assembly
-            program = assembly.known_program(POWER, lambda a=assembly: [applied_power(a.mechanism, a.own_equations)])
+            program = known_program(assembly, POWER, lambda a=assembly: [applied_power(a.mechanism, a.own_equations)])
             power += assembly.kernel(program)([t], q, u, a, [0.0] * len(assembly.reactions))[0][0]
         if name == "foucault-pendulum":
             continue  # its drive works, and nothing says how much

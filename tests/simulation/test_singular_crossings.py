@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from atwood import Component, Frame, Point, Scalar, Scene, Vector, connector, event, observable, parameter, simulate
 from atwood.cli.app import main
 from atwood.errors import SolveError
+from atwood.forms.quantities import observer
 from atwood.integrators.ida import library as sundials_library
 from atwood.result.about import describe_run
 from atwood.simulation.singular.collocation import find_arc
@@ -341,6 +342,6 @@ def test_an_arc_is_the_motion_to_rounding(form: str) -> None:
     assert arc is not None
     assert arc.error < 1e-11
     q, u, a = arc.at(times)
-    kernel = plan.assembly.kernel(plan.assembly.observer(("rod.angle",)), vectorized=True)
+    kernel = plan.assembly.kernel(observer(plan.assembly, ("rod.angle",)), vectorized=True)
     found = kernel(times[None, :], q, u, a, np.zeros((len(plan.assembly.reactions), 2)))[0][0]
     assert np.max(np.abs(found - exact.angle(times))) < 1e-13

@@ -8,6 +8,7 @@ import pytest
 from atwood import Component, ExternalFunction, Point, Scene, UsageError, connector, dynamics, external, force, select
 from atwood.analysis.dynamics import Dynamics
 from atwood.errors import KernelEvaluationError
+from atwood.forms.quantities import observer
 from atwood.model.declare.contributions import Load
 from atwood_library import Drag, Force, Ground, PointMass, Rod
 from atwood_library.scenes import SCENES
@@ -87,7 +88,7 @@ def test_jacobians_of_quantities_are_their_derivatives(name: str, path: str) -> 
     found, prepared, states = around(name, "reduced", 2)
     assembly = prepared.assembly
     paths = tuple(one for one in (f"{path}.x", f"{path}.y", f"{path}.z") if one in assembly.observables) or (path,)
-    kernel = assembly.kernel(assembly.observer(paths))
+    kernel = assembly.kernel(observer(assembly, paths))
 
     def values(q: Any) -> Any:
         n = len(found.speeds)

@@ -28,6 +28,7 @@ from atwood.expr import Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
+from atwood.forms.quantities import known_program
 from atwood.late import dataclass
 from atwood.showing import count_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
@@ -161,7 +162,7 @@ class Hamiltonian:
     def _velocities_of(self, q: FloatArray, u: FloatArray, t: float) -> FloatArray:
         """Return the derivatives of the coordinates, from speeds that may be angular velocities."""
         equations = self.assembly.reduced
-        program = self.assembly.known_program(_VELOCITIES, lambda: list(equations.rates))
+        program = known_program(self.assembly, _VELOCITIES, lambda: list(equations.rates))
         idle = np.zeros(len(equations.speeds)), np.zeros(len(self.assembly.reactions))
         try:
             return np.asarray(self.assembly.kernel(program)([t], q, u, *idle)[0], dtype=float)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,12 +12,11 @@ import numpy as np
 from atwood.arguments import BY_PATH, optional, takes
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel, CompiledProgram, compile_program
-from atwood.errors import ParameterError, UsageError, suggestion
-from atwood.expr import Expression, InputGroup, OutputGroup, Program
+from atwood.errors import UsageError
+from atwood.expr import Expression, Program
 from atwood.expr.core.relations import Relation, values_just_after
-from atwood.expr.simplify.collect import collect
+from atwood.forms.by_hand import as_by_hand
 from atwood.forms.dae import dae_form, keep_constraints
-from atwood.forms.derived import derive_once
 from atwood.forms.kept import Kept, Key
 from atwood.forms.places import with_reactions
 from atwood.forms.program import (
@@ -26,7 +25,6 @@ from atwood.forms.program import (
     RatesProgram,
     balance_program,
     rates_program,
-    state_groups,
 )
 from atwood.forms.reassembly import follow, other_mode, with_flat
 from atwood.forms.reduced import reduced_form
@@ -37,7 +35,7 @@ from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism, build_equations
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import discrete_states_of
-from atwood.mechanics.outputs.observables import Observable, Reaction, energies, list_reactions
+from atwood.mechanics.outputs.observables import Observable, Reaction, list_reactions
 from atwood.mechanics.outputs.reading import observe
 from atwood.mechanics.read import LineSigns
 from atwood.model.local.flatten import FlatScene, flatten
@@ -56,9 +54,6 @@ FormName = Literal["reduced", "dae"]
 Coordinates = Literal["reduced", "regular", "dae"]
 """Those of the reduced form, the same with quaternions for orientations, and those of the dae form."""
 
-_BY_HAND = 12
-"""Up to so many coordinates the equations are rewritten; beyond, the recursion is shorter than any closed form."""
-
 # What all assemblies of one structure share.
 _ROWS: Key[tuple[Expression, ...]] = Key("equations of motion as by hand")
 _DISCRETE_STATES: Key[tuple[DiscreteState, ...]] = Key("discrete states")
@@ -70,8 +65,6 @@ _COLUMNS: Key[ColumnProgram] = Key("machine code for many states")
 _REACTIONS: Key[tuple[Reaction, ...]] = Key("reactions")
 _OBSERVABLES: Key[Mapping[str, Observable]] = Key("quantities")
 _START_OBSERVABLES: Key[Mapping[str, Observable]] = Key("quantities of the start")
-_OBSERVER: Key[Program] = Key("quantities")
-_ENERGIES: Key[Program] = Key("energies")
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,18 +178,7 @@ class Assembly:
         reduced = self.reduced
         if reduced.read:  # what reactions are solved for with is nothing that one writes by hand
             return reduced.rows
-        return self.shared.get(_ROWS, lambda: tuple(self._tidy(reduced, reduced.rows)))
-
-    def _tidy(self, equations: Equations, rows: Sequence[Expression]) -> list[Expression]:
-        """Write rows as an expert would by hand, for scenes of the size that one would do by hand."""
-        if len(equations.coordinates) > _BY_HAND or equations.solved_speeds:
-            return list(rows)
-        angles = [q for q, c in zip(equations.coordinates, equations.names, strict=True) if c.unit == "rad"]
-        read = tuple(rows), tuple(angles), self.parameters
-        _, found = derive_once(
-            "rows", equations.graph, read, lambda: ("", collect(list(rows), angles, self.parameters))
-        )
-        return found
+        return self.shared.get(_ROWS, lambda: tuple(as_by_hand(reduced, self.parameters, reduced.rows)))
 
     # -- parameters -----------------------------------------------------------------------------------------------
 
@@ -347,7 +329,9 @@ class Assembly:
             if self.form == "reduced":
                 found = reduced_form(name, equations, self.parameters, self.rows, dependent, speeds)
             else:
-                found = dae_form(name, equations, self.parameters, self.level, partial(self._tidy, equations))
+                found = dae_form(
+                    name, equations, self.parameters, self.level, partial(as_by_hand, equations, self.parameters)
+                )
             return found.with_lock(self.shared.lock)
 
         return self.shared.get(_FORM, make, None if kept is None else tuple(kept), tuple(dependent), speeds)
@@ -409,60 +393,3 @@ class Assembly:
 
     def _observe(self, equations: Equations) -> Mapping[str, Observable]:
         return observe(self.mechanism, equations, self.reactions, self.shared.lock)
-
-    def find_observables(self, paths: Sequence[str]) -> list[Observable]:
-        """Return observables by path.
-
-        Raises
-        ------
-        ParameterError
-            If there is no such quantity.
-        """
-        for path in paths:
-            if path not in self.observables:
-                raise ParameterError(
-                    "there is no such quantity", where=path, advice=suggestion(path, list(self.observables))
-                )
-        return [self.observables[path] for path in paths]
-
-    def observer(self, paths: tuple[str, ...]) -> Program:
-        """Return the program of (t, q, u, a, reactions) that gives quantities by path."""
-        found = self.find_observables(paths)
-        return self.known_program(_OBSERVER, lambda: [one.value for one in found], paths)
-
-    @property
-    def energy_program(self) -> Program:
-        """The program of (t, q, u, a, reactions) that gives kinetic and potential energy."""
-        return self.known_program(_ENERGIES, lambda: energies(self.mechanism, self.own_equations))
-
-    def known_program(
-        self, key: Key[Program], expressions: Callable[[], Sequence[Expression]], *about: Hashable
-    ) -> Program:
-        """Return a program of (t, q, u, a, reactions) that is made once for all assemblies of this structure.
-
-        Parameters
-        ----------
-        key
-            What it is; messages have its name.
-        expressions
-            Gives what to compute.
-        about
-            What it depends on besides the structure.
-        """
-        return self.shared.get(key, lambda: self.state_program(key.name, expressions()), *about)
-
-    def state_program(self, name: str, expressions: Sequence[Expression]) -> Program:
-        """Return a program of (t, q, u, a, reactions) in the coordinates of this form."""
-        equations = self.own_equations
-        groups = (
-            *state_groups(equations),
-            InputGroup("a", equations.accelerations),
-            InputGroup("reactions", tuple(one.symbol for one in self.reactions)),
-        )
-        outputs = (OutputGroup(name, tuple(expressions)),)
-        return Program(f"{self.flat.name} {name}", groups, self.parameters, outputs)
-
-    def coordinate_program(self, name: str, equations: Equations, expressions: Sequence[Expression]) -> Program:
-        """Return a program of (t, q, u) in the coordinates of the given equations."""
-        outputs = (OutputGroup(name, tuple(expressions)),)
-        return Program(f"{self.flat.name} {name}", state_groups(equations), self.parameters, outputs)

@@ -14,6 +14,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
+from atwood.forms.quantities import coordinate_program, state_program
 from atwood.late import dataclass
 from atwood.linalg.matrices import scaled
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
@@ -180,7 +181,7 @@ def _carried(assembly: Assembly, start: Start) -> dict[str, float]:
     known = assembly.start_observables
     paths = [path for path in known if path.endswith(_CARRIED)]
     q, u = start.coordinates, start.speeds
-    program = assembly.coordinate_program("carried", assembly.reduced, [known[path].value for path in paths])
+    program = coordinate_program(assembly, "carried", assembly.reduced, [known[path].value for path in paths])
     values = np.asarray(assembly.kernel(program)([start.time], q, u)[0], dtype=float)
     found = {path: float(value) for path, value in zip(paths, values, strict=True) if np.isfinite(value)}
     found.update(_angles(assembly, start))
@@ -200,7 +201,7 @@ def _angles(assembly: Assembly, start: Start) -> dict[str, float]:
                 continue
             body = bodies.body_of[node]
             spin = spin_in_world(reduced.kinematics.angular_velocities[body], placements.axes[body])
-            program = assembly.coordinate_program("angle", reduced, [graph.convert(c) for c in (*axes[0], spin.y)])
+            program = coordinate_program(assembly, "angle", reduced, [graph.convert(c) for c in (*axes[0], spin.y)])
             x, _, z, rate = assembly.kernel(program)([start.time], start.coordinates, start.speeds)[0]
             found[f"{path}.angle"] = math.atan2(z, x)
             found[f"{path}.angular_speed"] = found[f"{path}.angular_velocity"] = -float(rate)  # about -y
@@ -255,7 +256,7 @@ def _nodes(assembly: Assembly, start: Start) -> dict[tuple[str, str], FloatArray
         else:
             vectors += [Vector(math.nan, math.nan, math.nan)] * 5
         expressions += [graph.convert(c) for vector in vectors for c in vector]
-    program = assembly.state_program("nodes", expressions)
+    program = state_program(assembly, "nodes", expressions)
     idle = np.zeros(len(assembly.reactions))
     values = np.asarray(assembly.kernel(program)([start.time], q, u, a, idle)[0], dtype=float).reshape(-1, 8, 3)
     place = dict(zip(nodes, values, strict=True))

@@ -11,6 +11,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Program, depends_on, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
+from atwood.forms.quantities import energy_program, known_program
 from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.outputs.moving_inertia import MovingMass, moving_masses
 from atwood.mechanics.outputs.power import applied_power, switched_energy
@@ -47,8 +48,8 @@ def account(segment: SegmentRecord, drives: DrivePower) -> Piece:
     """
     assembly, state = segment.assembly, (segment.coordinates, segment.speeds)
     mechanism, equations = assembly.mechanism, assembly.own_equations
-    switching = assembly.known_program(_SWITCHED, lambda: [switched_energy(mechanism, equations)])
-    kinetic, potential = _values(assembly, assembly.energy_program, segment.time, *state)
+    switching = known_program(assembly, _SWITCHED, lambda: [switched_energy(mechanism, equations)])
+    kinetic, potential = _values(assembly, energy_program(assembly), segment.time, *state)
     is_fixed = switching.results[0].is_zero
     return Piece(
         time=segment.time,
@@ -67,8 +68,8 @@ def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
     """Return what moves with which velocities."""
     assembly = segment.assembly
     masses = assembly.shared.get(_MASSES, lambda: moving_masses(assembly.mechanism, assembly.own_equations))
-    program = assembly.known_program(
-        _VELOCITIES, lambda: [x for one in masses for row in (one.velocities, *one.masses) for x in row]
+    program = known_program(
+        assembly, _VELOCITIES, lambda: [x for one in masses for row in (one.velocities, *one.masses) for x in row]
     )
     values = _values(assembly, program, segment.time, segment.coordinates, segment.speeds)
     found, done = [], 0
@@ -83,7 +84,7 @@ def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
 def power_into(segment: SegmentRecord, drives: DrivePower) -> FloatArray | None:
     """Return the power that is put into the scene at each sample, or None if nothing can."""
     assembly = segment.assembly
-    program = assembly.known_program(POWER, lambda: [applied_power(assembly.mechanism, assembly.own_equations)])
+    program = known_program(assembly, POWER, lambda: [applied_power(assembly.mechanism, assembly.own_equations)])
     moving = any(_moves_by_itself(assembly.maximal, one) for one in assembly.maximal.constraints)
     if program.results[0].is_zero and not moving:
         return None
@@ -126,6 +127,6 @@ def _rounding(segment: SegmentRecord, energy: FloatArray) -> float:
         turned = assembly.with_rows(near(np.repeat(values[:, None], samples, axis=1), 0.0))
         states = (near(x, size[:, None]) for x, size in zip((segment.coordinates, segment.speeds), sizes, strict=True))
         time = near(segment.time[None, :], 0.0)[0]
-        apart = np.abs(np.sum(_values(turned, assembly.energy_program, time, *states), axis=0) - energy)
+        apart = np.abs(np.sum(_values(turned, energy_program(assembly), time, *states), axis=0) - energy)
         largest = max(largest, float(np.max(apart, initial=0.0, where=np.isfinite(apart))))
     return largest

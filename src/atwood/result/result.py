@@ -16,6 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import ResultError
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
+from atwood.forms.quantities import find_observables, observer
 from atwood.integrators.protocol import Statistics
 from atwood.model.declare.quantities import PATHS, Quantity
 from atwood.result.accounts import account
@@ -189,11 +190,11 @@ class Result(Trajectories):
 
     def unit(self, path: str) -> str:
         """Return the SI unit of a quantity."""
-        return self.assembly.find_observables([self._known(path)])[0].unit
+        return find_observables(self.assembly, [self._known(path)])[0].unit
 
     def describe(self, path: str) -> str:
         """Return one line of meaning of a quantity."""
-        return self.assembly.find_observables([self._known(path)])[0].doc
+        return find_observables(self.assembly, [self._known(path)])[0].doc
 
     def __contains__(self, path: object) -> bool:
         return isinstance(path, (str, Quantity)) and str(path) in self.assembly.observables
@@ -250,7 +251,7 @@ class Result(Trajectories):
 
     def _evaluate(self, segment: SegmentRecord, paths: tuple[str, ...]) -> FloatArray:
         assembly = segment.assembly
-        observables = assembly.find_observables(paths)
+        observables = find_observables(assembly, paths)
         symbols = [one.symbol for one in assembly.reactions]
         reading = [depends_on(one.value, symbols) for one in observables]
         accelerating = [depends_on(one.value, assembly.own_equations.accelerations) for one in observables]
@@ -260,7 +261,7 @@ class Result(Trajectories):
             reactions, _ = self._reactions(segment)
         if any(accelerating) and segment.speeds.size:
             accelerations = self._accelerations(segment)
-        kernel = assembly.kernel(assembly.observer(paths), vectorized=True)
+        kernel = assembly.kernel(observer(assembly, paths), vectorized=True)
         values: FloatArray = kernel(
             segment.time[None, :], segment.coordinates, segment.speeds, accelerations, reactions
         )[0]

@@ -13,6 +13,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.forms.assembly import Assembly
+from atwood.forms.quantities import state_program
 from atwood.late import dataclass
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
@@ -219,7 +220,7 @@ def _along_run(result: Result, name: str, quantities: Callable[[Assembly], Itera
     for segment in result.run.segments:
         assembly = segment.assembly
         graph = assembly.mechanism.table.graph
-        program = assembly.state_program(name, [graph.convert(one) for one in quantities(assembly)])
+        program = state_program(assembly, name, [graph.convert(one) for one in quantities(assembly)])
         idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
         kernel = assembly.kernel(program, vectorized=True)
         values = kernel(segment.time[None, :], segment.coordinates, segment.speeds, *idle)[0]

@@ -9,6 +9,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, depends_on, is_zero
+from atwood.forms.quantities import state_program
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.contributions import BodyInertia
@@ -86,7 +87,7 @@ def _poses(result: Result) -> dict[int, Pose]:
             axes = placements.axes.get(body.index)
             unturned = [graph.constant(float(i == j)) for i in range(3) for j in range(3)]
             expressions += unturned if axes is None else [graph.convert(c) for axis in axes for c in axis]
-        program = assembly.state_program("poses", expressions)
+        program = state_program(assembly, "poses", expressions)
         idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
         kernel = assembly.kernel(program, vectorized=True)
         values = np.asarray(kernel(segment.time[None, :], segment.coordinates, segment.speeds, *idle)[0])

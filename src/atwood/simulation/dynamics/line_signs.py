@@ -6,6 +6,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
+from atwood.forms.quantities import coordinate_program
 
 __all__ = ["actual_line_signs", "line_signs_differ"]
 
@@ -33,7 +34,7 @@ def actual_line_signs(assembly: Assembly, t: float, q: FloatArray, u: FloatArray
     nodes = list(positions)
     program = assembly.shared.get(
         _POSITIONS,
-        lambda: assembly.coordinate_program("places", equations, [positions[node][0] for node in nodes]),
+        lambda: coordinate_program(assembly, "places", equations, [positions[node][0] for node in nodes]),
         form,
     )
     places = dict(zip(nodes, assembly.kernel(program)([t], q, u)[0], strict=True))

@@ -17,6 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import event_program
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
+from atwood.forms.quantities import known_program, observer
 from atwood.integrators.protocol import StepResult
 from atwood.late import dataclass
 from atwood.linalg.matrices import is_full, scaled, to_array
@@ -149,7 +150,7 @@ class EventProbe:
         self.reactions = ReactionSolver(assembly, t, q, u) if self.needs.reactions else None
         self.kernel = (
             assembly.kernel(
-                assembly.known_program(_EVENTS, lambda: [one.value for one in self.event_functions], conditions)
+                known_program(assembly, _EVENTS, lambda: [one.value for one in self.event_functions], conditions)
             )
             if self.event_functions
             else None
@@ -268,7 +269,7 @@ class EventProbe:
     def _is_there(self, step: StepResult, one: EventFunction) -> bool:
         assembly, expression = self.assembly, one.is_there
         assert expression is not None
-        program = assembly.known_program(_IS_THERE, lambda: [expression], one.law, self._conditions)
+        program = known_program(assembly, _IS_THERE, lambda: [expression], one.law, self._conditions)
         kernel = assembly.kernel(program)
         q, u = self.plan.program.split(step.y)
         return bool(kernel([step.t], q, u, np.zeros_like(u), [0.0] * len(assembly.reactions))[0][0] > 0.0)
@@ -467,7 +468,7 @@ def generalized_state(
     known = [name for name in names if name in before.observables]
     q, still = reference_coordinates(equations), np.zeros(len(equations.speeds))
     if known:
-        read = before.kernel(before.observer(tuple(known)))
+        read = before.kernel(observer(before, tuple(known)))
         idle = [0.0] * len(before.reactions)
         values = read([t], *own, np.zeros_like(own[1]), idle)[0]
         for name, value in zip(known, values, strict=True):

@@ -13,6 +13,7 @@ from atwood.errors import KernelEvaluationError
 from atwood.expr import Expression, Program, Scalar, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
+from atwood.forms.quantities import coordinate_program
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.mechanics.kinematics.orientation import node_axes
@@ -56,7 +57,7 @@ def _branch_tests(assembly: Assembly, equations: Equations) -> tuple[tuple[str, 
             trace = _trace(equations, joint)
             if trace is not None:
                 found[joint.part] = trace
-    return tuple(found), assembly.coordinate_program("facing", equations, list(found.values()))
+    return tuple(found), coordinate_program(assembly, "facing", equations, list(found.values()))
 
 
 def _trace(equations: Equations, joint: Joint) -> Expression | None:

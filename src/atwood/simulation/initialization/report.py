@@ -19,6 +19,7 @@ from atwood.expr import Expression, OutputGroup, Program, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
+from atwood.forms.quantities import coordinate_program
 from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.dynamics.equations import Equations
@@ -186,7 +187,7 @@ def _guesses(assembly: Assembly, equations: Equations, start: Start) -> tuple[Gu
     observables = [assembly.start_observables[path] for path in given]
     program = assembly.shared.get(
         _GUESSES,
-        lambda: assembly.coordinate_program("guesses", equations, [one.value for one in observables]),
+        lambda: coordinate_program(assembly, "guesses", equations, [one.value for one in observables]),
         tuple(given),
     )
     values = assembly.kernel(program)([start.time], start.coordinates, start.speeds)[0]
@@ -227,7 +228,7 @@ class _Bodies:
         speeds = list(self.equations.speeds)
         entries = jacobian(rates, speeds)
         return (
-            self.assembly.coordinate_program("places", self.equations, places),
+            coordinate_program(self.assembly, "places", self.equations, places),
             Program(
                 f"{self.assembly.flat.name} movements of bodies",
                 state_groups(self.equations),

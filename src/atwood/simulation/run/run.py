@@ -15,6 +15,7 @@ from atwood.errors import AtwoodError, SolveError, StartError, TopologyError, Un
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
+from atwood.forms.quantities import known_program
 from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
 from atwood.late import dataclass
@@ -494,7 +495,7 @@ def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
     prescribed = assembly.own_equations.prescribed
     if not prescribed:
         return
-    program = assembly.known_program(_PRESCRIBED, lambda: [value for _, value in prescribed])
+    program = known_program(assembly, _PRESCRIBED, lambda: [value for _, value in prescribed])
     n, m = len(assembly.own_equations.coordinates), len(assembly.own_equations.speeds)
     idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
     misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])

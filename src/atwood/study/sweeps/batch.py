@@ -19,6 +19,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import depends_on
 from atwood.forms.accelerations import accelerations_of
+from atwood.forms.quantities import find_observables, observer
 from atwood.integrators.explicit_problem import LOOSEST
 from atwood.integrators.protocol import SolverOptions
 from atwood.late import dataclass
@@ -274,8 +275,8 @@ class _Batches:
             a = self.watched.bind(values)(t[None, :], q, u)[-1]
         if self.needs_reactions:
             reactions = self._reactions(ready.runs[good], t, q, u, moments, values, ready.parameters is not None)
-        observer = assembly.compiled(assembly.observer(request.paths), vectorized=True).bind(values)
-        found: FloatArray = observer(t[None, :], q, u, a, reactions)[0]
+        kernel = assembly.compiled(observer(assembly, request.paths), vectorized=True).bind(values)
+        found: FloatArray = kernel(t[None, :], q, u, a, reactions)[0]
         return found.reshape(len(request.paths), count, moments)
 
     def _reactions(
@@ -303,4 +304,4 @@ class _Batches:
 
 def _reads(request: SweepRequest, symbols: Any) -> bool:
     """Return whether a quantity depends on any of some symbols."""
-    return any(depends_on(one.value, symbols) for one in request.assembly.find_observables(request.paths))
+    return any(depends_on(one.value, symbols) for one in find_observables(request.assembly, request.paths))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, ResultError, UsageError, suggestion_in_parts
 from atwood.forms.assembly import Assembly
+from atwood.forms.quantities import find_observables
 from atwood.late import dataclass
 from atwood.model.local.flatten import flatten
 from atwood.pipeline import simulate
@@ -63,7 +64,7 @@ class SweepRequest:
     @property
     def has_turns(self) -> bool:
         """Whether a quantity counts turns, which needs samples on the way."""
-        return any(one.periodic for one in self.assembly.find_observables(self.paths))
+        return any(one.periodic for one in find_observables(self.assembly, self.paths))
 
 
 @dataclass(eq=False)

@@ -13,6 +13,7 @@ import numpy as np
 from atwood.arguments import BY_PATH, instance, one_of, optional, takes, whole
 from atwood.errors import AtwoodError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
+from atwood.forms.quantities import find_observables
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.declare.quantities import PATHS
@@ -210,7 +211,7 @@ class _Progress:
 
 def _finished(request: SweepRequest, records: Records, reason: str, threads: int, wall: float) -> Sweep:
     first, cases = request.assembly, request.cases
-    observables = {one.path: one for one in first.find_observables(request.paths)}
+    observables = {one.path: one for one in find_observables(first, request.paths)}
     columns = [(axis, cases.column(k)) for k, axis in enumerate(cases.axes)]
     return Sweep(
         scene=first.flat.name,
