@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from random import Random
 
 import numpy as np
@@ -16,18 +15,16 @@ from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.outputs.moving_inertia import MovingMass, moving_masses
 from atwood.mechanics.outputs.power import applied_power, switched_energy
 from atwood.result.energy import Motion, Piece
+from atwood.result.segment_quantities import SegmentQuantities
 from atwood.simulation.run.record import SegmentRecord
 
-__all__ = ["POWER", "DrivePower", "account", "power_into"]
+__all__ = ["POWER", "account", "power_into"]
 
 POWER: Key[Program] = Key("power")
 _SWITCHED: Key[Program] = Key("switched energy")
 _MASSES: Key[list[MovingMass]] = Key("moving masses")
 _VELOCITIES: Key[Program] = Key("velocities")
 
-
-DrivePower = Callable[[SegmentRecord], FloatArray]
-"""Gives the power of constraints that move with time."""
 
 _DRAWS = 3
 """States near by that tell how far digits reach."""
@@ -36,17 +33,16 @@ _DIGIT = 4.0 * np.finfo(float).eps
 """Of each number in a state, relative to itself or to its size in the scene."""
 
 
-def account(segment: SegmentRecord, drives: DrivePower) -> Piece:
+def account(reading: SegmentQuantities) -> Piece:
     """Return the samples that a ledger is made of.
 
     Parameters
     ----------
-    segment
-        A stretch in one mode.
-    drives
-        Gives the power of constraints that move with time.
+    reading
+        The quantities of a segment.
     """
-    assembly, state = segment.assembly, (segment.coordinates, segment.speeds)
+    segment, assembly = reading.segment, reading.segment.assembly
+    state = segment.coordinates, segment.speeds
     mechanism, equations = assembly.mechanism, assembly.own_equations
     switching = known_program(assembly, _SWITCHED, lambda: [switched_energy(mechanism, equations)])
     kinetic, potential = _values(assembly, energy_program(assembly), segment.time, *state)
@@ -57,7 +53,7 @@ def account(segment: SegmentRecord, drives: DrivePower) -> Piece:
         potential=potential,
         motions=_motions(segment),
         rounding=_rounding(segment, kinetic + potential),
-        power=power_into(segment, drives),
+        power=power_into(reading),
         switched=None if is_fixed else _values(assembly, switching, segment.time, *state)[0],
         is_impact=segment.impact,
         is_switched=segment.after_time_event,
@@ -81,15 +77,15 @@ def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
     return tuple(found)
 
 
-def power_into(segment: SegmentRecord, drives: DrivePower) -> FloatArray | None:
+def power_into(reading: SegmentQuantities) -> FloatArray | None:
     """Return the power that is put into the scene at each sample, or None if nothing can."""
-    assembly = segment.assembly
+    segment, assembly = reading.segment, reading.segment.assembly
     program = known_program(assembly, POWER, lambda: [applied_power(assembly.mechanism, assembly.own_equations)])
     moving = any(_moves_by_itself(assembly.maximal, one) for one in assembly.maximal.constraints)
     if program.results[0].is_zero and not moving:
         return None
     total: FloatArray = _values(assembly, program, segment.time, segment.coordinates, segment.speeds)[0]
-    return total + drives(segment) if moving else total
+    return total + reading.reactions[1] if moving else total
 
 
 def _moves_by_itself(equations: Equations, constraint: Constraint) -> bool:

@@ -14,21 +14,20 @@ from numpy.typing import NDArray
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import ResultError
-from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
-from atwood.forms.quantities import find_observables, observer
+from atwood.forms.quantities import find_observables
 from atwood.integrators.protocol import Statistics
 from atwood.model.declare.quantities import PATHS, Quantity
 from atwood.result.accounts import account
 from atwood.result.angles import unwrap
 from atwood.result.conserved import ConservedLedger
 from atwood.result.energy import EnergyLedger
+from atwood.result.segment_quantities import SegmentQuantities
 from atwood.result.trajectories import Trajectories
 from atwood.result.work import find_ledger
 from atwood.showing import count_of, listed
 from atwood.simulation.dynamics.numerical_failure import named
 from atwood.simulation.dynamics.orientation_coordinates import CoordinateSwitch
-from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.events.modes import EventRecord
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
@@ -238,7 +237,7 @@ class Result(Trajectories):
         missing = tuple(path for path in paths if path not in self._cache)
         if not missing:
             return
-        pieces = [self._evaluate(segment, missing) for segment in self._segments]
+        pieces = [reading.values(missing) for reading in self._readings]
         for i, path in enumerate(missing):
             self._cache[path] = np.concatenate([piece[i] for piece in pieces])
         observables = self.assembly.observables
@@ -249,73 +248,16 @@ class Result(Trajectories):
                 turning = (self._all_time, self.samples(rate)) if rate else (None, None)
                 self._cache[path] = unwrap(self._cache[path], guesses.get(path), *turning)
 
-    def _evaluate(self, segment: SegmentRecord, paths: tuple[str, ...]) -> FloatArray:
-        assembly = segment.assembly
-        observables = find_observables(assembly, paths)
-        symbols = [one.symbol for one in assembly.reactions]
-        reading = [depends_on(one.value, symbols) for one in observables]
-        accelerating = [depends_on(one.value, assembly.own_equations.accelerations) for one in observables]
-        reactions = np.zeros((len(symbols), len(segment.time)))
-        accelerations = np.zeros_like(segment.speeds)
-        if any(reading):
-            reactions, _ = self._reactions(segment)
-        if any(accelerating) and segment.speeds.size:
-            accelerations = self._accelerations(segment)
-        kernel = assembly.kernel(observer(assembly, paths), vectorized=True)
-        values: FloatArray = kernel(
-            segment.time[None, :], segment.coordinates, segment.speeds, accelerations, reactions
-        )[0]
-        return values
-
     @cached_property
-    def _solvers(self) -> dict[int, ReactionSolver]:
-        return {}
-
-    @cached_property
-    def _reaction_cache(self) -> dict[int, tuple[FloatArray, FloatArray]]:
-        return {}
-
-    def _solver(self, segment: SegmentRecord) -> ReactionSolver:
-        if id(segment) not in self._solvers:
-            self._solvers[id(segment)] = ReactionSolver(
-                segment.assembly, float(segment.time[0]), segment.coordinates[:, 0], segment.speeds[:, 0]
-            )
-        return self._solvers[id(segment)]
-
-    def _accelerations(self, segment: SegmentRecord) -> FloatArray:
-        """Return the accelerations of the form's coordinates; near singular positions those of the smooth motion."""
-        solver = self._solver(segment)
-        found, clear = np.zeros_like(segment.speeds), np.ones(len(segment.time), dtype=bool)
-        for crossing in segment.singular_crossings:
-            inside = crossing.has_in_its_middle(segment.time)
-            if crossing.path is not None:
-                found[:, inside] = crossing.path.at(segment.time[inside])[2]
-                clear &= ~inside
-        state = segment.time[clear], segment.coordinates[:, clear], segment.speeds[:, clear]
-        found[:, clear] = solver.own_accelerations(*state, segment.plan.finding)
-        return found
-
-    def _reactions(self, segment: SegmentRecord) -> tuple[FloatArray, FloatArray]:
-        """Return all reactions, not known (nan) at singular positions, and the power of moving constraints."""
-        if id(segment) not in self._reaction_cache:
-            t, clear = segment.time, np.ones(len(segment.time), dtype=bool)
-            for crossing in segment.singular_crossings:
-                clear &= ~crossing.leaves_open(t)
-            values, power = np.full((len(segment.assembly.reactions), len(t)), np.nan), np.zeros(len(t))
-            if np.any(clear):  # otherwise it is a stretch within a moment, in which no work is done
-                values[:, clear], power[clear] = self._solver(segment).at(
-                    t[clear], segment.coordinates[:, clear], segment.speeds[:, clear]
-                )
-                power[~clear] = np.interp(t[~clear], t[clear], power[clear])
-            self._reaction_cache[id(segment)] = values, power
-        return self._reaction_cache[id(segment)]
+    def _readings(self) -> tuple[SegmentQuantities, ...]:
+        return tuple(SegmentQuantities(segment) for segment in self._segments)
 
     # -- how good it is -------------------------------------------------------------------------------------------
 
     @cached_property
     def energy(self) -> EnergyLedger:
         """Kinetic and potential energy, work, and how well they balance."""
-        pieces = [account(segment, self._power_of_drives) for segment in self._segments]
+        pieces = [account(reading) for reading in self._readings]
         every = (x for one in pieces for x in (one.kinetic, one.potential, one.power) if x is not None)
         if not all(np.all(np.isfinite(x)) for x in every):
             raise ResultError(
@@ -323,11 +265,7 @@ class Result(Trajectories):
                 where=self._without_energy(),
                 advice="A law is evaluated outside its domain there: look at its formula and at the start.",
             )
-        return find_ledger(self.run, pieces, self._shown, lambda run: Result(run)._power_of_drives)
-
-    def _power_of_drives(self, segment: SegmentRecord) -> FloatArray:
-        """Return the power of constraints that move with time."""
-        return self._reactions(segment)[1]
+        return find_ledger(self.run, pieces, self._shown)
 
     def _without_energy(self) -> str:
         """Return the part whose energy has no value."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.result.accounts import DrivePower, power_into
+from atwood.result.accounts import power_into
 from atwood.result.energy import EnergyLedger, Piece, make_ledger
+from atwood.result.segment_quantities import SegmentQuantities
 from atwood.simulation.run.retrace import run_again, times_of_steps
 from atwood.simulation.run.run import Run
 
@@ -97,7 +98,6 @@ def find_ledger(
     run: Run,
     pieces: Sequence[Piece],
     shown: NDArray[np.bool_],
-    drives_of: Callable[[Run], DrivePower],
 ) -> EnergyLedger:
     """Return the ledger of a run.
 
@@ -113,8 +113,6 @@ def find_ledger(
         Its samples.
     shown
         Which of all samples are outputs.
-    drives_of
-        Gives, for a run, what gives the power of constraints that move with time.
     """
     known = [
         (np.zeros(len(one.time)), 0.0) if one.power is None else integral_of_samples(one.time, one.power)
@@ -129,13 +127,11 @@ def find_ledger(
     few = run.statistics.steps > min(_SEEN[one] for one in solvers) * sum(len(one.time) for one in pieces)
     if not (hidden or (few and ledger.max_drift > _SUSPECT * rtol)):
         return ledger
-    found = _work_in_steps(run, pieces, max(_NODES[one] for one in solvers), drives_of)
+    found = _work_in_steps(run, pieces, max(_NODES[one] for one in solvers))
     return ledger if found is None else make_ledger(pieces, *found, shown)
 
 
-def _work_in_steps(
-    run: Run, pieces: Sequence[Piece], count: int, drives_of: Callable[[Run], DrivePower]
-) -> tuple[list[FloatArray], float] | None:
+def _work_in_steps(run: Run, pieces: Sequence[Piece], count: int) -> tuple[list[FloatArray], float] | None:
     """Return the work at all samples, integrated within each step of the solver, and its estimated error."""
     steps = times_of_steps(run)
     grids = [_joined(one.time, steps) for one in pieces]
@@ -143,12 +139,12 @@ def _work_in_steps(
     again = run_again(run, np.concatenate(nodes))
     if again is None:
         return None
-    drives, work, unsure = drives_of(again), [], 0.0
+    work, unsure = [], 0.0
     for segment, piece, grid, wanted in zip(again.segments, pieces, grids, nodes, strict=True):
         places = np.searchsorted(segment.time, wanted)
         if not np.array_equal(segment.time[np.minimum(places, len(segment.time) - 1)], wanted):
             return None
-        power = power_into(segment, drives)
+        power = power_into(SegmentQuantities(segment))
         rows = np.zeros((len(grid) - 1, count)) if power is None else power[places].reshape(-1, count)
         done, error = integral_in_steps(grid, rows)
         work.append(done[np.searchsorted(grid, piece.time)])
