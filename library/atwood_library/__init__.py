@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from atwood_library.blocks.sampled_feedback import SampledFeedback as SampledFeedback
     from atwood_library.blocks.second_order import SecondOrder as SecondOrder
     from atwood_library.blocks.servo_controller import ServoController as ServoController
+    from atwood_library.blocks.signal_function import SignalFunction as SignalFunction
     from atwood_library.blocks.state_space import StateSpace as StateSpace
     from atwood_library.blocks.transfer_function import TransferFunction as TransferFunction
     from atwood_library.drives.inertia import Inertia as Inertia
@@ -211,6 +212,7 @@ _MODULES = {
     "Screw": "joints.screw",
     "SecondOrder": "blocks.second_order",
     "ServoController": "blocks.servo_controller",
+    "SignalFunction": "blocks.signal_function",
     "Sine": "sources.sine",
     "SlideGear": "joints.slide_gear",
     "Slider": "joints.slider",

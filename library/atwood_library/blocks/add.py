@@ -8,7 +8,7 @@ from atwood import Component, Scalar, observable, parameter, signal
 class Add(Component):
     """The weighted sum of two signals, ``y = weight_1 u_1 + weight_2 u_2``; with weights 1 and -1 their difference."""
 
-    synonyms = ("Math.Add", "Math.Feedback", "Sum", "Summing point")
+    synonyms = ("Math.Add", "Math.Feedback", "Sum", "Summing point", "Math.Add3", "Math.MultiSum")
 
     weight_1: float = parameter(1.0, unit="any", doc="Weight of the first.")
     weight_2: float = parameter(1.0, unit="any", doc="Weight of the second.")

@@ -8,7 +8,7 @@ from atwood import Component, Scalar, derivative, parameter, signal, state
 class Integrator(Component):
     """The integral of a signal over time, ``y' = gain u``."""
 
-    synonyms = ("Continuous.Integrator", "I controller")
+    synonyms = ("Continuous.Integrator", "I controller", "LimIntegrator")
 
     gain: float = parameter(1.0, unit="any", doc="What the rate is of the input.")
     start: float = parameter(0.0, unit="any", doc="Value at the start.")

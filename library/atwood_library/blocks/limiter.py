@@ -8,7 +8,7 @@ from atwood import Component, ParameterError, Scalar, maximum, minimum, observab
 class Limiter(Component):
     """A signal that is cut off at two bounds."""
 
-    synonyms = ("Nonlinear.Limiter", "Saturation", "Clamp")
+    synonyms = ("Nonlinear.Limiter", "Saturation", "Clamp", "VariableLimiter")
 
     lower: float = parameter(-1.0, unit="any", doc="Least value.")
     upper: float = parameter(1.0, unit="any", doc="Greatest value.")

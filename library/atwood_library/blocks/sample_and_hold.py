@@ -8,7 +8,7 @@ from atwood import Component, Scalar, discrete_state, parameter, signal, update
 class SampleAndHold(Component):
     """A signal that is taken at sample times and held until the next."""
 
-    synonyms = ("ZeroOrderHold", "Sampler", "Discrete.Sampler")
+    synonyms = ("ZeroOrderHold", "Sampler", "Discrete.Sampler", "TriggeredSampler")
 
     period: float = parameter(0.1, unit="s", doc="Sample time.")
     start: float = parameter(0.0, unit="any", doc="Value before the first sample.")

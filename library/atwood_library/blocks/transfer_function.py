@@ -14,7 +14,10 @@ class TransferFunction(Component):
     last one is the input over the last coefficient of the denominator.
     """
 
-    synonyms = ("Continuous.TransferFunction", "Laplace transform", "Rational function")
+    synonyms = (
+        *("Continuous.TransferFunction", "Laplace transform", "Rational function", "Derivative"),
+        *("CriticalDamping", "LowpassButterworth", "Continuous.Filter", "PadeDelay"),
+    )
 
     numerator: Any = parameter((1.0,), array=True, doc="Coefficients of the numerator, of falling powers of s.")
     denominator: Any = parameter((1.0, 1.0), array=True, doc="Coefficients of the denominator, of falling powers of s.")

@@ -34,7 +34,7 @@ class Inertia(Component):
     on its `rotor` all the same.
     """
 
-    synonyms = ("Rotational.Inertia", "Flywheel", "Rotor", "Rotor1D")
+    synonyms = ("Flywheel", "Rotor", "Rotational.Components.Inertia")
     spaces = ("plane", "space")
 
     moment: float = parameter(1.0, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the axis.")

@@ -8,7 +8,10 @@ from atwood import Component, Scalar, Shaft, connector, constraint, observable, 
 class RotationalCoupling(Component):
     """Two angles joined rigidly, as flanges bolted together; it measures the torque and the power that pass."""
 
-    synonyms = ("Rotational.Sensors.TorqueSensor", "Rotational.Sensors.PowerSensor", "Torque cell", "Flange connection")
+    synonyms = (
+        *("Rotational.Sensors.TorqueSensor", "Rotational.Sensors.PowerSensor", "Torque cell"),
+        *("Flange connection", "Rotational.Components.Disc"),
+    )
     spaces = ("plane", "space")
 
     offset: float = parameter(0.0, unit="rad", doc="By how much b is ahead of a.")

@@ -27,7 +27,10 @@ class RotationalGap(Component):
     contact begins and ends is found exactly.
     """
 
-    synonyms = ("ElastoGap", "ElastoBacklash", "ElastoBacklash2", "Backlash", "Stop")
+    synonyms = (
+        *("ElastoBacklash", "ElastoBacklash2", "Backlash", "Stop"),
+        "Rotational.Components.ElastoBacklash",
+    )
     modes = ("apart", "upper", "lower")
     spaces = ("plane", "space")
 

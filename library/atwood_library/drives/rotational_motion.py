@@ -14,11 +14,9 @@ class RotationalMotion(Component):
     """
 
     synonyms = (
-        "Rotational.Sources.Position",
-        "Rotational.Sources.Speed",
-        "Rotational.Sources.Accelerate",
-        "Rotational.Sources.Move",
-        "ConstantSpeed",
+        *("Rotational.Sources.Position", "Rotational.Sources.Speed", "Rotational.Sources.Accelerate"),
+        *("Rotational.Sources.Move", "Rotational.Components.Fixed"),
+        *("Rotational.Sources.ConstantSpeed", "AngleToTorqueAdaptor"),
     )
     spaces = ("plane", "space")
 

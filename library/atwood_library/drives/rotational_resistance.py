@@ -17,10 +17,9 @@ class RotationalResistance(Component):
     """
 
     synonyms = (
-        "LinearSpeedDependentTorque",
-        "QuadraticSpeedDependentTorque",
-        "InverseSpeedDependentTorque",
-        "SignTorque",
+        *("LinearSpeedDependentTorque", "QuadraticSpeedDependentTorque"),
+        *("InverseSpeedDependentTorque", "SignTorque", "Rotational.Sources.EddyCurrentTorque"),
+        *("BearingFriction", "Rotational.Components.Brake"),
     )
     spaces = ("plane", "space")
 

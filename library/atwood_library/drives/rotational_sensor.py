@@ -10,9 +10,10 @@ class RotationalSensor(Component):
     """Measures an angle, turns counted, and its first and second rate, from another one or from the ground."""
 
     synonyms = (
-        *("Rotational.Sensors.AngleSensor", "Rotational.Sensors.SpeedSensor", "Rotational.Sensors.AccSensor"),
-        *("RelAngleSensor", "Rotational.Sensors.RelSpeedSensor", "Rotational.Sensors.RelAccSensor"),
-        *("MultiSensor", "Encoder", "Tachometer"),
+        *("Rotational.Sensors.AngleSensor", "Rotational.Sensors.SpeedSensor"),
+        *("Rotational.Sensors.AccSensor", "RelAngleSensor", "Rotational.Sensors.RelSpeedSensor"),
+        *("Rotational.Sensors.RelAccSensor", "MultiSensor", "Encoder", "Tachometer"),
+        *("Rotational.Sensors.MultiSensor", "Rotational.Components.RelativeStates"),
     )
     spaces = ("plane", "space")
 

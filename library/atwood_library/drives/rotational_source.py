@@ -11,7 +11,10 @@ from atwood_library.interfaces.along_coordinates import between, push
 class RotationalSource(Component):
     """A given torque on an angle, with its reaction on another one or on the ground: a motor without inertia."""
 
-    synonyms = ("Rotational.Sources.Torque", "Torque source", "Torque2", "ConstantTorque", "Ideal motor")
+    synonyms = (
+        *("Rotational.Sources.Torque", "Torque source", "Torque2", "ConstantTorque", "Ideal motor"),
+        *("Rotational.Sources.TorqueStep", "TorqueToAngleAdaptor"),
+    )
     spaces = ("plane", "space")
 
     value: float = signal(0.0, unit="N*m", doc="The torque, positive where it makes b grow.")

@@ -9,7 +9,10 @@ from atwood_library.interfaces.along_coordinates import between
 class RotationalSpringDamper(Component):
     """A linear spring and a damper side by side, between two angles or from one to the ground; either may be absent."""
 
-    synonyms = ("Rotational.SpringDamper", "Rotational.Spring", "Rotational.Damper", "Kelvin-Voigt element")
+    synonyms = (
+        *("Kelvin-Voigt element", "Rotational.Components.SpringDamper"),
+        *("Rotational.Components.Spring", "Rotational.Components.Damper"),
+    )
     spaces = ("plane", "space")
 
     stiffness: float = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque for a unit of extension.")

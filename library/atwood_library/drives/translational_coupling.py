@@ -9,10 +9,8 @@ class TranslationalCoupling(Component):
     """Two displacements joined rigidly, as flanges bolted together; it measures the force and the power that pass."""
 
     synonyms = (
-        "Translational.Sensors.ForceSensor",
-        "Translational.Sensors.PowerSensor",
-        "Force cell",
-        "Flange connection",
+        *("Translational.Sensors.ForceSensor", "Translational.Sensors.PowerSensor", "Force cell"),
+        *("Flange connection", "Translational.Components.Rod"),
     )
 
     offset: float = parameter(0.0, unit="m", doc="By how much b is ahead of a.")

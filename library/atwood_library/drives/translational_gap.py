@@ -27,7 +27,7 @@ class TranslationalGap(Component):
     contact begins and ends is found exactly.
     """
 
-    synonyms = ("ElastoGap", "ElastoBacklash", "ElastoBacklash2", "Backlash", "Stop")
+    synonyms = ("ElastoGap", "Backlash", "Stop", "MassWithStopAndFriction")
     modes = ("apart", "upper", "lower")
 
     stiffness: float = parameter(1e4, unit="N/m", above=0.0, doc="Force for a unit beyond the play.")

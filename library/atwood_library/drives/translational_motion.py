@@ -14,11 +14,10 @@ class TranslationalMotion(Component):
     """
 
     synonyms = (
-        "Translational.Sources.Position",
-        "Translational.Sources.Speed",
-        "Translational.Sources.Accelerate",
-        "Translational.Sources.Move",
-        "ConstantSpeed",
+        *("Translational.Sources.Position", "Translational.Sources.Speed"),
+        *("Translational.Sources.Accelerate", "Translational.Sources.Move"),
+        *("Translational.Components.Fixed", "Translational.Sources.ConstantSpeed"),
+        "PositionToForceAdaptor",
     )
 
     follows: str = parameter(

@@ -11,8 +11,10 @@ class TranslationalSensor(Component):
 
     synonyms = (
         *("PositionSensor", "Translational.Sensors.SpeedSensor", "Translational.Sensors.AccSensor"),
-        *("RelPositionSensor", "Translational.Sensors.RelSpeedSensor", "Translational.Sensors.RelAccSensor"),
-        *("MultiSensor", "Linear encoder", "Accelerometer"),
+        *("RelPositionSensor", "Translational.Sensors.RelSpeedSensor"),
+        *("Translational.Sensors.RelAccSensor", "MultiSensor", "Linear encoder", "Accelerometer"),
+        *("Translational.Sensors.PositionSensor", "Translational.Sensors.MultiSensor"),
+        "Translational.Components.RelativeStates",
     )
 
     against: str = parameter("ground", choices=("flange", "ground"), doc="What it is measured from.")

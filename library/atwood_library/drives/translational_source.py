@@ -11,7 +11,10 @@ from atwood_library.interfaces.along_coordinates import between, push
 class TranslationalSource(Component):
     """A given force on a displacement, with its reaction on another one or on the ground: an actuator."""
 
-    synonyms = ("Translational.Sources.Force", "Force source", "Force2", "ConstantForce", "Ideal motor")
+    synonyms = (
+        *("Translational.Sources.Force", "Force source", "Force2", "ConstantForce", "Ideal motor"),
+        *("Translational.Sources.ForceStep", "ForceToPositionAdaptor"),
+    )
 
     value: float = signal(0.0, unit="N", doc="The force, positive where it makes b grow.")
     against: str = parameter("ground", choices=("flange", "ground"), doc="What it acts against.")

@@ -9,7 +9,10 @@ from atwood_library.interfaces.along_coordinates import between
 class TranslationalSpringDamper(Component):
     """A linear spring and a damper side by side, between two displacements or from one to the ground."""
 
-    synonyms = ("Translational.SpringDamper", "Translational.Spring", "Translational.Damper", "Kelvin-Voigt element")
+    synonyms = (
+        *("Kelvin-Voigt element", "Translational.Components.SpringDamper"),
+        *("Translational.Components.Spring", "Translational.Components.Damper"),
+    )
 
     stiffness: float = parameter(0.0, unit="N/m", minimum=0.0, doc="Force for a unit of extension.")
     damping: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of its rate.")

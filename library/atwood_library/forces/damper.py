@@ -11,7 +11,7 @@ class Damper(Component):
     Rayleigh function ``1/2 c d'^2`` (Goldstein, section 1.5).
     """
 
-    synonyms = ("DamperParallel", "Dashpot")
+    synonyms = ("DamperParallel", "Dashpot", "SpringDamperParallel", "SpringDamperSeries")
 
     damping: float = parameter(1.0, unit="N*s/m", minimum=0.0, doc="Force for a rate of one metre a second.")
     a: Point = connector(Point, "One end.")

@@ -28,7 +28,7 @@ class Force(Component):
     fixed in the frame `other`, on which it does not act.
     """
 
-    synonyms = ("WorldForce", "Applied force", "Thruster")
+    synonyms = ("WorldForce", "Applied force", "Thruster", "WorldForceAndTorque", "ForceAndTorque")
 
     direction: tuple[float, float, float] = parameter(
         (1.0, 0.0, 0.0), direction=True, doc="Direction, in the axes that it is resolved in."

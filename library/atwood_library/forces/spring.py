@@ -28,7 +28,10 @@ class Spring(Component):
     one place between them.
     """
 
-    synonyms = ("LineForce", "Translational spring in space", "LineForceWithMass", "Coil spring")
+    synonyms = (
+        *("LineForce", "Translational spring in space", "LineForceWithMass", "Coil spring"),
+        *("LineForceWithTwoMasses", "SpringDamperParallel", "SpringDamperSeries"),
+    )
 
     stiffness: float = parameter(1.0, unit="N/m", minimum=0.0, doc="Force for an extension by one metre.")
     natural_length: float = parameter(0.0, unit="m", minimum=0.0, doc="Length without force.")

@@ -15,7 +15,7 @@ class Torque(Component):
     `other`: a motor between two frames.
     """
 
-    synonyms = ("WorldTorque", "Applied torque", "Couple")
+    synonyms = ("WorldTorque", "Applied torque", "Couple", "WorldForceAndTorque", "ForceAndTorque")
     spaces = ("plane", "space")
 
     axis: tuple[float, float, float] = parameter(

@@ -12,7 +12,7 @@ class FreeJoint(Component):
     A body that hangs on it has coordinates relative to frame a, which suits what moves along with a carrier.
     """
 
-    synonyms = ("FreeMotion", "Six-degree-of-freedom joint")
+    synonyms = ("FreeMotion", "Six-degree-of-freedom joint", "FreeMotionScalarInit")
 
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")

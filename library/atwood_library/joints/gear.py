@@ -14,7 +14,7 @@ class Gear(Component):
     from that of a housing, which takes the torque that is left.
     """
 
-    synonyms = ("IdealGear", "Gear pair", "Transmission", "GearConstraint", "Gearbox")
+    synonyms = ("IdealGear", "Gear pair", "Transmission", "GearConstraint", "Gearbox", "BevelGear1D", "LossyGear")
 
     ratio: float = parameter(-1.0, doc="Turns of joint a for one turn of joint b; negative for outer wheels.")
     offset: float = parameter(0.0, unit="rad", doc="Angle of joint a where that of joint b is zero.")

@@ -31,11 +31,8 @@ class Pivot(LoadedHinge):
     """
 
     synonyms: ClassVar[tuple[str, ...]] = (
-        "Revolute",
-        "Hinge",
-        "Pin joint",
-        "Revolute joint",
-        "RevolutePlanarLoopConstraint",
+        *("Revolute", "Hinge", "Pin joint", "Revolute joint", "RevolutePlanarLoopConstraint"),
+        *("MultiBody.Joints.Constraints.Revolute", "JointUSR", "JointSSR", "JointRRR", "JointRRP"),
     )
 
     axis: tuple[float, float, float] = parameter(

@@ -11,7 +11,7 @@ class RackAndPinion(Component):
     ``displacement = radius * angle + offset``; a negative radius puts the rack on the pinion's other side.
     """
 
-    synonyms = ("IdealGearR2T", "Rack and pinion")
+    synonyms = ("IdealGearR2T", "Rack and pinion", "IdealRollingWheel")
 
     radius: float = parameter(1.0, unit="m", doc="Displacement of the rack for one radian of the pinion.")
     offset: float = parameter(0.0, unit="m", doc="Displacement of the rack where the pinion's angle is zero.")

@@ -13,7 +13,7 @@ class RollingDisc(Rolling):
     error. In a plane it rolls along a line, with its axis across the page.
     """
 
-    synonyms = ("RollingWheel", "Rolling contact")
+    synonyms = ("RollingWheel", "Rolling contact", "RollingWheelSet", "MultiBody.Joints.RollingWheelSet")
 
     axis: tuple[float, float, float] = parameter(
         (0.0, 1.0, 0.0), turning=True, doc="Axis of symmetry of the disc in frame b."

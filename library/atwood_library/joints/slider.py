@@ -29,7 +29,10 @@ class Slider(LoadedSlide):
     damper, an actuator and stops.
     """
 
-    synonyms = ("Prismatic", "Prismatic joint", "Guide")
+    synonyms = (
+        *("Prismatic", "Prismatic joint", "Guide", "MultiBody.Joints.Constraints.Prismatic"),
+        *("JointUPS", "JointUSP", "JointSSP", "JointRRP"),
+    )
 
     axis: tuple[float, float, float] = parameter(
         (1.0, 0.0, 0.0),

@@ -13,7 +13,11 @@ class Spherical(LoadedBall):
     motors and a cone as a stop.
     """
 
-    synonyms = ("Ball joint", "Ball and socket", "Spherical joint")
+    synonyms = (
+        *("Ball joint", "Ball and socket", "Spherical joint"),
+        *("MultiBody.Joints.Constraints.Spherical", "UniversalSpherical", "JointUPS", "JointUSR"),
+        *("JointUSP", "JointSSR", "JointSSP"),
+    )
 
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")

@@ -33,7 +33,11 @@ class Universal(LoadedCross):
     of space.
     """
 
-    synonyms = ("Hooke's joint", "Cardan joint", "U-joint", "Universal joint")
+    synonyms = (
+        *("Hooke's joint", "Cardan joint", "U-joint", "Universal joint"),
+        *("MultiBody.Joints.Constraints.Universal", "UniversalSpherical", "JointUPS", "JointUSR"),
+        "JointUSP",
+    )
     spaces = ("space",)
 
     axis_a: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="First axis, in frame a.")

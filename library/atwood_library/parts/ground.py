@@ -11,7 +11,7 @@ class Ground(Component):
     Its `force` and `torque` are what the ground exerts on everything that is connected to it.
     """
 
-    synonyms = ("Fixed", "World frame")
+    synonyms = ("Fixed", "World frame", "World", "MultiBody.Parts.Fixed")
 
     position: tuple[float, float, float] = parameter(
         (0.0, 0.0, 0.0), unit="m", size=3, doc="Position in world axes (x right, y into the page, z up)."

@@ -30,7 +30,7 @@ class Mass1D(Component):
     one-dimensional and planar parts can meet.
     """
 
-    synonyms = ("Translational.Mass", "Mass on a line")
+    synonyms = ("Mass on a line", "Translational.Components.Mass", "MassWithStopAndFriction")
 
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     origin: tuple[float, float, float] = parameter(

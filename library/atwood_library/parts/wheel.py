@@ -16,7 +16,7 @@ class Wheel(Model):
     the plane does.
     """
 
-    synonyms = ("RollingWheel",)
+    synonyms = ("RollingWheel", "RollingWheelSet", "MultiBody.Parts.RollingWheelSet")
 
     radius: float = parameter(0.3, unit="m", above=0.0, doc="Radius.")
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")

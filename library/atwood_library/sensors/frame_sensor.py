@@ -15,7 +15,10 @@ class FrameSensor(Component):
     it: ``m a`` with its acceleration against the world. The point is meant to be the body's centre of mass.
     """
 
-    synonyms = ("RelativeSensor", "Fictitious forces", "Coriolis force", "Centrifugal force", "Rotating frame")
+    synonyms = (
+        *("RelativeSensor", "Fictitious forces", "Coriolis force", "Centrifugal force"),
+        *("Rotating frame", "AbsoluteAngularVelocity", "RelativeAngularVelocity"),
+    )
     spaces = _SPACES
 
     frame: Frame = connector(Frame, "The frame of the observer.")

@@ -25,7 +25,7 @@ class OrientationSensor(Component):
     A part of space.
     """
 
-    synonyms = ("AbsoluteAngles", "RelativeAngles")
+    synonyms = ("AbsoluteAngles", "RelativeAngles", "AbsoluteAngularVelocity", "RelativeAngularVelocity")
     spaces = ("space",)
 
     convention: str = parameter("zyz", choices=CONVENTIONS, doc="Axes of the three turns, in order.")

@@ -11,7 +11,7 @@ class Pulse(Component):
     Its `value` is connected to an input and takes the input's unit.
     """
 
-    synonyms = ("Sources.Pulse", "Rectangular wave", "Square wave")
+    synonyms = ("Sources.Pulse", "Rectangular wave", "Square wave", "BooleanPulse")
 
     amplitude: float = parameter(1.0, unit="any", doc="How much more it is while on, in the unit of the input.")
     offset: float = parameter(0.0, unit="any", doc="Value while off, in the unit of the input.")

@@ -11,7 +11,7 @@ class Ramp(Component):
     Its `value` is connected to an input and takes the input's unit.
     """
 
-    synonyms = ("ContinuousClock", "Linear function of time", "Sources.Ramp")
+    synonyms = ("ContinuousClock", "Linear function of time", "Sources.Ramp", "Sources.Clock")
 
     slope: float = parameter(1.0, unit="any", doc="Rise in a second, in the unit of the input.")
     offset: float = parameter(0.0, unit="any", doc="Value where it begins to rise, in the unit of the input.")

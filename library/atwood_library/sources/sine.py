@@ -11,7 +11,7 @@ class Sine(Component):
     Its `value` is connected to an input and takes the input's unit.
     """
 
-    synonyms = ("Sinusoid",)
+    synonyms = ("Sinusoid", "Cosine", "Sources.Sine")
 
     amplitude: float = parameter(1.0, unit="any", doc="Amplitude, in the unit of the input.")
     angular_frequency: float = parameter(1.0, unit="rad/s", doc="Angular frequency.")

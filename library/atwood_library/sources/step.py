@@ -11,7 +11,7 @@ class Step(Component):
     Its `value` is connected to an input and takes the input's unit.
     """
 
-    synonyms = ("Sources.Step", "Heaviside function")
+    synonyms = ("Sources.Step", "Heaviside function", "BooleanStep")
 
     height: float = parameter(1.0, unit="any", doc="By how much it jumps, in the unit of the input.")
     offset: float = parameter(0.0, unit="any", doc="Value before, in the unit of the input.")

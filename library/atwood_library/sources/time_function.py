@@ -14,7 +14,11 @@ class TimeFunction(Component):
     the rates are derived exactly, where a controller or a drive needs them.
     """
 
-    synonyms = ("RealExpression", "Formula", "Expression of time", "Exponentials", "ExpSine")
+    synonyms = (
+        *("RealExpression", "Formula", "Expression of time", "Exponentials", "ExpSine"),
+        *("Sources.Constant", "SawTooth", "Trapezoid", "LogFrequencySweep"),
+        *("SineVariableFrequencyAndAmplitude", "Sinc"),
+    )
 
     function: Any = parameter(0.0, unit="any", function_of={"t": "s"}, doc="The function.")
 

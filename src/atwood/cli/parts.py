@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from atwood.cli.libraries import all_libraries
@@ -53,6 +53,9 @@ def is_a_part(text: str) -> bool:
 def parts_called(name: str) -> dict[str, type[Component]]:
     """Return the parts of a name: the one part that has it, or those that textbooks or Modelica call so.
 
+    Of a name with dots, such as ``Modelica.Mechanics.Rotational.Components.Spring``, and of synonyms with dots, the
+    shorter has to be the end of the longer. Of several parts those are meant that agree in most of it.
+
     Parameters
     ----------
     name
@@ -61,8 +64,20 @@ def parts_called(name: str) -> dict[str, type[Component]]:
     kinds = library_parts()
     if name in kinds:
         return {name: kinds[name]}
-    wanted = _plain(name)
-    return {own: kind for own, kind in kinds.items() if wanted in map(_plain, _synonyms(kind))}
+    agree = {own: _agreement(name, (*([own] if "." in name else ()), *_synonyms(kind))) for own, kind in kinds.items()}
+    most = max(agree.values(), default=0)
+    return {own: kinds[own] for own, steps in agree.items() if most and steps == most}
+
+
+def _agreement(name: str, words: Iterable[str]) -> int:
+    """Return in how many steps, from its end, a name agrees with one of several; zero if neither is the other's end."""
+    asked, most = [_plain(step) for step in name.split(".")], 0
+    for word in words:
+        steps = [_plain(step) for step in word.split(".")]
+        count = min(len(asked), len(steps))
+        if asked[-count:] == steps[-count:]:
+            most = max(most, count)
+    return most
 
 
 def _synonyms(kind: type[Component]) -> tuple[str, ...]:
