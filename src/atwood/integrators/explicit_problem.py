@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from atwood.errors import UsageError
+from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.event_location import State
 from atwood.integrators.protocol import FloatArray, SolverOptions, Values
 from atwood.late import dataclass
@@ -34,6 +34,8 @@ __all__ = [
     "Stepper",
     "absolute_tolerances",
     "first_step",
+    "no_interpolation",
+    "sample_one_by_one",
 ]
 
 EDGE = 6.1
@@ -238,6 +240,24 @@ class Stepper(Protocol):
     def counts(self) -> Counts:
         """What it has done so far, over all starts."""
         ...
+
+
+def no_interpolation(t: float) -> KernelEvaluationError:
+    """Return the error of a step within which there is no value."""
+    return KernelEvaluationError(f"the right-hand side has no value within a step, at t = {t:.9g}")
+
+
+def sample_one_by_one(stepper: Stepper, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
+    """Take steps to one time after another; see `Stepper.sample`."""
+    last = stepper.counts.steps + steps
+    size = len(stepper.state()[1])
+    y, yp = np.empty((2, len(times), size))
+    for filled, t in enumerate(times):
+        outcome = stepper.run(float(t), last - stepper.counts.steps)
+        if outcome is not Outcome.REACHED:
+            return y[:filled], yp[:filled], outcome
+        _, y[filled], yp[filled] = stepper.interpolate(float(t))
+    return y, yp, Outcome.REACHED
 
 
 LOOSEST = 1e-3

@@ -9,9 +9,10 @@ from __future__ import annotations
 from atwood.integrators.dop853.layout import COUNTS, NUMBERS, POINTERS, prologue
 from atwood.integrators.dop853.reference import GROWTH, RETREAT, SAFETY, SHRINKAGE
 from atwood.integrators.dop853.start_code import begin_code
-from atwood.integrators.dop853.stepping_code import ROWS, exact, loop_code
+from atwood.integrators.dop853.stepping_code import ROWS, loop_code
 from atwood.integrators.dop853.tableau import NODES
 from atwood.integrators.explicit_problem import CALM, EDGE, STIFF
+from atwood.integrators.machine_text import exact, sample_code
 
 __all__ = ["COUNTS", "FUNCTIONS", "NUMBERS", "POINTERS", "step_code"]
 
@@ -301,47 +302,19 @@ failed:
 }}"""
 
 
-def _sample() -> str:
-    """Return the function that goes through output times and fills a table; it ends as `run` does."""
-    return f"""define i32 @sample(ptr %session, ptr %times, i64 %wanted, ptr %ys, ptr %yps) #0 {{
-entry:
-{prologue()}
-  br label %next
-next:
-  %i = phi i64 [ 0, %entry ], [ %following, %filled ]
-  store i64 %i, ptr %filled.at
-  %more = icmp slt i64 %i, %wanted
-  br i1 %more, label %go, label %done
-go:
-  %place = getelementptr double, ptr %times, i64 %i
-  %time = load double, ptr %place
-  store double %time, ptr %stop.at
-  %outcome = call i32 @run(ptr %session)
-  %reached = icmp eq i32 %outcome, 0
-  br i1 %reached, label %read, label %stopped
-read:
-  %offset = mul i64 %i, %n
-  %y = getelementptr double, ptr %ys, i64 %offset
-  %yp = getelementptr double, ptr %yps, i64 %offset
-  %code = call i32 @interpolate(ptr %session, double %time, ptr %y, ptr %yp)
-  %ok = icmp eq i32 %code, 0
-  br i1 %ok, label %filled, label %stopped
-filled:
-  %following = add i64 %i, 1
-  br label %next
-stopped:
-  %reason = phi i32 [ %outcome, %go ], [ %code, %read ]
-  ret i32 %reason
-done:
-  ret i32 0
-}}"""
-
-
 def step_code() -> str:
     """Return the functions, to be added to a module of `atwood.codegen.llvm.module`, which declares what all use.
 
     They take a pointer to the pointers of a session, in the order of `POINTERS`; numbers and counts are in the order of
     `NUMBERS` and `COUNTS`.
     """
-    parts = [loop_code(), _evaluate(), begin_code(), _look(), _run(), _interpolate(), _sample()]
+    parts = [
+        loop_code(),
+        _evaluate(),
+        begin_code(),
+        _look(),
+        _run(),
+        _interpolate(),
+        sample_code("%session", prologue(), "%n"),
+    ]
     return "\n".join([*parts, "declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"])

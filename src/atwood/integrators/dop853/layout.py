@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from atwood.integrators.machine_text import unpack
+
 __all__ = ["COUNTS", "NUMBERS", "POINTERS", "prologue"]
 
 NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first")
@@ -24,17 +26,7 @@ COUNTS = (
 POINTERS = ("function", "data", "numbers", "counts", "arrays", "events", "events_data", "values", "signs")
 
 
-def _fields(names: tuple[str, ...], group: str) -> str:
-    """Return the instructions that find the places of numbers or counts."""
-    return "\n".join(f"  %{name}.at = getelementptr i64, ptr %{group}, i64 {k}" for k, name in enumerate(names))
-
-
 def prologue() -> str:
     """Return the instructions that unpack the pointers of a session, which `%session` points to."""
-    lines = []
-    for k, name in enumerate(POINTERS):
-        lines.append(f"  %{name}.from = getelementptr ptr, ptr %session, i64 {k}")
-        lines.append(f"  %{name} = load ptr, ptr %{name}.from")
-    lines += [_fields(NUMBERS, "numbers"), _fields(COUNTS, "counts")]
-    lines += ["  %n = load i64, ptr %size.at", "  %m = load i64, ptr %padded.at"]
-    return "\n".join(lines)
+    sizes = "  %n = load i64, ptr %size.at\n  %m = load i64, ptr %padded.at"
+    return f"{unpack(POINTERS, NUMBERS, COUNTS)}\n{sizes}"

@@ -22,8 +22,7 @@ from atwood.codegen.once import once
 from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.expr import Program
 from atwood.integrators.dop853.code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
-from atwood.integrators.dop853.reference import no_interpolation
-from atwood.integrators.dop853.stepping_code import ROWS, WIDTH
+from atwood.integrators.dop853.stepping_code import ROWS
 from atwood.integrators.ensemble.batch import BatchPlaces
 from atwood.integrators.event_location import State
 from atwood.integrators.explicit_problem import (
@@ -33,7 +32,9 @@ from atwood.integrators.explicit_problem import (
     ExplicitProblem,
     Outcome,
     absolute_tolerances,
+    no_interpolation,
 )
+from atwood.integrators.machine_text import WIDTH
 from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.late import dataclass
 

@@ -23,10 +23,12 @@ from atwood.integrators.explicit_problem import (
     Outcome,
     absolute_tolerances,
     first_step,
+    no_interpolation,
+    sample_one_by_one,
 )
 from atwood.integrators.protocol import FloatArray, SolverOptions
 
-__all__ = ["GROWTH", "ORDER", "RETREAT", "SAFETY", "SHRINKAGE", "ReferenceStepper", "estimate", "no_interpolation"]
+__all__ = ["GROWTH", "ORDER", "RETREAT", "SAFETY", "SHRINKAGE", "ReferenceStepper", "estimate"]
 
 ORDER = 8
 SAFETY = 0.9
@@ -149,16 +151,7 @@ class ReferenceStepper:
 
     def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
         """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
-        last = self._counts.steps + steps
-        found = []
-        outcome = Outcome.REACHED
-        for t in times:
-            outcome = self.run(float(t), last - self._counts.steps)
-            if outcome is not Outcome.REACHED:
-                break
-            found.append(self.interpolate(float(t))[1:])
-        table = np.array(found).reshape(len(found), 2, self._size)
-        return table[:, 0], table[:, 1], outcome
+        return sample_one_by_one(self, times, steps)
 
     def _slope(self, t: float, y: FloatArray) -> FloatArray:
         self._counts.evaluations += 1
@@ -235,11 +228,6 @@ class ReferenceStepper:
         step = self._y - self._y_old
         first = np.array([step, h * k[0] - step, 2.0 * step - h * (k[0] + k[12])])
         return np.concatenate([first, h * (_LAST @ k)])
-
-
-def no_interpolation(t: float) -> KernelEvaluationError:
-    """Return the error of a step within which there is no value."""
-    return KernelEvaluationError(f"the right-hand side has no value within a step, at t = {t:.9g}")
 
 
 def _root(error: float) -> float:

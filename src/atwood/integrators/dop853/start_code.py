@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from atwood.integrators.dop853.layout import prologue
-from atwood.integrators.dop853.stepping_code import ROWS, exact
+from atwood.integrators.dop853.stepping_code import ROWS
+from atwood.integrators.machine_text import exact
 
 __all__ = ["begin_code"]
 

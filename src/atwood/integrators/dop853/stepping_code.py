@@ -6,23 +6,15 @@ numbers at a time; the padding stays finite and counts nothing.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Mapping
 
 from atwood.integrators.dop853.tableau import DENSE, ERROR_3, ERROR_5, STAGES
+from atwood.integrators.machine_text import WIDTH, exact
 
-__all__ = ["ROWS", "WIDTH", "exact", "loop_code"]
-
-WIDTH = 4
-"""How many numbers are worked on at a time."""
+__all__ = ["ROWS", "loop_code"]
 
 ROWS = {"slope": 0, "y": 16, "y_old": 17, "trial": 18, "absolute": 19, "dense": 20, "last": 27, "all": 28}
 _VECTOR = f"<{WIDTH} x double>"
-
-
-def exact(value: float) -> str:
-    """Return a double, exactly."""
-    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
 
 
 def _constant(value: float) -> str:

@@ -8,10 +8,10 @@ VIII.5 and VIII.6).
 
 from __future__ import annotations
 
-from atwood.integrators.dop853.stepping_code import exact
 from atwood.integrators.gauss.layout import COUNTS, NUMBERS, Layout
 from atwood.integrators.gauss.tableau import Tableau
 from atwood.integrators.gauss.writer import Code
+from atwood.integrators.machine_text import exact, sample_code
 
 __all__ = ["FUNCTIONS", "gauss_code"]
 
@@ -318,39 +318,9 @@ def _sample(layout: Layout) -> str:
     places, width = layout.places, layout.coordinates + layout.speeds
     stop = places["numbers"] + NUMBERS.index("stop")
     filled = places["counts"] + COUNTS.index("filled")
-    return f"""define i32 @sample(ptr %mem, ptr %times, i64 %wanted, ptr %ys, ptr %yps) #0 {{
-entry:
-  %stop.at = getelementptr double, ptr %mem, i64 {stop}
-  %filled.at = getelementptr i64, ptr %mem, i64 {filled}
-  br label %next
-next:
-  %i = phi i64 [ 0, %entry ], [ %following, %filled ]
-  store i64 %i, ptr %filled.at
-  %more = icmp slt i64 %i, %wanted
-  br i1 %more, label %go, label %done
-go:
-  %place = getelementptr double, ptr %times, i64 %i
-  %time = load double, ptr %place
-  store double %time, ptr %stop.at
-  %outcome = call i32 @run(ptr %mem)
-  %reached = icmp eq i32 %outcome, 0
-  br i1 %reached, label %read, label %stopped
-read:
-  %offset = mul i64 %i, {width}
-  %y = getelementptr double, ptr %ys, i64 %offset
-  %yp = getelementptr double, ptr %yps, i64 %offset
-  %code = call i32 @interpolate(ptr %mem, double %time, ptr %y, ptr %yp)
-  %ok = icmp eq i32 %code, 0
-  br i1 %ok, label %filled, label %stopped
-filled:
-  %following = add i64 %i, 1
-  br label %next
-stopped:
-  %reason = phi i32 [ %outcome, %go ], [ %code, %read ]
-  ret i32 %reason
-done:
-  ret i32 0
-}}"""
+    prologue = f"""  %stop.at = getelementptr double, ptr %mem, i64 {stop}
+  %filled.at = getelementptr i64, ptr %mem, i64 {filled}"""
+    return sample_code("%mem", prologue, str(width))
 
 
 def gauss_code(layout: Layout, method: Tableau) -> str:

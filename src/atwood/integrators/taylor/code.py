@@ -6,7 +6,7 @@ pointers to the two compiled programs of its recurrences, so that it is compiled
 
 from __future__ import annotations
 
-from atwood.integrators.dop853.stepping_code import exact
+from atwood.integrators.machine_text import exact, sample_code, unpack
 from atwood.integrators.taylor.problem import HIGHEST, LOWEST, RETREAT, RETRIES, SMALLER, WATCHED
 from atwood.integrators.taylor.stepping_code import LANES, ROWS, STRIDE, loop_code
 
@@ -32,14 +32,8 @@ FUNCTIONS = ("run", "interpolate", "sample", "evaluate")
 
 def _prologue() -> str:
     """Return the instructions that unpack the pointers of a session."""
-    lines = []
-    for k, name in enumerate(POINTERS):
-        lines.append(f"  %{name}.from = getelementptr ptr, ptr %session, i64 {k}")
-        lines.append(f"  %{name} = load ptr, ptr %{name}.from")
-    for group, names in (("numbers", NUMBERS), ("counts", COUNTS)):
-        lines += [f"  %{name}.at = getelementptr i64, ptr %{group}, i64 {k}" for k, name in enumerate(names)]
-    lines += ["  %n = load i64, ptr %size.at", "  %m = load i64, ptr %padded.at", "  %p = load i64, ptr %order.at"]
-    return "\n".join(lines)
+    sizes = "  %n = load i64, ptr %size.at\n  %m = load i64, ptr %padded.at\n  %p = load i64, ptr %order.at"
+    return f"{unpack(POINTERS, NUMBERS, COUNTS)}\n{sizes}"
 
 
 def _row(name: str, row: str) -> str:
@@ -352,48 +346,13 @@ inside:
 }}"""
 
 
-def _sample() -> str:
-    """Return the function that goes through output times and fills a table; it ends as `run` does."""
-    return f"""define i32 @sample(ptr %session, ptr %times, i64 %wanted, ptr %ys, ptr %yps) #0 {{
-entry:
-{_prologue()}
-  br label %next
-next:
-  %i = phi i64 [ 0, %entry ], [ %following, %filled ]
-  store i64 %i, ptr %filled.at
-  %more = icmp slt i64 %i, %wanted
-  br i1 %more, label %go, label %done
-go:
-  %place = getelementptr double, ptr %times, i64 %i
-  %moment = load double, ptr %place
-  store double %moment, ptr %stop.at
-  %outcome = call i32 @run(ptr %session)
-  %reached = icmp eq i32 %outcome, 0
-  br i1 %reached, label %read, label %stopped
-read:
-  %offset = mul i64 %i, %n
-  %y = getelementptr double, ptr %ys, i64 %offset
-  %yp = getelementptr double, ptr %yps, i64 %offset
-  %code = call i32 @interpolate(ptr %session, double %moment, ptr %y, ptr %yp)
-  %ok = icmp eq i32 %code, 0
-  br i1 %ok, label %filled, label %stopped
-filled:
-  %following = add i64 %i, 1
-  br label %next
-stopped:
-  %reason = phi i32 [ %outcome, %go ], [ %code, %read ]
-  ret i32 %reason
-done:
-  ret i32 0
-}}"""
-
-
 def step_code() -> str:
     """Return the functions, to be added to a module of `atwood.codegen.llvm.module`, which declares what all use.
 
     They take a pointer to the pointers of a session, in the order of `POINTERS`; numbers and counts are in the order of
     `NUMBERS` and `COUNTS`.
     """
-    parts = [loop_code(), _evaluate(), _expand(), _choose(), _run(), _interpolate(), _sample()]
+    parts = [loop_code(), _evaluate(), _expand(), _choose(), _run(), _interpolate()]
+    parts += [sample_code("%session", _prologue(), "%n")]
     parts += ["declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)", "declare double @llvm.floor.f64(double)"]
     return "\n".join(parts)

@@ -21,10 +21,9 @@ from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.once import once
 from atwood.errors import UsageError
 from atwood.expr.series.taylor import TaylorPrograms
-from atwood.integrators.dop853.reference import no_interpolation
-from atwood.integrators.dop853.stepping_code import WIDTH
 from atwood.integrators.event_location import State
-from atwood.integrators.explicit_problem import Counts, Outcome, absolute_tolerances
+from atwood.integrators.explicit_problem import Counts, Outcome, absolute_tolerances, no_interpolation
+from atwood.integrators.machine_text import WIDTH
 from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.integrators.taylor.code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
 from atwood.integrators.taylor.problem import DEFECT, FLOOR, TaylorProblem, choose_order, share_of_radius

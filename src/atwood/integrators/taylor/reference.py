@@ -14,9 +14,14 @@ import numpy as np
 
 from atwood.codegen.python.backend import compile_program
 from atwood.errors import KernelEvaluationError
-from atwood.integrators.dop853.reference import no_interpolation
 from atwood.integrators.event_location import State
-from atwood.integrators.explicit_problem import Counts, Outcome, absolute_tolerances
+from atwood.integrators.explicit_problem import (
+    Counts,
+    Outcome,
+    absolute_tolerances,
+    no_interpolation,
+    sample_one_by_one,
+)
 from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.integrators.taylor.problem import (
     DEFECT,
@@ -117,14 +122,7 @@ class ReferenceStepper:
 
     def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
         """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
-        last = self._counts.steps + steps
-        y, yp = np.empty((2, len(times), self._size))
-        for filled, t in enumerate(times):
-            outcome = self.run(float(t), last - self._counts.steps)
-            if outcome is not Outcome.REACHED:
-                return y[:filled], yp[:filled], outcome
-            _, y[filled], yp[filled] = self.interpolate(float(t))
-        return y, yp, Outcome.REACHED
+        return sample_one_by_one(self, times, steps)
 
     # -- one step -------------------------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ The other loops go over the columns of a table of arrays, as in `atwood.integrat
 
 from __future__ import annotations
 
-from atwood.integrators.dop853.stepping_code import WIDTH, exact
+from atwood.integrators.machine_text import WIDTH, exact
 from atwood.integrators.taylor.problem import HIGHEST
 
 __all__ = ["LANES", "ROWS", "STRIDE", "loop_code", "positions"]
