@@ -12,7 +12,9 @@ extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napole
 html_theme = "furo"
 html_title = "Atwood"
 exclude_patterns = ["build", "jupyter_execute"]
-nb_execution_mode = "off"
+nb_execution_mode = "force"  # of pages that are notebooks: those of the course
+nb_execution_raise_on_error = True
+nb_execution_timeout = 120
 myst_heading_anchors = 3
 suppress_warnings = [
     "myst.xref_missing",  # pages link to files of the repository, which stand outside of the pages
