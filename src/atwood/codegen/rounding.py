@@ -9,6 +9,7 @@ operation say the same for one sum, and grow without need from rotation to rotat
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,10 @@ WAYS = 8
 
 ROUGHNESS = 2.0**-48
 """By how much each operation is off, relative to what it gives: 16 times the machine's own rounding."""
+
+
+_KEPT = 1000
+"""The factors of so many values at most are kept."""
 
 
 def _logical(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -70,7 +75,7 @@ _ROUNDED: dict[str, Callable[..., Any]] = {
 
 
 def roughly(count: int, start: int = 0) -> FloatArray:
-    """Return factors next to one, up or down, shape (count, `WAYS`): the same ones each time.
+    """Return factors next to one, up or down, shape (count, `WAYS`): the same ones each time, not to be changed.
 
     Parameters
     ----------
@@ -79,9 +84,18 @@ def roughly(count: int, start: int = 0) -> FloatArray:
     start
         The number of the first.
     """
+    return _kept_factors(count, start) if count <= _KEPT else _factors(count, start)
+
+
+def _factors(count: int, start: int) -> FloatArray:
     numbers = np.arange(start + 1, start + count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     bits = (numbers[:, None] >> np.arange(40, 40 + WAYS, dtype=np.uint64)) & np.uint64(1)
-    return 1.0 + ROUGHNESS * (2.0 * bits.astype(float) - 1.0)
+    found: FloatArray = 1.0 + ROUGHNESS * (2.0 * bits.astype(float) - 1.0)
+    found.flags.writeable = False
+    return found
+
+
+_kept_factors = lru_cache(maxsize=128)(_factors)
 
 
 class RoughProgram:

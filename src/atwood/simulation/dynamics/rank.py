@@ -10,6 +10,7 @@ that is small but known well does not.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,7 @@ _LOOK = 1e-4
 def row_sizes(jacobian: Matrix, scales: FloatArray) -> FloatArray:
     """Return the largest entry of each row after its columns are scaled, shape (rows,)."""
     if is_full(jacobian):
-        return np.asarray(np.max(np.abs(jacobian * scales), axis=1, initial=0.0))
+        return np.asarray(np.abs(jacobian * scales).max(axis=1, initial=0.0))
     from atwood.linalg.sparse import csr_row_sizes
 
     return csr_row_sizes(jacobian, scales)
@@ -122,31 +123,37 @@ def independent_rows(
 def _chosen(rows: FloatArray, errors: FloatArray, most: int, first: NDArray[np.bool_] | None) -> list[int]:
     """Return the rows that Gram and Schmidt's method keeps, each time one of those of which most is left."""
     left = rows.copy()
-    sizes = np.linalg.norm(left, axis=1)
+    sizes = _lengths(left)
     chosen: list[int] = []
     basis = np.empty((most, rows.shape[1]))
     is_open, is_first = np.ones(len(rows), dtype=bool), np.zeros(len(rows), dtype=bool) if first is None else first
     while len(chosen) < most:
         bounds = tolerances.CERTAIN * errors
-        largest = float(np.max(sizes, where=is_open, initial=0.0))
+        largest = float(sizes.max(where=is_open, initial=0.0))
         if chosen and largest < _LOOK:
             weights = np.linalg.lstsq(rows[chosen].T, rows.T, rcond=None)[0]
             bounds = tolerances.CERTAIN * np.sqrt(errors**2 + errors[chosen] ** 2 @ weights**2)
         is_open &= sizes > bounds
-        if not np.any(is_open):
+        if not is_open.any():
             break
-        among = is_open & is_first if np.any(is_open & is_first) else is_open
-        i = int(np.argmax(among & (sizes >= _LEVEL * np.max(sizes, where=among, initial=0.0))))
+        before = is_open & is_first
+        among = before if before.any() else is_open
+        i = int((among & (sizes >= _LEVEL * sizes.max(where=among, initial=0.0))).argmax())
         direction = left[i] / sizes[i]
         known = basis[: len(chosen)]
         direction = direction - (known @ direction) @ known  # once more, against rounding
-        direction /= np.linalg.norm(direction)
+        direction /= sqrt(direction.dot(direction))
         basis[len(chosen)] = direction
         chosen.append(i)
         is_open[i] = False
         left -= (left @ direction)[:, None] * direction
-        sizes = np.linalg.norm(left, axis=1)
+        sizes = _lengths(left)
     return sorted(chosen)
+
+
+def _lengths(rows: FloatArray) -> FloatArray:
+    """Return the length of each row; NumPy's own function takes longer than that for few."""
+    return np.asarray(np.sqrt((rows * rows).sum(axis=1)))
 
 
 def review_rows(

@@ -85,7 +85,7 @@ class RowErrors:
         scales
             Size of a displacement along each speed.
         """
-        reach, first = float(np.max(np.abs(q), initial=0.0)), self._first is None
+        reach, first = float(np.abs(q).max(initial=0.0)), self._first is None
         passed = 0.0 if self._first is None else abs(t - self._first)
         if first or reach > _GROWN * self._reach or (self.moves_by_itself and passed > _GROWN * self._passed):
             self._first = t if self._first is None else self._first
@@ -173,4 +173,4 @@ class RowErrors:
 
 
 def _spread(values: FloatArray) -> FloatArray:
-    return np.asarray(np.max(values, axis=1, initial=-np.inf) - np.min(values, axis=1, initial=np.inf))
+    return np.asarray(values.max(axis=1, initial=-np.inf) - values.min(axis=1, initial=np.inf))

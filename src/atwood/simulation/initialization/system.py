@@ -140,24 +140,25 @@ def newton(
     errors = system.errors.near(t, q, scales)
     rows = row_scales(matrix, scales, errors)
     for _ in range(iterations):
-        size = float(np.max(np.abs(residual / rows), initial=0.0))
+        size = float(np.abs(residual / rows).max(initial=0.0))
         if size < 1e-15:
             break
         step = scales * least_norm(scaled(matrix, scales, rows), residual / rows)
-        longest = float(np.max(np.abs(step / scales), initial=0.0))
+        longest = float(np.abs(step / scales).max(initial=0.0))
         step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
         for _ in range(8):
             trial = system.kinematic_map.moved(t, q, -step)
             new_residual, new_matrix = system.at(t, trial, still)
-            if float(np.max(np.abs(new_residual / rows))) < size or longest < 1e-9:
+            new_size = float(np.abs(new_residual / rows).max())
+            if new_size < size or longest < 1e-9:
                 break
             step *= 0.5
-        if float(np.max(np.abs(new_residual / rows))) >= size and size < tolerances.MET:
+        if new_size >= size and size < tolerances.MET:
             break
         q, residual, matrix = trial, new_residual, new_matrix
         rows = row_scales(matrix, scales, errors)
     # What hardly changes with any coordinate, as where links line up, is measured by the scene.
-    sizes = np.maximum(rows, 1e-4 * max(np.max(rows, initial=0.0), np.max(scales, initial=0.0)))
+    sizes = np.maximum(rows, 1e-4 * max(rows.max(initial=0.0), scales.max(initial=0.0)))
     # What rounding could have left of a condition that nothing changes, as of a speed that a drive prescribes, is met.
     sizes = np.maximum(sizes, certain(errors, np.zeros_like(errors)) / tolerances.MET)
     return q, residual / sizes, scaled(matrix, scales)

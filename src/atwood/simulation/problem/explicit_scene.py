@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["compiled_rates", "explicit_problem", "own_rates"]
 
+_EXTERNAL: Key[bool] = Key("whether accelerations call functions in Python")
 _COMPILED: Key[CompiledAccelerations] = Key("machine code of accelerations")
 
 
@@ -71,7 +72,7 @@ def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAc
 
 def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], CompiledRates] | None:
     """Return what gives each session compiled rates, made when they are first asked for; None if they cannot be."""
-    if not _compiles(found):
+    if not _compiles(assembly, found):
         return None
 
     @cache
@@ -87,7 +88,7 @@ def own_rates(assembly: Assembly) -> tuple[CompiledAccelerations, OwnRates] | No
     None where they cannot be compiled, and where the scene is not one for explicit methods.
     """
     found = accelerations_of(assembly)
-    if found is None or not _compiles(found):
+    if found is None or not _compiles(assembly, found):
         return None
     code = compiled_rates(assembly, found)
     rates = code.open()
@@ -95,10 +96,11 @@ def own_rates(assembly: Assembly) -> tuple[CompiledAccelerations, OwnRates] | No
     return code, rates
 
 
-def _compiles(found: AccelerationProgram) -> bool:
+def _compiles(assembly: Assembly, found: AccelerationProgram) -> bool:
     """Return whether accelerations can be machine code."""
     try:
         from atwood.integrators.dop853 import native as explicit_native  # noqa: F401
     except ImportError:  # no compiler: steps in Python
         return False
-    return not any(node.operation == "external" for node in found.program.nodes)
+    nodes = found.program.nodes
+    return not assembly.shared.get(_EXTERNAL, lambda: any(node.operation == "external" for node in nodes), found)

@@ -175,10 +175,6 @@ class Plan:
         """
         return bool(self.dependent_speeds) and (self._null_space is None or self.dependent != self.dependent_speeds)
 
-    def review_output(self, t: float, q: FloatArray) -> bool:
-        """Do the same at an output, where it is to be done there."""
-        return self.reviews_outputs and self.review_partitioning(t, q)
-
     def check_held(self, t: float, q: FloatArray, u: FloatArray) -> None:
         """Refuse a state that misses constraints even after it has been projected onto them: they contradict.
 

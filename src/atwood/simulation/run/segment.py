@@ -377,8 +377,8 @@ class _Runner:
         segment, recorder, progress = self.segment, self.recorder, self.segment.options.progress
         samples = segment.samples
         times, shown, extra = (x.tolist() for x in (samples.times, samples.shown, samples.between))
-        plan, told, reads = segment.plan, -np.inf, isinstance(session, ReadingSession)
-        looks = plan.is_projected or bool(plan.dependent_speeds) or not plan.balance.kinematic_map.is_plain
+        plan, told = segment.plan, -np.inf
+        reads, repairs = hasattr(type(session), "read_on"), self._repairs  # protocols are slow to ask
         while done < len(times):
             moment, monitor = times[done], self.monitor
             between = monitor is not None and monitor.next < moment
@@ -410,9 +410,11 @@ class _Runner:
                 continue
             recorder.take(step_result.t, step_result.y, shown[done])
             first, done = done, done + 1
-            if looks and not extra[first]:
-                plan.review_output(step_result.t, step_result.y[: plan.program.coordinates])
-                self._repair(session, step_result)
+            if not extra[first]:
+                if plan.reviews_outputs:
+                    plan.review_partitioning(step_result.t, step_result.y[: plan.program.coordinates])
+                if repairs:
+                    self._repair(session, step_result)
             if reads and self._reads_on():  # up to the last, at which a monitor looks
                 rows = cast("ReadingSession", session).read_on(times, done, len(times) - 1)
                 recorder.take_all(times[done : done + len(rows)], rows, shown[done : done + len(rows)])
