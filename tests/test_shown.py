@@ -55,6 +55,17 @@ def _declared() -> list[object]:
     ]
 
 
+def _transformations() -> list[object]:
+    import sympy
+
+    one, two, new, other = sympy.symbols("q p Q P")
+    hanging = DoublePendulum()
+    return [
+        atwood.canonical_transformation(((one,), (two,)), {new: two}, {other: -one}),
+        atwood.point_transformation(hanging, {"rod1.angle": new, "rod2.angle": new + other}, [new, other]),
+    ]
+
+
 def _torus(count: int) -> np.ndarray:
     """Return the corners of the triangles of a torus, shape (triangles, 3, 3)."""
     angles = 2.0 * np.pi * np.arange(count) / count
@@ -95,6 +106,7 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "linear": atwood.linearize(scene, at=hanging, inputs=[], outputs=["bob[0].position.x"]),
         "dynamics": atwood.dynamics(scene),
         "conserved": atwood.conserved(FourBar()),
+        "transformations": _transformations(),
         "symmetry": atwood.Symmetry(dict.fromkeys(angles, 1.0), 0.0),
         "modes": atwood.normal_modes(scene, at=hanging),
         "equilibria": list(atwood.equilibria(DoublePendulum())),

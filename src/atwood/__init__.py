@@ -95,6 +95,17 @@ if TYPE_CHECKING:
     from atwood.study.comparison.compare import Comparison, ComparisonRow, compare
     from atwood.study.sweeps.files import load_sweep
     from atwood.study.sweeps.sweep import Sweep, sweep
+    from atwood.theory.canonical import (
+        CanonicalTransformation,
+        PointTransformation,
+        canonical_transformation,
+        fundamental_brackets,
+        generated_transformation,
+        point_transformation,
+        poisson_bracket,
+        poisson_brackets,
+        total_derivative,
+    )
     from atwood.theory.dynamics import Dynamics, dynamics
     from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
     from atwood.theory.flow import (
@@ -165,6 +176,7 @@ __all__ += [
 # Equations and what follows from them
 __all__ += [
     "BranchPoint",
+    "CanonicalTransformation",
     "Conserved",
     "ConservedQuantity",
     "Dynamics",
@@ -180,24 +192,32 @@ __all__ += [
     "PartOfEquations",
     "PhasePortrait",
     "PoincareSection",
+    "PointTransformation",
     "RestPoint",
     "RootLocus",
     "Symmetry",
     "TangentFlow",
     "Trim",
+    "canonical_transformation",
     "conserved",
     "dynamics",
     "equations",
     "equilibria",
     "equilibrium_branches",
+    "fundamental_brackets",
+    "generated_transformation",
     "hamiltonian",
     "linearize",
     "lyapunov_exponents",
     "normal_modes",
     "phase_portrait",
     "poincare_section",
+    "point_transformation",
+    "poisson_bracket",
+    "poisson_brackets",
     "root_locus",
     "tangent_flow",
+    "total_derivative",
     "trim",
 ]
 
@@ -289,6 +309,7 @@ __all__ += [
 _LATER = {
     "Assembly": "atwood.pipeline",
     "BranchPoint": "atwood.theory.linearization",
+    "CanonicalTransformation": "atwood.theory.canonical",
     "CheckReport": "atwood.checking",
     "Comparison": "atwood.study",
     "ComparisonRow": "atwood.study",
@@ -309,6 +330,7 @@ _LATER = {
     "PartOfEquations": "atwood.theory.equations",
     "PhasePortrait": "atwood.theory.flow",
     "PoincareSection": "atwood.theory.flow",
+    "PointTransformation": "atwood.theory.canonical",
     "RestPoint": "atwood.theory.flow",
     "Result": "atwood.result.result",
     "RootLocus": "atwood.theory.linearization",
@@ -319,6 +341,7 @@ _LATER = {
     "Trim": "atwood.theory.linearization",
     "animate": "atwood.plotting",
     "assemble": "atwood.pipeline",
+    "canonical_transformation": "atwood.theory.canonical",
     "check": "atwood.checking",
     "compare": "atwood.study",
     "conserved": "atwood.theory.symmetries",
@@ -328,6 +351,8 @@ _LATER = {
     "equilibrium_branches": "atwood.theory.linearization",
     "formula": "atwood.expr.formulas.formula",
     "from_data": "atwood.model.compose.serialization",
+    "fundamental_brackets": "atwood.theory.canonical",
+    "generated_transformation": "atwood.theory.canonical",
     "hamiltonian": "atwood.theory.hamiltonian",
     "linearize": "atwood.theory.linearization",
     "load_result": "atwood.result.files",
@@ -349,6 +374,9 @@ _LATER = {
     "plot_section": "atwood.plotting.plots.phase",
     "plot_sweep": "atwood.plotting",
     "poincare_section": "atwood.theory.flow",
+    "point_transformation": "atwood.theory.canonical",
+    "poisson_bracket": "atwood.theory.canonical",
+    "poisson_brackets": "atwood.theory.canonical",
     "report": "atwood.reporting",
     "root_locus": "atwood.theory.linearization",
     "save_result": "atwood.result.files",
@@ -357,6 +385,7 @@ _LATER = {
     "sweep": "atwood.study",
     "tangent_flow": "atwood.theory.flow",
     "to_data": "atwood.model.compose.serialization",
+    "total_derivative": "atwood.theory.canonical",
     "trim": "atwood.theory.linearization",
 }
 """Names whose modules are imported when they are first used; each also stands in `__all__` and above."""

@@ -1,0 +1,296 @@
+"""Canonical transformations: tested by their matrix, made from generating functions or from new coordinates.
+
+``J Omega J^T = Omega`` with J the derivatives of new coordinates and momenta by the old (Goldstein, equation 9.55).
+Where they depend on time, the new Hamiltonian is ``K = H + dF/dt`` (Goldstein, equation 9.12 and table 9.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+from atwood.analysis.hamiltonian import Hamiltonian
+from atwood.arguments import takes_names
+from atwood.errors import UnsupportedError, UsageError
+from atwood.late import dataclass
+from atwood.theory.canonical.phase_space import PhaseSpace, Sympy, Verdict, phase_space_of, short, vanishes
+
+__all__ = ["CanonicalTransformation", "canonical_transformation", "generated_transformation"]
+
+Space = Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]
+_KINDS = {1: ("q", "Q"), 2: ("q", "P"), 3: ("p", "Q"), 4: ("p", "P")}
+
+
+@dataclass(frozen=True, eq=False)
+class CanonicalTransformation:
+    """New coordinates and momenta in terms of the old ones, and whether they are canonical.
+
+    Attributes
+    ----------
+    space
+        The old coordinates and momenta.
+    coordinates, momenta
+        Symbols of the new ones.
+    new_coordinates, new_momenta
+        What they are in terms of the old and of time.
+    inverse
+        What the old ones are in terms of the new; empty where that is not known.
+    old_hamiltonian
+        H on the plain symbols of `space`; None where only coordinates and momenta were given.
+    added
+        ``dF/dt`` in terms of the new ones; None where it is not known.
+    """
+
+    space: PhaseSpace
+    coordinates: tuple[Sympy, ...]
+    momenta: tuple[Sympy, ...]
+    new_coordinates: tuple[Sympy, ...]
+    new_momenta: tuple[Sympy, ...]
+    inverse: Mapping[Sympy, Sympy]
+    old_hamiltonian: Sympy | None
+    added: Sympy | None
+
+    @cached_property
+    def matrix(self) -> Sympy:
+        """J: derivatives of new coordinates and momenta by the old, shape (2n, 2n)."""
+        import sympy
+
+        new = [self.space.read(one) for one in (*self.new_coordinates, *self.new_momenta)]
+        old = (*self.space.coordinates, *self.space.momenta)
+        return sympy.ImmutableMatrix([[self.space.shown(one.diff(x)) for x in old] for one in new])
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether ``J Omega J^T = Omega``, and how that is known."""
+        import sympy
+
+        n = len(self.coordinates)
+        omega = sympy.zeros(2 * n, 2 * n)
+        for k in range(n):
+            omega[k, n + k], omega[n + k, k] = 1, -1
+        read = self.matrix.applyfunc(self.space.read)
+        off = read * omega * read.T - omega
+        return vanishes(off[i, j] for i in range(2 * n) for j in range(i))
+
+    @property
+    def is_canonical(self) -> bool:
+        """Whether it is canonical."""
+        return self.verdict.holds
+
+    @cached_property
+    def hamiltonian(self) -> Sympy:
+        """The new Hamiltonian ``K = H + dF/dt``, in the new coordinates and momenta.
+
+        Raises
+        ------
+        UsageError
+            If the transformation is not canonical, or no Hamiltonian was given.
+        UnsupportedError
+            If the old coordinates and momenta, or dF/dt, are not known in terms of the new ones.
+        """
+        if self.old_hamiltonian is None:
+            raise UsageError("no Hamiltonian was given", where="canonical transformation", advice="Give one.")
+        if not self.is_canonical:
+            raise UsageError(
+                f"the transformation is not canonical: J Omega J^T is {self.verdict.sentence.removeprefix('off by')} "
+                "away from Omega",
+                where="canonical transformation",
+            )
+        if not self.inverse or self.added is None:
+            raise UnsupportedError(
+                "the old coordinates and momenta are not known in terms of the new ones, or dF/dt is not",
+                where="canonical transformation",
+                advice="Give `inverse`, or a generating function.",
+            )
+        return short(self.old_hamiltonian.xreplace(dict(self.inverse)) + self.added)
+
+    def __repr__(self) -> str:
+        told = "canonical" if self.is_canonical else "not canonical"
+        return f"<CanonicalTransformation to {', '.join(map(str, self.coordinates))}: {told}, {self.verdict.sentence}>"
+
+
+@takes_names
+def canonical_transformation(
+    hamiltonian: Space,
+    coordinates: Mapping[Any, Any],
+    momenta: Mapping[Any, Any],
+    *,
+    inverse: Mapping[Any, Any] | None = None,
+) -> CanonicalTransformation:
+    """Return new coordinates and momenta, with whether they are canonical and their Hamiltonian.
+
+    Parameters
+    ----------
+    hamiltonian
+        What `atwood.hamiltonian` returns, or a pair: coordinates and momenta.
+    coordinates, momenta
+        Each new symbol with what it is in terms of the old coordinates and momenta, parameters and t.
+    inverse
+        Each old coordinate and momentum in terms of the new; it is sought if not given.
+
+    Returns
+    -------
+    CanonicalTransformation
+        Ready to be asked for J, for whether it is canonical, and for the new Hamiltonian.
+
+    Raises
+    ------
+    UsageError
+        If there are not as many new coordinates and momenta as old ones.
+    """
+    import sympy
+
+    space = phase_space_of(hamiltonian)
+    n = len(space.coordinates)
+    new = [*_symbols(coordinates), *_symbols(momenta)]
+    if len(coordinates) != n or len(momenta) != n or len(set(new)) != 2 * n:
+        raise UsageError(f"{n} new coordinates and {n} new momenta are needed", where=f"{new}"[:80])
+    values = [space.read(one) for one in (*coordinates.values(), *momenta.values())]
+    old = [*space.coordinates, *space.momenta]
+    if inverse is not None:
+        by = {space.read(key): sympy.sympify(value) for key, value in inverse.items()}
+        if set(by) != set(old):
+            raise UsageError(
+                "the inverse does not give every old coordinate and momentum", where=f"{list(inverse)}"[:80]
+            )
+    else:
+        by = _solved([value - one for value, one in zip(values, new, strict=True)], old)
+    return CanonicalTransformation(
+        space,
+        tuple(new[:n]),
+        tuple(new[n:]),
+        tuple(space.shown(one) for one in values[:n]),
+        tuple(space.shown(one) for one in values[n:]),
+        by,
+        _old_hamiltonian(hamiltonian, space),
+        _added(values, new, by),
+    )
+
+
+@takes_names
+def generated_transformation(
+    function: Any, kind: int, hamiltonian: Space, coordinates: Sequence[Any], momenta: Sequence[Any]
+) -> CanonicalTransformation:
+    """Return the canonical transformation of a generating function (Goldstein, table 9.1).
+
+    Parameters
+    ----------
+    function
+        F in terms of old and new variables, parameters and t, in sympy.
+    kind
+        1: F(q, Q, t), with ``p = dF/dq`` and ``P = -dF/dQ``. 2: F(q, P, t), with ``p = dF/dq`` and ``Q = dF/dP``.
+        3: F(p, Q, t), with ``q = -dF/dp`` and ``P = -dF/dQ``. 4: F(p, P, t), with ``q = -dF/dp`` and ``Q = dF/dP``.
+    hamiltonian
+        See `canonical_transformation`.
+    coordinates, momenta
+        Symbols of the new coordinates and momenta.
+
+    Raises
+    ------
+    UsageError
+        If the function holds variables of the wrong kind, or leaves new variables undetermined.
+    """
+    import sympy
+
+    if kind not in _KINDS:
+        raise UsageError(f"there is no generating function of kind {kind!r}", where="kind", advice="Give 1, 2, 3 or 4.")
+    space = phase_space_of(hamiltonian)
+    f, n = space.read(function), len(space.coordinates)
+    new_q, new_p = [tuple(map(sympy.sympify, one)) for one in (coordinates, momenta)]
+    if len(new_q) != n or len(new_p) != n:
+        raise UsageError(f"{n} new coordinates and {n} new momenta are needed", where=f"{coordinates}, {momenta}"[:80])
+    variables = {"q": space.coordinates, "p": space.momenta, "Q": new_q, "P": new_p}
+    used = _KINDS[kind]
+    wrong = [one for name, own in variables.items() if name not in used for one in own if f.has(one)]
+    if wrong:
+        raise UsageError(
+            f"a generating function of kind {kind} is one of {used[0]} and {used[1]}, and this holds {wrong[0]}",
+            where=str(function)[:80],
+        )
+    first, second = ("p", 1) if used[0] == "q" else ("q", -1), ("P", -1) if used[1] == "Q" else ("Q", 1)
+    equations, pairs = [], ((used[0], *first), (used[1], *second))
+    for by, given, sign in pairs:
+        equations += [y - sign * f.diff(x) for x, y in zip(variables[by], variables[given], strict=True)]
+    old, new = [*space.coordinates, *space.momenta], [*new_q, *new_p]
+    forward, inverse = _solved(equations, new), _solved(equations, old)
+    if not forward:
+        raise UsageError(
+            "it leaves new coordinates or momenta undetermined, or has no solution that is found",
+            where=str(function)[:80],
+            advice=f"The mixed second derivatives by {used[0]} and {used[1]} must not be singular.",
+        )
+    added = f.diff(sympy.Symbol("t"))
+    if inverse:
+        added = added.xreplace(inverse)
+    values = [forward[one] for one in new]
+    return CanonicalTransformation(
+        space,
+        new_q,
+        new_p,
+        tuple(space.shown(short(one)) for one in values[:n]),
+        tuple(space.shown(short(one)) for one in values[n:]),
+        inverse,
+        _old_hamiltonian(hamiltonian, space),
+        added if inverse or added == 0 else None,
+    )
+
+
+def _symbols(given: Mapping[Any, Any]) -> list[Sympy]:
+    import sympy
+
+    return [sympy.Symbol(one) if isinstance(one, str) else one for one in given]
+
+
+def _old_hamiltonian(given: Space, space: PhaseSpace) -> Sympy | None:
+    return None if isinstance(given, (tuple, list)) else space.read(given.expression)
+
+
+def _solved(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> dict[Sympy, Sympy]:
+    """Return a solution of equations; empty where none is found. Linear ones are solved as such, others in turn."""
+    import sympy
+
+    try:
+        found = sympy.solve(list(equations), list(unknowns), dict=True, simplify=False, check=False)
+    except (NotImplementedError, ValueError):
+        return {}
+    whole = [one for one in found if set(one) == set(unknowns)]
+    chosen = next((one for one in reversed(whole) if _is_real(one.values())), None)
+    return {} if chosen is None else {key: short(value) for key, value in chosen.items()}
+
+
+def _is_real(values: Iterable[Sympy]) -> bool:
+    """Return whether expressions are real where all symbols are some positive numbers."""
+    import sympy
+
+    def at(value: Sympy) -> complex:
+        symbols = sorted(value.free_symbols, key=str)
+        point = {one: sympy.Rational(7 + 3 * k, 11 + 2 * k) for k, one in enumerate(symbols)}
+        return complex(value.xreplace(point).evalf(30))
+
+    found = [at(one) for one in values]
+    return all(abs(one.imag) <= 1e-20 * (abs(one) + 1.0) for one in found)
+
+
+def _added(values: Sequence[Sympy], new: Sequence[Sympy], inverse: Mapping[Sympy, Sympy]) -> Sympy | None:
+    """Return dF/dt, from how new coordinates and momenta move while the old ones stay.
+
+    That motion is the one of dF/dt as a Hamiltonian, which is found along straight lines from the origin: for what is a
+    polynomial in the new variables.
+    """
+    import sympy
+
+    t = sympy.Symbol("t")
+    rates = [one.diff(t) for one in values]
+    if all(one == 0 for one in rates):
+        return sympy.Integer(0)
+    if not inverse:
+        return None
+    n, share = len(new) // 2, sympy.Dummy("s")
+    rates = [short(one.xreplace(dict(inverse))) for one in rates]
+    scaled = [one.xreplace({x: share * x for x in new}) for one in rates]
+    total = sympy.expand(sum(new[n + k] * scaled[k] - new[k] * scaled[n + k] for k in range(n)))
+    if not total.is_polynomial(share):
+        return None
+    found = sum(c * sympy.Rational(1, m[0] + 1) for m, c in sympy.Poly(total, share).terms())
+    return short(sympy.expand(found))
