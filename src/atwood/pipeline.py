@@ -29,7 +29,6 @@ from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.progress import told
-from atwood.result.conserved import MONITOR, Monitor
 from atwood.result.result import Result
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
 from atwood.simulation.initialization.start import Start, find_start
@@ -39,6 +38,7 @@ from atwood.simulation.problem.arguments import (
     FORM,
     LEVEL,
     LIMITS,
+    MONITOR,
     NAME,
     ORDER,
     ORIENTATION,
@@ -219,7 +219,7 @@ def simulate(
     progress: Callable[[float], object] | bool | None = None,
     until: Any = None,
     record: Any = None,
-    monitor: Monitor | None = None,
+    monitor: Any = None,
 ) -> Result:
     """Simulate a scene from its start to its end.
 

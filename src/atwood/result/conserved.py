@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from atwood.arguments import Kind, Refused
 from atwood.arrays import FloatArray
 from atwood.late import dataclass
 
-__all__ = ["MONITOR", "ConservedLedger", "ConservedValues", "Monitor"]
+__all__ = ["ConservedLedger", "ConservedValues"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,19 +89,3 @@ class ConservedLedger(Mapping[str, ConservedValues]):
 
     def __repr__(self) -> str:
         return f"<ConservedLedger: {self.describe()}>"
-
-
-class Monitor(Protocol):
-    """What follows quantities along a run, as `atwood.Conserved` does."""
-
-    def along(self, result: Any) -> ConservedLedger:
-        """Return quantities along a run."""
-
-
-def _monitor(value: Any) -> Any:
-    if value is not None and not callable(getattr(value, "along", None)):
-        raise Refused
-    return value
-
-
-MONITOR = Kind("what `atwood.conserved(scene)` returns", _monitor)

@@ -6,12 +6,12 @@ import os
 from collections.abc import ItemsView, Iterable, Iterator, Mapping, ValuesView
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arguments import FILE, instance, optional, takes
+from atwood.arguments import ANYTHING, FILE, instance, takes
 from atwood.arrays import FloatArray
 from atwood.errors import ResultError
 from atwood.forms.assembly import Assembly
@@ -20,7 +20,6 @@ from atwood.integrators.protocol import Statistics
 from atwood.model.declare.quantities import PATHS, Quantity
 from atwood.result.accounts import account
 from atwood.result.angles import unwrap
-from atwood.result.conserved import ConservedLedger
 from atwood.result.energy import EnergyLedger
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.result.trajectories import Trajectories
@@ -37,6 +36,9 @@ from atwood.simulation.problem.projection import misses_of
 from atwood.simulation.run.record import SegmentRecord
 from atwood.simulation.run.run import Run
 from atwood.simulation.singular.crossing import SingularCrossing
+
+if TYPE_CHECKING:
+    from atwood.result.conserved import ConservedLedger
 
 __all__ = ["Result"]
 
@@ -59,7 +61,7 @@ class Result(Trajectories):
         Conserved quantities along it; see `simulate(..., monitor=)`.
     """
 
-    @takes(run=instance("a run, as solve.run makes it", Run), conserved=optional(instance("a ledger", ConservedLedger)))
+    @takes(run=instance("a run, as solve.run makes it", Run), conserved=ANYTHING)
     def __init__(self, run: Run, conserved: ConservedLedger | None = None) -> None:
         self.run, self.conserved = run, conserved
         self._cache: dict[str, FloatArray] = {}

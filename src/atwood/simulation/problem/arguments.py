@@ -34,6 +34,7 @@ __all__ = [
     "FORMS",
     "LEVEL",
     "LIMITS",
+    "MONITOR",
     "NAME",
     "ORDER",
     "ORIENTATION",
@@ -70,6 +71,12 @@ def _time(value: Any) -> float:
 
 
 _SECONDS = number(least=-_LONGEST, most=_LONGEST)
+
+
+def _monitor(value: Any) -> Any:
+    if value is not None and not callable(getattr(value, "along", None)):
+        raise Refused
+    return value
 
 
 def _condition(value: Any) -> str:
@@ -119,6 +126,7 @@ SAMPLES = whole(f"a whole number of samples, 1 to {_MOST:,}", 1, _MOST)
 ORDER = optional(Kind(f"one of {', '.join(map(str, _ORDERS))}", _order))
 STRUCTURE = FLAG
 PROGRESS = optional(either(FLAG, CALLBACK))
+MONITOR = Kind("what `atwood.conserved(scene)` returns", _monitor)
 _WATCHED = "a condition such as 'rod1.angle crosses 0', a function of quantities, or a list of these"
 _ONE = either(Kind(_WATCHED, _condition), CALLBACK)
 CONDITIONS = optional(Kind(_WATCHED, lambda value: either(CALLBACK, each(_ONE, _WATCHED)).read(value)))
