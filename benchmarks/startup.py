@@ -1,4 +1,4 @@
-"""How soon something happens: from starting a process to its printed result, and from a known scene to its next run.
+"""How soon something happens: from starting a process to its printed result. For what follows see `opening.py`.
 
 Processes are started in turn, in at least 15 rounds, and each is divided by the import of NumPy of its own round; the
 medians of these ratios are shown, of time on the clock and of processor time (what others do on the machine changes the
@@ -9,7 +9,6 @@ pipe.
 from __future__ import annotations
 
 import importlib.util
-import json
 import os
 import resource
 import statistics
@@ -40,33 +39,6 @@ GOALS = {
     "cold run double-pendulum --t-end 10": "warm + 1.5",
 }
 PEERS = ("mujoco", "pinocchio", "exudyn", "heyoka", "casadi")
-AGAIN = """
-import json, sys, time
-from atwood import assemble, simulate
-from atwood_library.scenes import Chain, DoublePendulum, FourBar
-
-rounds = int(sys.argv[1])
-found = {}
-for name, scene, end, path in (
-    ("double pendulum, 10 s", DoublePendulum(), 10.0, "mass2"),
-    ("four-bar, 1 s", FourBar(), 1.0, "coupler_length"),
-    ("chain of 10, 1 s", Chain(links=10), 1.0, "mass"),
-):
-    assembly = assemble(scene)
-    simulate(assembly, t_end=end)
-    value = getattr(scene, path)
-    again, other = [], []
-    for i in range(rounds):
-        began = time.perf_counter()
-        result = simulate(assembly, t_end=end)
-        again.append(1e3 * (time.perf_counter() - began - result.statistics.seconds))
-        began = time.perf_counter()
-        result = simulate(assembly.with_values({path: value * (1.0 + 1e-3 * (i + 1))}), t_end=end, max_steps=1)
-        other.append(1e3 * (time.perf_counter() - began - result.statistics.seconds))
-    found[name] = {"again": min(again), "other values": min(other)}
-print(json.dumps(found))
-"""
-
 Spent = tuple[float, float]
 """Seconds on the clock, and of the processor."""
 
@@ -140,17 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         rows.append([name, on_clock, of_processor, kept[name]["seconds"], GOALS.get(name)])
     title = f"Processes, as times the import of NumPy; medians of {rounds} rounds"
     print_table(title, ["process", "clock", "processor", "least s", "goal"], rows)
-    done = subprocess.run(
-        [sys.executable, "-c", AGAIN, str(3 if chosen.quick else 50)],
-        env=environment(), capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    again = json.loads(done.stdout)
-    print_table(
-        "A scene that was simulated before: ms beside integration, to the end and to the first step with other values",
-        ["scene", "again", "other values"],
-        [[name, one["again"], one["other values"]] for name, one in again.items()],
-    )
-    save(chosen.json, {"startup": kept, "again": again})
+    save(chosen.json, {"startup": kept})
 
 
 if __name__ == "__main__":
