@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from atwood import Component, Frame, Point, Scalar, Scene, connector, constraint, parameter, simulate
 from atwood.pipeline import assemble
+from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.problem import make_plan
 from atwood_library import Cylindrical, Ground, Link, Pivot, PointMass, PointOnPlane, RigidBody, Rod, Weld
+from atwood_library.scenes import FourBar
 
 FORMS = ("reduced", "dae")
 
@@ -48,6 +51,24 @@ def test_a_row_that_says_nothing_of_the_place_hides_no_other_row() -> None:
     assert freedom(scene, "dae") == 1
     found = simulate(scene, form="dae", t_end=0.2, outputs=2, rtol=1e-9)
     assert math.hypot(found["bob.position.x"][-1], found["bob.position.z"][-1]) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_errors_that_were_being_learned_when_ctrl_c_came_are_learned_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was kept of it would be half of it, and what came before Ctrl-C is still projected with it."""
+    assembly = assemble(FourBar(), form="dae")
+    start = find_start(assembly)
+    q, u = own_state(assembly, start)
+    plan = make_plan(assembly, start.time, q, u, start.length, 1.0)
+    expected, errors = (balance_of(assemble(FourBar(), form="dae"), "dae").errors for _ in range(2))
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(errors, "_learn", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            errors.near(0.0, q, plan.sizes)
+    np.testing.assert_allclose(errors.near(0.0, q, plan.sizes), expected.near(0.0, q, plan.sizes))
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -12,6 +12,7 @@ from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
 from atwood.mechanics.constraints.read_multipliers import known_multipliers, with_known
 from atwood.mechanics.constraints.rolling import Taken, integrated, take_up, without_idle_spins
 from atwood.mechanics.constraints.values import Values, constraint_values, find_constraints, levels, velocity_levels
+from atwood.mechanics.constraints.whole_turns import without_whole_turns
 from atwood.mechanics.dynamics.equations import Equations, force_rows, motion_rows, put_in_place
 from atwood.mechanics.dynamics.forces import Site, in_joint_coordinates, local_map
 from atwood.mechanics.dynamics.inertia import Masses, add_masses, check_masses
@@ -125,6 +126,9 @@ def _use_up(
     """
     found = find_constraints(derivation, forest, motion.placements)
     values = constraint_values(derivation, site, motion.placements, found.on_positions)
+    if derivation.space.name == "plane":
+        named = zip(motion.all_coordinates, forest.coordinates, strict=True)
+        values = without_whole_turns(derivation, [symbol for symbol, one in named if one.unit == "rad"], values)
     check_held(derivation, masses, forest, motion.all_coordinates, values, found.on_velocities)
     if forest.form != "reduced":
         return values, Taken({}, {}, (), found.on_velocities)

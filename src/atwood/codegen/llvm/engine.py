@@ -2,6 +2,9 @@
 
 Object code is what the cache keeps; loading it needs none of LLVM's work on code.  Names of the C library are bound
 to addresses when code is loaded, so that object code holds nothing of the process that made it.
+
+LLVM's objects are closed by name, not by their finalizers: whatever a finalizer raises is lost, Ctrl-C too, and LLVM
+works long enough on some of them for that to happen.
 """
 
 from __future__ import annotations
@@ -11,6 +14,8 @@ import itertools
 import os
 import sys
 import threading
+import weakref
+from collections import deque
 from collections.abc import Iterable, Mapping
 from functools import cache, lru_cache
 
@@ -34,13 +39,25 @@ _numbers = itertools.count()
 _LOADS = 200
 
 
+class _Grave(weakref.ref["LoadedCode"]):
+    """What is unloaded when the code that it refers to is no longer there; the callback is no function of Python."""
+
+    __slots__ = ("linker", "tracker")
+    tracker: binding.ResourceTracker
+    linker: binding.LLJIT
+
+
+_graves: dict[int, _Grave] = {}
+_dead: deque[_Grave] = deque()
+
+
 class LoadedCode:
     """Machine code in memory; it stays there as long as this object lives.
 
     Parameters
     ----------
-    tracker
-        What keeps the code in memory.
+    tracker, linker
+        What keeps the code in memory, and what loaded it.
     kept
         What else the code needs: functions of Python that it calls.
 
@@ -51,11 +68,25 @@ class LoadedCode:
     """
 
     def __init__(
-        self, tracker: binding.ResourceTracker, addresses: Mapping[str, int], kept: tuple[object, ...]
+        self,
+        tracker: binding.ResourceTracker,
+        linker: binding.LLJIT,
+        addresses: Mapping[str, int],
+        kept: tuple[object, ...],
     ) -> None:
-        self._tracker = tracker
         self._kept = kept
         self.addresses = dict(addresses)
+        grave = _Grave(self, _dead.append)
+        grave.tracker, grave.linker = tracker, linker
+        _graves[id(grave)] = grave
+
+
+def _unload_dead() -> None:
+    """Unload the code that is no longer used."""
+    while _dead:
+        grave = _dead.popleft()
+        del _graves[id(grave)]
+        grave.tracker.close()
 
 
 def compile_text(text: str, level: int) -> bytes:
@@ -69,9 +100,8 @@ def compile_text(text: str, level: int) -> bytes:
         How hard LLVM works on the machine code, from 0 to 3.
     """
     with _lock:
-        context = binding.create_context()
-        module = binding.parse_assembly(text, context)
-        found: bytes = _machine(level).emit_object(module)
+        with binding.create_context() as context, binding.parse_assembly(text, context) as module:
+            found: bytes = _machine(level).emit_object(module)
         return found
 
 
@@ -103,10 +133,11 @@ def load_code(
     for name in names:
         builder.export_symbol(name)
     with _lock:
+        _unload_dead()
         number = next(_numbers)
         linker = _linker(number // _LOADS)
         tracker = builder.link(linker, f"atwood.{number}")
-    return LoadedCode(tracker, {name: tracker[name] for name in names}, (linker, *kept))
+        return LoadedCode(tracker, linker, {name: tracker[name] for name in names}, kept)
 
 
 @cache

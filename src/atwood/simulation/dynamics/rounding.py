@@ -88,11 +88,11 @@ class RowErrors:
         reach, first = float(np.abs(q).max(initial=0.0)), self._first is None
         passed = 0.0 if self._first is None else abs(t - self._first)
         if first or reach > _GROWN * self._reach or (self.moves_by_itself and passed > _GROWN * self._passed):
-            self._first = t if self._first is None else self._first
-            self._reach, self._passed = max(reach, self._reach, 1.0), max(passed, self._passed)
             aside = _ASIDE * scales * np.sin(_GOLDEN * np.arange(1.0, len(scales) + 1.0))
             self._learn(t, self._kinematic_map.moved(t, q, aside), scales)
-            self._known = None
+            # Afterwards, so that whoever is interrupted meanwhile learns again.
+            self._known, self._reach, self._passed = None, max(reach, self._reach, 1.0), max(passed, self._passed)
+            self._first = t if self._first is None else self._first
         if self._known is None or self._known[0] is not scales:
             found = self._shared(np.maximum(self._values, self._of_rows(self._entries, self._tangent, scales)))
             self._known = scales, found
