@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -9,6 +10,7 @@ from atwood import (
     BodyInertia,
     Component,
     Frame,
+    Outline,
     Placement,
     Scalar,
     Shaft,
@@ -25,6 +27,9 @@ from atwood import (
     parameter,
     turn,
 )
+
+_STEEL = 7850.0
+"""Density of steel, kg/m^3."""
 
 
 class Inertia(Component):
@@ -44,6 +49,12 @@ class Inertia(Component):
     )
     rotor: Frame = connector(Frame, "The frame that turns.")
     flange: Shaft = connector(Shaft, "The angle, where gears and springs take hold of it.", of="angle")
+
+    def outline(self) -> Outline:
+        """Return what it looks like: a disc of steel of its moment of inertia, a fifth as thick as wide."""
+        r = (5.0 * self.moment / (math.pi * _STEEL)) ** 0.2  # J = rho pi r^4 h/2 with h = 2 r/5
+        profile = ((0.0, -0.2 * r), (r, -0.2 * r), (r, 0.2 * r), (0.0, 0.2 * r))
+        return Outline.revolved(profile, tuple(self.axis))
 
     def place(self) -> Vector:
         """Return where it is; in a plane it cannot leave that."""

@@ -2,8 +2,24 @@
 
 from __future__ import annotations
 
-from atwood import Component, Frame, Scalar, Vector, as_vector, connector, constraint, cross, dot, observable, parameter
+from atwood import (
+    Component,
+    Frame,
+    Outline,
+    Scalar,
+    Vector,
+    as_vector,
+    connector,
+    constraint,
+    cross,
+    dot,
+    observable,
+    parameter,
+)
 from atwood_library.interfaces.bearings import velocity_seen
+
+_LENGTH = 0.1
+"""m. How long it is drawn."""
 
 
 class Blade(Component):
@@ -24,6 +40,11 @@ class Blade(Component):
     )
     a: Frame = connector(Frame, "The frame that carries the surface.")
     b: Frame = connector(Frame, "The blade, at its point of contact.")
+
+    def outline(self) -> Outline:
+        """Return what it looks like: a thin edge along the blade, at its point of contact."""
+        x, y = as_vector(self.axis), as_vector(self.normal)
+        return Outline.box(_LENGTH, 0.1 * _LENGTH, 0.03 * _LENGTH).turned(x, y, cross(x, y)).on("b")
 
     def across(self) -> Vector:
         """Return the direction across the blade, in world axes."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Component, Frame, Point, Scalar, Vector, connector, constraint, norm, observable, parameter
+from atwood import Component, Frame, Outline, Point, Scalar, Vector, connector, constraint, norm, observable, parameter
 
 
 class PointOnLevelSurface(Component):
@@ -34,6 +34,10 @@ class PointOnLevelSurface(Component):
         r = self.arm()
         x, y, z = (self.function.derivative(axis)(r.x, r.y, r.z) for axis in "xyz")
         return Vector(x, y if self.in_space else 0.0, z)
+
+    def outline(self) -> Outline:
+        """Return what it looks like: the way of the point on the surface."""
+        return Outline.path("b")
 
     @constraint(
         reaction="normal_force",

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from atwood.arguments import FLAG, Kind, Refused, check, number, one_of, real, show, takes_names
+from atwood.arguments import FLAG, NAME, Kind, Refused, check, number, one_of, real, show, takes_names
 from atwood.errors import DeclarationError, UsageError
 from atwood.late import dataclass
 
@@ -18,12 +18,12 @@ __all__ = ["Outline"]
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """The surface of a part, in the axes of its first frame; made by `box`, `revolved` or `mesh`.
+    """The surface of a part, in the axes of its first frame; made by `box`, `revolved`, `mesh` or `path`.
 
     Attributes
     ----------
     kind
-        ``"box"``, ``"revolved"`` or ``"mesh"``.
+        ``"box"``, ``"revolved"``, ``"mesh"`` or ``"path"``.
     sides
         Of a box, its sides along x, y and z, m; its centre is the origin.
     profile
@@ -33,17 +33,20 @@ class Outline:
         Of a surface of revolution: 0, 1 or 2 for x, y or z.
     axes
         Where its x, y and z axes point in the axes of the frame, in columns; None if they are the same.
+    frame
+        Name of the connector in whose axes it is; empty for the first one.
     is_ring
         Whether the line ends where it begins, as that of a tube does; otherwise it begins and ends on the axis.
     vertices, triangles
         Arrays of a mesh: m, shape (vertices, 3), and its triangles, counter-clockwise from outside.
     """
 
-    kind: Literal["box", "revolved", "mesh"]
+    kind: Literal["box", "revolved", "mesh", "path"]
     sides: tuple[float, float, float] = (0.0, 0.0, 0.0)
     profile: tuple[tuple[float, float], ...] = ()
     axis: int = 2
     axes: Any = None
+    frame: str = ""
     is_ring: bool = False
     vertices: Any = None
     triangles: Any = None
@@ -85,6 +88,17 @@ class Outline:
                 f"triangles cannot be {show(triangles)}", where="Outline.mesh", advice=f"Give {kind.what}."
             )
         return cls("mesh", vertices=vertices, triangles=triangles)
+
+    @classmethod
+    @takes_names
+    def path(cls, frame: str) -> Outline:
+        """Return the way of a connector, by its name, along a run as seen from the first one: what a guide shows."""
+        return cls("path", frame=check(NAME, frame, "frame", "Outline.path"))
+
+    @takes_names
+    def on(self, frame: str) -> Outline:
+        """Return the same surface in the axes of another connector of the part, by its name."""
+        return replace(self, frame=check(NAME, frame, "frame", "Outline.on"))
 
     @takes_names
     def turned(self, x_axis: Any, y_axis: Any, z_axis: Any) -> Outline:

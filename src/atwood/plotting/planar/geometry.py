@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.expr import Expression, Scalar, evaluate
+from atwood.expr import Expression, Scalar, depends_on, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import state_program
 from atwood.late import dataclass
@@ -19,14 +19,31 @@ from atwood.mechanics.build import Mechanism
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
 from atwood.model.declare.connectors import Groove
 from atwood.model.local.laws import LocalPart
+from atwood.model.values.outline import Outline
 from atwood.plotting.planar.columns import spread_columns
+from atwood.plotting.shapes.curves import joint_curve, numbers
 from atwood.plotting.shapes.meshes import Mesh
 from atwood.plotting.shapes.outlines import outline_mesh, outline_of
 from atwood.result.result import Result
 
 __all__ = ["Kind", "Picture", "Shape", "find_connectors", "make_picture"]
 
-Kind = Literal["ground", "rod", "link", "spring", "damper", "rope", "mass", "pulley", "rail", "pivot", "solid"]
+Kind = Literal[
+    "ground",
+    "rod",
+    "link",
+    "spring",
+    "damper",
+    "rope",
+    "mass",
+    "pulley",
+    "rail",
+    "pivot",
+    "solid",
+    "curve",
+    "path",
+    "spiral",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +62,8 @@ class Shape:
         Mass of a mass, kg; zero otherwise.
     surface
         Of a solid its surface, in the axes of its node.
+    line
+        Of a curve its points from its node, in the axes of that, m, shape (points, 2).
     """
 
     part: str
@@ -52,6 +71,7 @@ class Shape:
     nodes: tuple[int, ...]
     size: float = 0.0
     surface: Mesh | None = None
+    line: FloatArray | None = None
 
     @cached_property
     def rim(self) -> FloatArray:
@@ -80,7 +100,7 @@ class Picture:
     radii
         On a vertical line: radius of each pulley by its groove's node.
     angles
-        Of the nodes of solids: how they are turned, counter-clockwise, rad, shape (times,).
+        Of the nodes of solids and curves: how they are turned, counter-clockwise, rad, shape (times,).
     """
 
     time: FloatArray
@@ -99,9 +119,9 @@ class Picture:
         """Return the places that hold all that is drawn at some of the times, shape (places, 2)."""
         places = [points[shown] for points in self.points.values()]
         for shape in self.shapes:
-            if shape.surface is not None:
+            if shape.surface is not None or shape.line is not None:
                 angles = self.angles[shape.nodes[0]][shown, None]
-                x, z = shape.rim.T
+                x, z = shape.rim.T if shape.line is None else shape.line.T
                 turned = np.stack([x * np.cos(angles) - z * np.sin(angles), x * np.sin(angles) + z * np.cos(angles)], 2)
                 middle = self.points[shape.nodes[0]][shown]
                 places += [middle + turned.min(axis=1), middle + turned.max(axis=1)]
@@ -166,8 +186,18 @@ def make_picture(result: Result, also: Iterable[int] = ()) -> Picture:
             for node, values in points.items():
                 values[:, 0] = places.get(node, columns.get(mechanism.bodies.body_of[node], 0.0))
             _place_grounds(mechanism, shapes, points, columns)
-    angles = _node_angles(result, [shape.nodes[0] for shape in shapes if shape.surface is not None])
-    return Picture(result.time, points, tuple(shapes), direction, radii, angles)
+    turned = [shape.nodes[0] for shape in shapes if shape.surface is not None or shape.kind in ("curve", "path")]
+    angles = _node_angles(result, turned)
+    drawn = [_followed(shape, points, angles) if shape.kind == "path" else shape for shape in shapes]
+    return Picture(result.time, points, tuple(drawn), direction, radii, angles)
+
+
+def _followed(shape: Shape, points: Mapping[int, FloatArray], angles: Mapping[int, FloatArray]) -> Shape:
+    """Return, as a curve, the way of a shape's second node as seen from its first one."""
+    base, rider = shape.nodes
+    c, s = np.cos(angles[base]), np.sin(angles[base])
+    x, z = (points[rider] - points[base]).T
+    return replace(shape, kind="curve", nodes=(base,), line=np.column_stack([x * c + z * s, z * c - x * s]))
 
 
 def _place_grounds(
@@ -236,10 +266,13 @@ def _shapes(mechanism: Mechanism) -> list[Shape]:
     order: tuple[Kind, ...] = (
         "ground",
         "rail",
+        "curve",
+        "path",
         "rope",
         "spring",
         "damper",
         "solid",
+        "spiral",
         "link",
         "rod",
         "pulley",
@@ -257,7 +290,14 @@ def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]
     grooves = [nodes[name] for name, one in kinds.items() if isinstance(one, Groove)]
     outline = outline_of(local) if mechanism.space.name == "plane" else None
     if outline is not None:
-        return [Shape(path, "solid", (ends[0],), surface=outline_mesh(outline, around=120))]
+        node = nodes[outline.frame] if outline.frame else ends[0]
+        if outline.kind == "path":
+            return [Shape(path, "path", (ends[0], node))]
+        return [Shape(path, "solid", (node,), surface=outline_mesh(outline, around=120))]
+    for joint in local.joints if mechanism.space.name == "plane" else ():
+        line = joint_curve(mechanism, path, joint) if joint.placement.axes == "a" else None
+        if line is not None and joint.law.options.a != "world":
+            return [Shape(path, "curve", (nodes[joint.law.options.a],), line=line[:, [0, 2]])]
     masses = [one for one in local.point_inertias if len(one.points) == 1]
     weight = sum(_value(mechanism, one.masses[0][0]) for one in masses)
     joints = [joint.law.options for joint in local.joints]
@@ -267,10 +307,30 @@ def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]
         return [Shape(path, "pulley", (grooves[0], *ends[:1]), weight)]
     if len(ends) == 2:
         return _between(mechanism, path, local, (ends[0], ends[1]), grooves)
+    if local.body_inertias and len(ends) == 1 and mechanism.space.name == "plane":
+        return _bodies(mechanism, path, local, ends[0])
+    if len(ends) == 3 and not local.body_inertias and len(local.joints) > 1:
+        return _between(mechanism, path, local, (ends[0], ends[1]), grooves)
     if masses and ends:
         rail = [Shape(path, "rail", (0, ends[0]))] if joints and mechanism.space.name == "plane" else []
         return [*rail, Shape(path, "mass", (ends[0],), weight)]
     return []
+
+
+def _bodies(mechanism: Mechanism, path: str, local: LocalPart, node: int) -> list[Shape]:
+    """Return bodies that do not say what they look like: uniform discs of their masses and moments."""
+    found = []
+    for body in local.body_inertias:
+        mass, moment = _value(mechanism, body.mass), _value(mechanism, body.moment)
+        center = numbers(mechanism, tuple(body.center_of_mass))
+        if mass > 0.0 and moment > 0.0:
+            radius = float(np.sqrt(2.0 * moment / mass))
+            profile = [(0.0, -0.1 * radius), (radius, -0.1 * radius), (radius, 0.1 * radius), (0.0, 0.1 * radius)]
+            disc = outline_mesh(Outline.revolved(profile, "y"), around=120)
+            found.append(Shape(path, "solid", (node,), surface=disc.placed(center, np.eye(3))))
+        elif mass > 0.0 and not np.any(center):
+            found.append(Shape(path, "mass", (node,), mass))
+    return found
 
 
 def _between(
@@ -283,9 +343,9 @@ def _between(
     if any(joint.law.options.rigid for joint in joints):
         return [Shape(path, "link", ends)]
     if local.potentials or local.dissipations:
-        turns = all(symbols.angle is not None for symbols in local.connectors.values())
-        if turns:
-            return []  # a torsion spring acts where its frames meet
+        places = [symbol for symbols in local.connectors.values() for symbol in (*symbols.position, *symbols.velocity)]
+        if not any(depends_on(one, places) for one in (*local.potentials, *local.dissipations)):
+            return [Shape(path, "spiral", ends)] if mechanism.space.name == "plane" else []
         return [Shape(path, "spring" if local.potentials else "damper", ends)]
     if joints:
         shifts = [c for joint in joints for c in joint.placement.displacement]

@@ -150,6 +150,19 @@ class Pen:
         lines = list(page[ends[borders]])
         axes.add_collection(LineCollection(lines, colors=[self._tone(INK)], linewidths=1.3, capstyle="round", **look))
 
+    def _curve(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        assert shape.line is not None
+        angle = float(self.picture.angles[shape.nodes[0]][moment])
+        c, s = np.cos(angle), np.sin(angle)
+        line = points[0] + shape.line @ np.array([[c, s], [-s, c]])
+        axes.plot(line[:, 0], line[:, 1], color=self._tone(GREY), linewidth=1.6, solid_joinstyle="round", **look)
+
+    def _spiral(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        turn = np.linspace(0.0, 5.0 * np.pi, 80)
+        out = self.unit * (0.6 + 2.2 * turn / turn[-1])
+        line = points[0] + np.column_stack([out * np.cos(turn), out * np.sin(turn)])
+        axes.plot(line[:, 0], line[:, 1], color=self._tone(INK), linewidth=1.1, **look)
+
     def _pivot(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         x, z = points[0]
         edge = self._tone(INK)

@@ -7,22 +7,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, Scalar, depends_on, evaluate
+from atwood.expr import Expression
 from atwood.mechanics.build import Mechanism
 from atwood.model.local.laws import LocalJoint
 from atwood.model.values.rotation import FreeRotation, Rotation, as_rotation
 from atwood.plotting.scene3d.reading import Joining, Reading
+from atwood.plotting.shapes.curves import depends, joint_curve, joint_shift, joint_step, numbers
 
-__all__ = ["numbers", "read_joint"]
-
-
-def numbers(
-    mechanism: Mechanism, given: Sequence[Scalar], also: Mapping[Expression, float] | None = None
-) -> FloatArray:
-    """Return the values of expressions of parameters, and of further symbols with the values given."""
-    graph = mechanism.table.graph
-    values = {**mechanism.known_at_start(), **(also or {})}
-    return np.array(evaluate([graph.convert(one) for one in given], values), dtype=float)
+__all__ = ["read_joint", "seen_from"]
 
 
 def read_joint(
@@ -50,28 +42,27 @@ def read_joint(
     axes = _turning_axes(mechanism, placement.rotation)
     if all(c.is_zero for c in shift):
         return _meeting(reading, path, (a, b), axes, isinstance(placement.rotation, FreeRotation))
-    moving = [c for c in joint.coordinates if _depends(shift, c)]
+    moving = [c for c in joint.coordinates if depends(shift, c)]
     if len(moving) == 2:
         if not _is_flat(mechanism, joint, shift, moving):
             return _sheet(mechanism, path, joint, (a, b), turn)
-        first, second = (_step(mechanism, joint, shift, one, 1.0) for one in moving)
+        first, second = (joint_step(mechanism, joint, shift, one, 1.0) for one in moving)
         normal = turn @ np.cross(first, second)
         return [Joining(path, "plane", (a, b), (normal / np.linalg.norm(normal),), reach=_touched(mechanism, path))]
     if len(moving) > 2:
         return []
     if len(moving) == 1:
-        one, two = (_step(mechanism, joint, shift, moving[0], size) for size in (1.0, 2.0))
-        if not np.allclose(two, 2.0 * one, rtol=1e-9, atol=0.0):
-            angles = np.linspace(*_ends(mechanism, path), 73)
-            points = np.array([_shift(mechanism, joint, shift, {moving[0]: angle}) for angle in angles])
+        points = joint_curve(mechanism, path, joint)
+        if points is not None:
             return [Joining(path, "curve", (a, b), curve=points @ turn.T)]
+        one = joint_step(mechanism, joint, shift, moving[0], 1.0)
         axis = turn @ one
     else:
         axis = _seen_axis(reading, a, b)
     if not np.any(axis):
         return []
     axis = axis / np.linalg.norm(axis)
-    along = _seen_from(reading, a, b) @ axis
+    along = seen_from(reading, a, b) @ axis
     return [Joining(path, "slide", (a, b), (axis,), bool(axes), (float(along.min()), float(along.max())))]
 
 
@@ -84,23 +75,14 @@ def _is_idle(mechanism: Mechanism, path: str, joint: LocalJoint) -> bool:
     return len(members) == 1
 
 
-def _ends(mechanism: Mechanism, path: str) -> tuple[float, float]:
-    """Return between which values of its coordinate a curve is drawn: its ends, or once round."""
-    values = mechanism.locals_[path].part.values
-    low, high = values.get("lower_end"), values.get("upper_end")
-    if isinstance(low, float) and isinstance(high, float):
-        return low, high
-    if isinstance(low, float):
-        return low, low + 2.0 * np.pi
-    return (high - 2.0 * np.pi, high) if isinstance(high, float) else (-np.pi, np.pi)
-
-
 def _is_flat(
     mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], moving: Sequence[Expression]
 ) -> bool:
     """Return whether a joint moves its end in a plane, evenly with two coordinates."""
     places = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [2.0, 3.0]]
-    origin, one, two, far = (_shift(mechanism, joint, shift, dict(zip(moving, place, strict=True))) for place in places)
+    origin, one, two, far = (
+        joint_shift(mechanism, joint, shift, dict(zip(moving, place, strict=True))) for place in places
+    )
     return bool(np.allclose(far - origin, 2.0 * (one - origin) + 3.0 * (two - origin), rtol=1e-9, atol=1e-12))
 
 
@@ -109,12 +91,12 @@ def _sheet(
 ) -> list[Joining]:
     """Return lines on a curved surface, along either of its coordinates."""
     shift = [mechanism.table.graph.convert(c) for c in joint.placement.displacement]
-    first, second = [c for c in joint.coordinates if _depends(shift, c)]
+    first, second = [c for c in joint.coordinates if depends(shift, c)]
     steps, lines = np.linspace(-np.pi, np.pi, 49), np.linspace(-np.pi, np.pi, 9)
     found = []
     for along, across in ((first, second), (second, first)):
         for held in lines:
-            points = np.array([_shift(mechanism, joint, shift, {along: step, across: held}) for step in steps])
+            points = np.array([joint_shift(mechanism, joint, shift, {along: step, across: held}) for step in steps])
             if np.all(np.isfinite(points)):
                 found.append(Joining(path, "curve", nodes, curve=points @ turn.T))
     return found
@@ -124,11 +106,6 @@ def _touched(mechanism: Mechanism, path: str) -> tuple[float, float]:
     """Return how far from below what moves on a plane it can touch it: by the radius of what rolls."""
     radius = mechanism.locals_[path].part.values.get("radius", 0.0)
     return 0.0, float(radius) if isinstance(radius, (int, float)) else 0.0
-
-
-def _depends(expressions: Sequence[Expression], symbol: Expression) -> bool:
-    """Return whether one of some expressions depends on a symbol."""
-    return any(depends_on(one, [symbol]) for one in expressions)
 
 
 def _turning_axes(mechanism: Mechanism, rotation: object) -> list[FloatArray]:
@@ -152,25 +129,7 @@ def _meeting(
     return [Joining(path, "hinge", nodes, (reading.turns[a] @ axis,)) for axis in axes]
 
 
-def _shift(
-    mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], values: Mapping[Expression, float]
-) -> FloatArray:
-    known = {**dict.fromkeys((*joint.coordinates, *mechanism.relations.roots), 0.0), **values}
-    for axes in joint.axes:  # whichever way they are turned, the step along a coordinate is the same
-        known.update((c, float(i == k)) for i, axis in enumerate(axes) for k, c in enumerate(axis))
-    return numbers(mechanism, shift, known)
-
-
-def _step(
-    mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], one: Expression, value: float
-) -> FloatArray:
-    """Return by how much a joint's displacement changes when one of its coordinates goes from zero to a value."""
-    ends = [_shift(mechanism, joint, shift, {one: place}) for place in (value, 0.0)]
-    found: FloatArray = ends[0] - ends[1]
-    return found
-
-
-def _seen_from(reading: Reading, a: int, b: int) -> FloatArray:
+def seen_from(reading: Reading, a: int, b: int) -> FloatArray:
     """Return the way from node a to node b in the axes of the body of a, m, shape (times, 3)."""
     pose = reading.poses[reading.body_of[a]]
     found: FloatArray = np.einsum("tji,tj->ti", pose.axes, reading.place(b) - reading.place(a))
@@ -179,7 +138,7 @@ def _seen_from(reading: Reading, a: int, b: int) -> FloatArray:
 
 def _seen_axis(reading: Reading, a: int, b: int) -> FloatArray:
     """Return the direction in which node b moves as seen from node a, where it stays on a straight line; else zero."""
-    seen = _seen_from(reading, a, b)
+    seen = seen_from(reading, a, b)
     spread = seen - seen.mean(axis=0)
     sizes, axes = np.linalg.svd(spread, full_matrices=False)[1:]
     straight = sizes[0] > 0.0 and (len(sizes) < 2 or sizes[1] <= 1e-6 * sizes[0])

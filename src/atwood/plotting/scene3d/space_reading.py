@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, depends_on, is_zero
+from atwood.expr import depends_on, is_zero
 from atwood.forms.quantities import state_program
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.laws import LocalPart
-from atwood.plotting.scene3d.joint_reading import numbers, read_joint
+from atwood.plotting.scene3d.joint_reading import read_joint, seen_from
 from atwood.plotting.scene3d.reading import Joining, Lump, Pose, Reading, Tie, TieKind
+from atwood.plotting.shapes.curves import holds_distance, numbers
 from atwood.plotting.shapes.outlines import outline_of
 from atwood.result.result import Result
 
@@ -42,7 +43,9 @@ def read_scene(result: Result) -> Reading:
         nodes = {name: mechanism.graph.node_of[path, name] for name in local.connectors}
         joinings += [one for joint in local.joints for one in read_joint(bare, mechanism, path, joint, nodes)]
         lumps += _lumps(bare, mechanism, path, local, nodes)
-        ties += _ties(path, local, nodes)
+        followed = _followed(bare, path, local, nodes)
+        joinings += followed
+        ties += [] if followed else _ties(path, local, nodes)
         options = [joint.law.options for joint in local.joints]
         if any(one.rigid and one.a == "world" for one in options):
             grounds += nodes.values()
@@ -54,6 +57,15 @@ def read_scene(result: Result) -> Reading:
         grounds=tuple(dict.fromkeys(grounds)),
         is_heavy=not is_zero(mechanism.gravity.z),
     )
+
+
+def _followed(reading: Reading, path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Joining]:
+    """Return, as a curve, the way of a connector as seen from the first one, where the part's outline is that."""
+    outline = outline_of(local)
+    if outline is None or outline.kind != "path":
+        return []
+    first, other = next(iter(nodes.values())), nodes[outline.frame]
+    return [Joining(path, "curve", (first, other), curve=seen_from(reading, first, other))]
 
 
 def _layouts(mechanism: Mechanism) -> tuple[dict[int, FloatArray], dict[int, FloatArray]]:
@@ -102,7 +114,9 @@ def _poses(result: Result) -> dict[int, Pose]:
 
 
 def _lumps(reading: Reading, mechanism: Mechanism, path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Lump]:
-    found = []
+    found, outline = [], outline_of(local)
+    if outline is not None and outline.kind == "path":
+        return []
     for one in local.point_inertias:
         if len(one.points) == 1:
             node = nodes[one.points[0].name]
@@ -112,8 +126,11 @@ def _lumps(reading: Reading, mechanism: Mechanism, path: str, local: LocalPart, 
         center = numbers(mechanism, tuple(body.center_of_mass))
         (mass,) = numbers(mechanism, [body.mass])
         lump = _lump(reading, path, nodes[body.frame.name], float(mass), center, _tensor(mechanism, body))
-        found.append(replace(lump, outline=outline_of(local), origin=reading.offsets[lump.node]))
-    return [one for one in found if one.mass > 0.0]
+        found.append(replace(lump, outline=outline, origin=reading.offsets[lump.node]))
+    if outline is not None and not local.body_inertias:
+        lump = _lump(reading, path, nodes[outline.frame or next(iter(nodes))], 0.0, np.zeros(3), np.zeros((3, 3)))
+        found.append(replace(lump, outline=outline, origin=reading.offsets[lump.node]))
+    return [one for one in found if one.mass > 0.0 or one.outline is not None]
 
 
 def _tensor(mechanism: Mechanism, body: BodyInertia) -> FloatArray:
@@ -128,20 +145,12 @@ def _lump(reading: Reading, path: str, node: int, mass: float, center: FloatArra
     return Lump(path, reading.body_of[node], node, mass, place, turn, turn @ tensor @ turn.T)
 
 
-def _is_distance(local: LocalPart, value: Expression) -> bool:
-    """Return whether a constraint holds points apart: it reads the places of two connectors at least, and no more."""
-    several = local.connectors.values()
-    others = [symbol for one in several for symbol in (*one.velocity, *one.orientation, *one.spin)]
-    reads = [depends_on(value, list(one.position)) for one in several]
-    return sum(reads) > 1 and not depends_on(value, others)
-
-
 def _ties(path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Tie]:
     """Return what a part that only pulls or pushes between its nodes looks like."""
     ends = tuple(dict.fromkeys(nodes.values()))
     if local.joints or len(ends) < 2:
         return []
-    if any(_is_distance(local, one.value) for one in local.constraints):
+    if any(holds_distance(local, one.value) for one in local.constraints):
         return [Tie(path, "rope" if local.part.component.modes else "rod", ends)]
     kinds: list[TieKind] = []
     symbols = [symbol for one in local.connectors.values() for symbol in one.position]
