@@ -19,7 +19,8 @@ from atwood.integrators.explicit_session import open_explicit
 from atwood.integrators.ida import native as ida_native
 from atwood.integrators.protocol import SolverOptions, Statistics, Status, StepResult
 from atwood.simulation.problem.explicit_scene import explicit_problem
-from atwood.simulation.problem.problem import Plan, pack_state
+from atwood.simulation.problem.preparation import pack_state
+from atwood.simulation.problem.problem import Plan
 
 __all__ = ["Prepared", "explicit_run", "ida_run", "ida_session", "prepare", "taylor_run", "whole_run"]
 

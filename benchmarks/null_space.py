@@ -16,7 +16,8 @@ from timing import best_of, options, print_table, ratio, save
 from atwood import Scene, simulate
 from atwood.integrators.ida import native as ida_native, sundae as ida_sundae
 from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status
-from atwood.simulation.problem.problem import Plan, make_plan, pack_state
+from atwood.simulation.problem.preparation import make_plan, pack_state
+from atwood.simulation.problem.problem import Plan
 from atwood_library import Ground, Link, Pivot
 from atwood_library.scenes import FourBar, SliderCrank
 

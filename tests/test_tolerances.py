@@ -29,7 +29,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.initialization.start import find_start
-from atwood.simulation.problem.problem import make_plan
+from atwood.simulation.problem.preparation import make_plan
 from atwood.tolerances import INTERVALS, tolerances
 from atwood_library.scenes import SCENES, Bricard, FourBar, HeavyTop, RollingBall, SimplePendulum
 

@@ -57,7 +57,7 @@ from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
-from atwood.model.declare.fields import parameter, signal
+from atwood.model.declare.field_functions import parameter, signal
 from atwood.model.declare.laws import (
     constraint,
     derivative,

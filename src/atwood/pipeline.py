@@ -53,7 +53,8 @@ from atwood.simulation.problem.arguments import (
 )
 from atwood.simulation.problem.conditions import Condition
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.run.run import Run, run, run_out_of_time
+from atwood.simulation.run.made import Run
+from atwood.simulation.run.run import run, run_out_of_time
 from atwood.stages import stage, watching
 from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import Orientation, check_orientation

@@ -15,7 +15,8 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.pipeline import assemble, simulate
 from atwood.simulation.initialization.start import Start, find_start
-from atwood.simulation.problem.problem import Plan, make_plan, pack_state
+from atwood.simulation.problem.preparation import make_plan, pack_state
+from atwood.simulation.problem.problem import Plan
 
 FORMS = ("reduced", "dae")
 

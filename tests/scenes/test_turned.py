@@ -30,7 +30,7 @@ from atwood import (
 from atwood.pipeline import assemble
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.initialization.start import find_start, own_state
-from atwood.simulation.problem.problem import make_plan
+from atwood.simulation.problem.preparation import make_plan
 from atwood_library import Disc, Ground, Link, Pivot, RigidBody, Rod, RotaryDrive, Spherical, Weld
 
 FORMS = ("reduced", "dae")

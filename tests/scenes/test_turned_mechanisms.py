@@ -15,7 +15,7 @@ from atwood.model.local.flatten import flatten
 from atwood.pipeline import assemble
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.initialization.start import find_start, own_state
-from atwood.simulation.problem.problem import make_plan
+from atwood.simulation.problem.preparation import make_plan
 from atwood_library import Ground, Link, Pivot, Weld
 from atwood_library.scenes import Bricard, FlyballGovernor, FourBarRow, SpatialSliderCrank, UniversalShaft
 

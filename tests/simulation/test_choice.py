@@ -27,7 +27,7 @@ from atwood.integrators.ida import library as sundials_library
 from atwood.pipeline import assemble
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.problem.problem import make_plan
+from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.run.choice import ASKED, stiffness_of
 from atwood_library import Damper, Force, Ground, PointMass, Spring
 from atwood_library.scenes import SCENES

@@ -12,7 +12,7 @@ from atwood.model.declare.laws import event
 from atwood.pipeline import assemble
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.initialization.start import find_start
-from atwood.simulation.problem.problem import make_plan
+from atwood.simulation.problem.preparation import make_plan
 from atwood_library import Ground, PointMass, Spring
 from atwood_library.scenes import SCENES
 

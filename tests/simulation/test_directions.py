@@ -18,7 +18,7 @@ from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.problem.problem import make_plan, pack_state
+from atwood.simulation.problem.preparation import make_plan, pack_state
 from atwood.simulation.run.run import run
 from atwood_library import Ground, Link, Pivot, PointMass, Rod, Rope
 from atwood_library.scenes import SCENES, FourBar

@@ -11,7 +11,7 @@ from atwood import Component, Frame, Point, Scalar, Scene, connector, constraint
 from atwood.pipeline import assemble
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.initialization.start import find_start, own_state
-from atwood.simulation.problem.problem import make_plan
+from atwood.simulation.problem.preparation import make_plan
 from atwood_library import Cylindrical, Ground, Link, Pivot, PointMass, PointOnPlane, RigidBody, Rod, Weld
 from atwood_library.scenes import FourBar
 

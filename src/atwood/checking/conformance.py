@@ -18,7 +18,7 @@ from atwood.consistency.trials import make_trial
 from atwood.errors import AtwoodError, UsageError
 from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
-from atwood.model.declare.laws import Kind
+from atwood.model.declare.law import Kind
 from atwood.model.local.flatten import Part
 from atwood.model.values.outline import Outline
 from atwood.model.values.space import Space, make_space

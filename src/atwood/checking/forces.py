@@ -14,7 +14,7 @@ from atwood.consistency.joints import Unknown, attempt
 from atwood.consistency.trials import Pose, Trial, nudged
 from atwood.model.declare.connectors import Motion
 from atwood.model.declare.contributions import Load
-from atwood.model.declare.laws import Law
+from atwood.model.declare.law import Law
 from atwood.model.values.vector import Vector, cross
 
 __all__ = ["Wrench", "energy_forces", "in_motion", "load_forces", "ways", "wrong_forces"]

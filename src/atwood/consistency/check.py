@@ -12,7 +12,7 @@ from atwood.consistency.names import wrong_names
 from atwood.consistency.trials import Trial, make_trial
 from atwood.errors import DeclarationError
 from atwood.model.declare.component import Component
-from atwood.model.declare.laws import Law
+from atwood.model.declare.law import Law
 from atwood.model.local.flatten import Part
 from atwood.model.values.space import Space
 

@@ -9,7 +9,7 @@ from typing import Any
 from atwood.consistency.sources import contradiction_at
 from atwood.errors import DeclarationError, suggestion
 from atwood.model.declare.component import Component
-from atwood.model.declare.laws import Law
+from atwood.model.declare.law import Law
 
 __all__ = ["wrong_names"]
 

@@ -16,7 +16,7 @@ from atwood.late import dataclass
 from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.contributions import Placement
-from atwood.model.declare.laws import Law
+from atwood.model.declare.law import Law
 from atwood.model.local.flatten import Part
 from atwood.model.values.rotation import FREE, IDENTITY, Axes, Rotation, as_rotation, transposed
 from atwood.model.values.space import FIXED_AXES, Space, planar_axes

@@ -28,7 +28,6 @@ from atwood.forms.program import (
 )
 from atwood.forms.reassembly import follow, other_mode, with_flat
 from atwood.forms.reduced import reduced_form
-from atwood.forms.restoring import recipe
 from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
 from atwood.forms.source import Source, no_start_quantity
 from atwood.late import dataclass
@@ -42,8 +41,8 @@ from atwood.model.local.flatten import FlatScene, flatten
 from atwood.model.local.parts import DiscreteState
 from atwood.model.local.states import declared_starts
 from atwood.showing import count_of, fitted
+from atwood.topology.forest_growth import grow_spanning_forest
 from atwood.topology.orientation_coordinates import Orientation
-from atwood.topology.spanning_forest import grow_spanning_forest
 
 if TYPE_CHECKING:
     from atwood.codegen.llvm.columns import ColumnKernel, ColumnProgram
@@ -124,6 +123,8 @@ class Assembly:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
+        from atwood.forms.restoring import recipe
+
         return recipe(self)
 
     def __repr__(self) -> str:

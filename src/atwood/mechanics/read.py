@@ -15,7 +15,8 @@ from atwood.mechanics.kinematics.mechanism import Mechanism, check_closures, mak
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.carried_inertia import Carried
 from atwood.model.local.flatten import FlatScene
-from atwood.model.local.laws import LocalPart, ParameterTable, localize
+from atwood.model.local.laws import LocalPart, localize
+from atwood.model.local.parameters import ParameterTable
 from atwood.model.values.space import Space, make_space
 from atwood.topology.bodies import Bodies, find_bodies
 from atwood.topology.graph import MechanismGraph, build_graph

@@ -9,7 +9,7 @@ from atwood.errors import AtwoodError, DeclarationError, is_about, suggestion
 from atwood.expr import Expression, Graph
 from atwood.model.declare.connectors import Frame, Point
 from atwood.model.declare.contributions import Load, Placement, PointInertia
-from atwood.model.declare.laws import Law
+from atwood.model.declare.law import Law
 from atwood.model.values.vector import Vector
 
 __all__ = ["call_law", "law_value", "listed", "not_evaluated", "one_scalar"]

@@ -36,7 +36,8 @@ from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
 from atwood.simulation.initialization.start import Start, find_start, own_state, settle
 from atwood.simulation.problem.arguments import NAME, ORIENTATION
-from atwood.simulation.problem.problem import Plan, make_plan
+from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.problem import Plan
 from atwood.tolerances import tolerances
 
 __all__ = [

@@ -25,7 +25,7 @@ from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.rank import independent_rows
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start, own_state
-from atwood.simulation.problem.problem import make_plan
+from atwood.simulation.problem.preparation import make_plan
 
 __all__ = ["Offer", "find_offers"]
 

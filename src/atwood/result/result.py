@@ -33,9 +33,11 @@ from atwood.simulation.initialization.report import InitializationReport, report
 from atwood.simulation.initialization.start import Start, own_state
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
+from atwood.simulation.run.made import Run
 from atwood.simulation.run.record import SegmentRecord
-from atwood.simulation.run.run import Run
-from atwood.simulation.singular.crossing import SingularCrossing
+
+if TYPE_CHECKING:
+    from atwood.simulation.singular.crossing import SingularCrossing
 
 if TYPE_CHECKING:
     from atwood.result.conserved import ConservedLedger

@@ -11,12 +11,12 @@ from atwood.arguments import check, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import MissingGroupError, MissingQuantityError, ResultError, suggestion, suggestion_in_parts
 from atwood.model.declare.quantities import PATH, PATHS, Quantity
-from atwood.result.formats.dataset import Dataset, Variable
-from atwood.result.formats.tables import needed, to_xarray
 from atwood.showing import count_of, fitted, html_table, listed
 
 if TYPE_CHECKING:
     import os
+
+    from atwood.result.formats.dataset import Dataset
 
 __all__ = ["Group", "Trajectories", "output_number"]
 
@@ -123,6 +123,8 @@ class Trajectories(Mapping[str, FloatArray]):
         UsageError
             If pandas is not installed (``pip install 'atwood[data]'``).
         """
+        from atwood.result.formats.tables import needed
+
         pandas, columns = needed("pandas"), self.table(paths)
         table = pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
         table.attrs["units"] = {"time": "s", **{path: self.unit(path) for path in columns}}
@@ -147,10 +149,14 @@ class Trajectories(Mapping[str, FloatArray]):
         UsageError
             If xarray is not installed (``pip install 'atwood[data]'``).
         """
+        from atwood.result.formats.tables import to_xarray
+
         return to_xarray(self.as_dataset(paths))
 
     def as_dataset(self, paths: Iterable[str] | None = None) -> Dataset:
         """Return the quantities as arrays with names, units and dimensions, for files."""
+        from atwood.result.formats.dataset import Dataset, Variable
+
         every = (
             Variable(path, ("time",), values, self.unit(path), self.describe(path))
             for path, values in self.table(paths).items()

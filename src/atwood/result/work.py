@@ -11,8 +11,7 @@ from atwood.arrays import FloatArray
 from atwood.result.accounts import power_into
 from atwood.result.energy import EnergyLedger, Piece, make_ledger
 from atwood.result.segment_quantities import SegmentQuantities
-from atwood.simulation.run.retrace import run_again, times_of_steps
-from atwood.simulation.run.run import Run
+from atwood.simulation.run.made import Run
 
 __all__ = ["find_ledger", "integral_in_steps", "integral_of_samples", "nodes_between"]
 
@@ -133,6 +132,8 @@ def find_ledger(
 
 def _work_in_steps(run: Run, pieces: Sequence[Piece], count: int) -> tuple[list[FloatArray], float] | None:
     """Return the work at all samples, integrated within each step of the solver, and its estimated error."""
+    from atwood.simulation.run.retrace import run_again, times_of_steps
+
     steps = times_of_steps(run)
     grids = [_joined(one.time, steps) for one in pieces]
     nodes = [nodes_between(grid, count) for grid in grids]

@@ -12,6 +12,7 @@ from ctypes import c_double, c_int, c_int64, c_void_p
 from dataclasses import fields
 from itertools import accumulate
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +24,6 @@ from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.expr import Program
 from atwood.integrators.dop853.code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
 from atwood.integrators.dop853.stepping_code import ROWS
-from atwood.integrators.ensemble.batch import BatchPlaces
 from atwood.integrators.event_location import State
 from atwood.integrators.explicit_problem import (
     CompiledEvents,
@@ -37,6 +37,9 @@ from atwood.integrators.explicit_problem import (
 from atwood.integrators.machine_text import WIDTH
 from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.late import dataclass
+
+if TYPE_CHECKING:
+    from atwood.integrators.ensemble.batch import BatchPlaces
 
 __all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates"]
 
@@ -168,6 +171,8 @@ class CompiledStepper:
 
     def batch_places(self) -> BatchPlaces:
         """Return the addresses with which many runs can be made in one call."""
+        from atwood.integrators.ensemble.batch import BatchPlaces
+
         begin, sample = (_code().code.addresses[name] for name in ("begin", "sample"))
         limit, steps, filled = (self._counts[k:].ctypes.data for k in (_LIMIT, _STEPS, _FILLED))
         tolerance = self._arrays[ROWS["absolute"]].ctypes.data

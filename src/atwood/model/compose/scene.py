@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 from atwood.errors import StartError
 from atwood.model.compose.composite import Model
 from atwood.model.compose.start_values import StartValues
-from atwood.model.declare.fields import parameter
+from atwood.model.declare.field_functions import parameter
 from atwood.showing import listed
 
 __all__ = ["Scene"]

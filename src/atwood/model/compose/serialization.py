@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import importlib
 import json
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,20 +18,19 @@ from atwood.arguments import FILE, MAPPING, instance, takes
 from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.files import check_readable, write_atomically
 from atwood.model.compose.composite import Model
-from atwood.model.compose.connection_rules import Parts, find_end
-from atwood.model.compose.differences import REMOVED, Differences, find_differences
+from atwood.model.compose.connection_rules import find_end
+from atwood.model.compose.differences import REMOVED
+from atwood.model.compose.written import CHANGES, find_class, join_path, write_component
 from atwood.model.declare.component import Component
 from atwood.model.declare.fields import FieldReference
-from atwood.model.declare.function_values import Function, read_function
+from atwood.model.declare.function_values import read_function
 from atwood.model.declare.parameter_expressions import OPERATIONS, ParameterExpression
-from atwood.model.declare.time_functions import StoredFunction, write_function
+from atwood.model.declare.time_functions import StoredFunction
 
-__all__ = ["FORMAT", "VERSION", "from_data", "load_scene", "save_scene", "to_data"]
+__all__ = ["FORMAT", "VERSION", "find_class", "from_data", "load_scene", "save_scene", "to_data"]
 
 FORMAT = "atwood scene"
 VERSION = 1
-
-_CHANGES = ("settings", "replaced", "added", "connections", "starts")
 
 
 @takes(scene=instance("a Scene or a Model", Model))
@@ -52,7 +49,7 @@ def to_data(scene: Model) -> dict[str, Any]:
     ParameterError
         If a function of time cannot be written.
     """
-    return {"format": FORMAT, "version": VERSION, "scene": _write(scene, "")}
+    return {"format": FORMAT, "version": VERSION, "scene": write_component(scene, "")}
 
 
 def _checksum(data: Mapping[str, Any]) -> str:
@@ -146,133 +143,18 @@ def load_scene(path: str | Path) -> Model:
 # -- writing -----------------------------------------------------------------------------------------------------
 
 
-def _write(component: Component, path: str) -> dict[str, Any]:
-    written: dict[str, Any] = {"class": _class_name(type(component), path)}
-    values = {name: _write_value(value, _join(path, name)) for name, value in component._settings.items()}
-    if values:
-        written["values"] = values
-    if isinstance(component, Model):
-        parts = {name: _write_parts(part, _join(path, name)) for name, part in component._given.items()}
-        if parts:
-            written["parts"] = parts
-        changes = _write_differences(find_differences(component), path)
-        if changes:
-            written["changes"] = changes
-    return written
-
-
-def _write_parts(parts: Parts, path: str) -> Any:
-    if isinstance(parts, list):
-        return [_write(one, f"{path}[{index}]") for index, one in enumerate(parts)]
-    return _write(parts, path)
-
-
-def _write_differences(differences: Differences, path: str) -> dict[str, Any]:
-    changes = {
-        "settings": {
-            part: {name: _write_value(value, _join(path, f"{part}.{name}")) for name, value in values.items()}
-            for part, values in differences.settings.items()
-        },
-        "replaced": {name: _write_parts(part, _join(path, name)) for name, part in differences.replaced.items()},
-        "added": {name: _write_parts(parts, _join(path, name)) for name, parts in differences.added.items()},
-        "connections": {part: [list(pair) for pair in joined] for part, joined in differences.joined.items()},
-        "starts": {
-            part: {
-                kind: {key: _write_value(value, key) for key, value in values.items()}
-                for kind, values in starts.items()
-            }
-            for part, starts in differences.starts.items()
-        },
-    }
-    return {name: change for name, change in changes.items() if change}
-
-
-def _write_value(value: Any, where: str) -> Any:
-    if isinstance(value, FieldReference):
-        return {"bound": value.name}
-    if isinstance(value, ParameterExpression):
-        return {"bound": [value.operation, *(_write_operand(one) for one in value.arguments)]}
-    if isinstance(value, tuple):
-        return list(value)
-    if isinstance(value, Function):
-        return {"function": value.steps(where), "arguments": list(value.arguments), "text": value.text}
-    if callable(value):
-        return {"function": write_function(value, where)}
-    return value
-
-
-def _write_operand(operand: Any) -> Any:
-    if isinstance(operand, FieldReference):
-        return operand.name
-    if isinstance(operand, ParameterExpression):
-        return [operand.operation, *(_write_operand(one) for one in operand.arguments)]
-    return float(operand)
-
-
-def _class_name(cls: type[Component], path: str) -> str:
-    name = f"{cls.__module__}:{cls.__qualname__}"
-    try:
-        same = _find_class(name, path) is cls
-    except AtwoodError:
-        same = False
-    if not same:
-        raise UsageError(
-            f"the class {cls.__qualname__} could not be found again by its name",
-            where=path or cls.__name__,
-            advice="Write the class at the outer level of a module, not inside a function.",
-        )
-    return name
-
-
-def _join(path: str, name: str) -> str:
-    return f"{path}.{name}" if path else name
-
-
 # -- reading -----------------------------------------------------------------------------------------------------
-
-
-def _find_class(name: Any, where: str) -> type[Component]:
-    module_name, _, qualified = name.partition(":") if isinstance(name, str) else ("", "", "")
-    if not module_name or not qualified:
-        raise UsageError(f"{name!r} does not name a class", where=where, advice="A class is named 'module:Class'.")
-    advice = (
-        f"The module must be one that Python can import: install it, start Python in its folder, or, for a scene "
-        f"in a file {module_name}.py, put the folder of that file on the path."
-    )
-    if module_name == "__main__":
-        advice = "It was declared in a script that was run; put the class into a module of its own and save it again."
-    try:
-        found: Any = sys.modules.get(module_name) or importlib.import_module(module_name)
-    except Exception as error:  # importing runs code of others
-        raise UsageError(
-            f"the module {module_name!r} cannot be imported ({type(error).__name__}: {error})",
-            where=where,
-            advice=advice,
-        ) from error
-    for step in qualified.split("."):
-        known = [key for key in vars(found) if not key.startswith("_")]
-        found = vars(found).get(step) if isinstance(found, type) else getattr(found, step, None)
-        if found is None:
-            raise UsageError(
-                f"there is no class {qualified!r} in the module {module_name!r}",
-                where=where,
-                advice=advice if module_name == "__main__" else suggestion(step, known) or advice,
-            )
-        if not isinstance(found, type):
-            break
-    if not isinstance(found, type) or not issubclass(found, Component):
-        raise UsageError(f"{name!r} is no component", where=where, advice="Name a class derived from Component.")
-    return found
 
 
 def _read(data: Any, where: str) -> Component:
     entries = _mapping(data, where, ("class", "values", "parts", "changes"))
-    cls = _find_class(entries.get("class"), where)
+    cls = find_class(entries.get("class"), where)
     given = {
-        name: _read_value(value, _join(where, name)) for name, value in _mapping(entries.get("values"), where).items()
+        name: _read_value(value, join_path(where, name))
+        for name, value in _mapping(entries.get("values"), where).items()
     }
     parts = {
-        name: _read_parts(part, _join(where, name)) for name, part in _mapping(entries.get("parts"), where).items()
+        name: _read_parts(part, join_path(where, name)) for name, part in _mapping(entries.get("parts"), where).items()
     }
     if not issubclass(cls, Model):
         if "parts" in entries or "changes" in entries:
@@ -329,9 +211,9 @@ def _read_parts(data: Any, where: str) -> Any:
 
 
 def _read_changes(model: Model, data: Any, where: str) -> None:
-    changes = _mapping(data, where, _CHANGES)
+    changes = _mapping(data, where, CHANGES)
     for path, values in _mapping(changes.get("settings"), where).items():
-        for name, value in _mapping(values, _join(where, path)).items():
+        for name, value in _mapping(values, join_path(where, path)).items():
             setattr(model[path], name, _read_value(value, f"{path}.{name}"))
     for path, part in _mapping(changes.get("replaced"), where).items():
         owner, name = _owner(model, path)
@@ -356,7 +238,7 @@ def _read_changes(model: Model, data: Any, where: str) -> None:
         owner = _model_at(model, path)
         for kind, values in _mapping(starts, where).items():
             if kind not in owner._start_values():
-                raise UsageError(f"it has no {kind!r}", where=_join(where, path))
+                raise UsageError(f"it has no {kind!r}", where=join_path(where, path))
             target = owner._start_values()[kind]
             for key, value in _mapping(values, where).items():
                 if value is REMOVED:

@@ -12,7 +12,7 @@ from atwood.model.declare.binding import Binding
 from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
 from atwood.model.declare.declaring import ComponentType, check_field_name, merge_inherited, with_checked_default
 from atwood.model.declare.fields import MISSING, Field, ParameterExpression, ParameterSpec, SignalSpec
-from atwood.model.declare.laws import Kind, Law, ObservableOptions
+from atwood.model.declare.law import Kind, Law, ObservableOptions
 from atwood.model.declare.quantities import Quantity
 from atwood.model.declare.states import StateSpec, discrete_state, state
 from atwood.model.values.outline import Outline

@@ -9,28 +9,15 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from atwood.arguments import (
-    ANYTHING,
-    BY_PATH,
-    CALLBACK,
-    DOC,
-    FLAG,
-    NAME,
-    TEXT,
-    each,
-    either,
-    number,
-    optional,
     real,
     show,
-    takes,
-    whole,
 )
-from atwood.errors import AtwoodError, DeclarationError, ParameterError, near_matches, suggestion
+from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion
 from atwood.model.declare.array_values import check_array
 from atwood.model.declare.function_values import make_function
 from atwood.model.declare.parameter_expressions import ParameterExpression
@@ -40,16 +27,7 @@ from atwood.model.values.units import Unit, parse_quantity, parse_si_unit
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
 
-__all__ = [
-    "MISSING",
-    "Field",
-    "FieldReference",
-    "ParameterExpression",
-    "ParameterSpec",
-    "SignalSpec",
-    "parameter",
-    "signal",
-]
+__all__ = ["MISSING", "Field", "FieldReference", "ParameterExpression", "ParameterSpec", "SignalSpec"]
 
 
 class _Missing:
@@ -309,130 +287,3 @@ def _plain_number(value: Any) -> float | None:
         return real(value)
     except Exception:  # a value of somebody else's class may raise anything
         return None
-
-
-_BOUND = optional(number())
-
-
-@takes(
-    DeclarationError,
-    default=ANYTHING,
-    unit=TEXT,
-    doc=DOC,
-    minimum=_BOUND,
-    above=_BOUND,
-    maximum=_BOUND,
-    size=optional(whole("a whole number of components, at least 1", 1, 1000)),
-    integer=FLAG,
-    choices=each(NAME, "a list of words", single=False),
-    structural=FLAG,
-    direction=FLAG,
-    turning=FLAG,
-    text=FLAG,
-    function_of=optional(BY_PATH),
-    array=either(FLAG, CALLBACK),
-)
-def parameter(
-    default: Any = MISSING,
-    *,
-    unit: str = "1",
-    doc: str,
-    minimum: float | None = None,
-    above: float | None = None,
-    maximum: float | None = None,
-    size: int | None = None,
-    integer: bool = False,
-    choices: Sequence[str] = (),
-    structural: bool = False,
-    direction: bool = False,
-    turning: bool = False,
-    text: bool = False,
-    function_of: Mapping[str, str] | None = None,
-    array: Callable[[Any, str], Any] | bool = False,
-) -> Any:
-    """Declare a parameter in the class body of a component.
-
-    Parameters
-    ----------
-    default
-        The value when none is given; without one, the parameter is required. None makes it optional. It can be
-        worked out from parameters declared before it.
-    unit
-        SI unit, checked against the unit of what is given (``Rod(length="30 cm")``).
-    doc
-        One line of meaning.
-    minimum, maximum
-        The smallest and the largest value allowed.
-    above
-        A bound that the value must exceed.
-    size
-        The number of components, for a parameter that is a vector.
-    integer
-        Whether it is a count.
-    choices
-        The words it can be, for a parameter that is a choice.
-    structural
-        Whether its value shapes the mechanism, as a direction does. Counts and choices always do; every other
-        parameter is a number that can change without anything being derived again.
-    direction
-        Whether it is a direction: three numbers, not all zero, of which a unit vector is made, or an axis such as
-        ``"z"`` or ``"-x"``. Components that are nothing but rounding, as of ``(cos(pi/2), 0, 1)``, are zero.
-    turning
-        Whether it is a direction about which something turns; in a plane it can only be the plane's normal.
-    text
-        Whether it is text, as the path of a file is.
-    function_of
-        For a parameter that is a function: the names of its arguments with their units, ``{"x": "m", "t": "s"}``. It is
-        given as a number, a formula (``"0.5*x**2"``), or a function in plain arithmetic of some of these arguments, and
-        a law calls it with all of them. With ``size=3`` its value is a vector. It shapes the mechanism.
-    array
-        Whether it is numbers in a row, or in rows and columns, as tuples; a NumPy array and a data frame will do. A
-        function of a value and the path of the parameter may turn anything else that is given into numbers.
-
-    Raises
-    ------
-    DeclarationError
-        If there is no line of meaning, or the unit is no SI unit.
-    """
-    return ParameterSpec(
-        default,
-        unit,
-        doc,
-        minimum=minimum,
-        above=above,
-        maximum=maximum,
-        size=3 if direction or turning else size,
-        integer=integer,
-        choices=tuple(choices),
-        structural=structural,
-        direction=direction or turning,
-        turning=turning,
-        text=text,
-        function_of=function_of,
-        array=array,
-    )
-
-
-@takes(DeclarationError, default=ANYTHING, unit=TEXT, doc=DOC, init=ANYTHING)
-def signal(default: Any = 0.0, *, unit: str = "1", doc: str, init: Literal[True] = True) -> Any:
-    """Declare an input in the class body of a component.
-
-    Its value is a number, a function of time written in plain arithmetic with Atwood's functions, or the output of
-    another component (``scene.connect(sensor.output("length"), force.input("value"))``). In the class body of a
-    model it can be passed on to the input of a part.
-
-    Parameters
-    ----------
-    default
-        The value when nothing is given or connected.
-    unit
-        SI unit.
-    doc
-        One line of meaning.
-
-    Raises
-    ------
-    DeclarationError
-        If there is no line of meaning, or the unit is no SI unit.
-    """
-    return SignalSpec(default, unit, doc)

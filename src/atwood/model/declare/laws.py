@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Literal, TypeVar, overload
+from typing import Any, TypeVar, overload
 
 from atwood.arguments import (
     CALLBACK,
@@ -28,10 +28,19 @@ from atwood.arguments import (
 )
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
-from atwood.late import dataclass
+from atwood.model.declare.law import (
+    ActingOptions,
+    ConstraintOptions,
+    DerivativeOptions,
+    EventOptions,
+    JointOptions,
+    Kind,
+    Law,
+    ObservableOptions,
+    UpdateOptions,
+)
 from atwood.model.declare.quantities import ObservableLaw
 from atwood.model.values.units import parse_si_unit
-from atwood.model.values.vector import Vector
 
 __all__ = [
     "constraint",
@@ -47,115 +56,7 @@ __all__ = [
     "update",
 ]
 
-Kind = Literal[
-    "potential",
-    "dissipation",
-    "force",
-    "inertia",
-    "lagrangian",
-    "constraint",
-    "joint",
-    "observable",
-    "event",
-    "derivative",
-    "update",
-]
 _F = TypeVar("_F", bound=Callable[..., Any])
-
-
-@dataclass(frozen=True)
-class Law:
-    """A marked method of a component; `options` is one of the `...Options` below, or None."""
-
-    kind: Kind
-    name: str
-    options: Any = None
-
-    def holds_in(self, space: str) -> bool:
-        """Return whether the law has a meaning in a space."""
-        return self.options is None or space in getattr(self.options, "spaces", (space,))
-
-    def acts_in(self, mode: str) -> bool:
-        """Return whether the law acts while its component is in a mode."""
-        modes = getattr(self.options, "modes", ())
-        return not modes or mode in modes
-
-
-@dataclass(frozen=True)
-class ActingOptions:
-    """In which modes a potential, a Rayleigh function or loads act; in all when empty."""
-
-    modes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class ConstraintOptions:
-    """See `constraint`."""
-
-    reactions: tuple[str, ...]
-    unit: str
-    sign: float
-    doc: str
-    modes: tuple[str, ...]
-    spaces: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class JointOptions:
-    """See `joint`."""
-
-    a: str
-    b: str
-    coordinates: tuple[str, ...]
-    solves: tuple[str, ...]
-    spaces: tuple[str, ...]
-    rigid: bool
-    reaction_doc: str
-    modes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class ObservableOptions:
-    """See `observable`."""
-
-    unit: str
-    doc: str
-    periodic: bool
-    rate: str
-    spaces: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class EventOptions:
-    """See `event`."""
-
-    modes: tuple[str, ...]
-    direction: int
-    target: str
-    message: str
-    unit: str
-    impact: bool
-    spaces: tuple[str, ...] = ("line", "plane", "space")
-
-
-@dataclass(frozen=True)
-class DerivativeOptions:
-    """See `derivative`."""
-
-    states: tuple[str, ...]
-    modes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class UpdateOptions:
-    """See `update`."""
-
-    sets: tuple[str, ...]
-    every: str | float | None
-    offset: str | float
-    at: str
-    when: str
-    reads: tuple[str, ...] | None
 
 
 def _mark(function: _F, law: Law) -> _F:
@@ -496,8 +397,4 @@ def update(
 
 def scalars(value: Any) -> list[Scalar]:
     """Return what a law gave as a list of scalars."""
-    if isinstance(value, Vector):
-        return list(value)
-    if isinstance(value, Iterable):
-        return list(value)
-    return [value]
+    return list(value) if isinstance(value, Iterable) else [value]

@@ -9,7 +9,7 @@ from atwood.errors import UsageError
 
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
-    from atwood.model.declare.laws import Law
+    from atwood.model.declare.law import Law
 
 __all__ = ["PATH", "PATHS", "ObservableLaw", "Quantity"]
 

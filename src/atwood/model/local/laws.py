@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import field, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from atwood.errors import AtwoodError, DeclarationError, ParameterError, UnsupportedError
+from atwood.errors import AtwoodError, DeclarationError, UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, depends_on, live
 from atwood.late import dataclass
 from atwood.model.declare.carried_inertia import Asked, Carried
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
-from atwood.model.declare.fields import ParameterSpec
-from atwood.model.declare.laws import Law, scalars
+from atwood.model.declare.law import Law
+from atwood.model.declare.laws import scalars
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.gravity_field import energies_in
 from atwood.model.local.joint_coordinates import (
@@ -32,38 +32,14 @@ from atwood.model.local.joint_coordinates import (
 )
 from atwood.model.local.joint_references import JointCoordinateUse, find_joint_coordinate_uses
 from atwood.model.local.moving_mass import check_lagrangians, find_varying
+from atwood.model.local.parameters import ParameterTable, read_parameter, read_signal, read_variation
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart, multiplier_symbol
 from atwood.model.local.states import discrete_states, local_states, state_values
 from atwood.model.returned import call_law, law_value, listed, one_scalar
 from atwood.model.values.space import FIXED_AXES, Space, planar_axes
 from atwood.model.values.vector import Vector
 
-__all__ = [
-    "LocalConnector",
-    "LocalConstraint",
-    "LocalJoint",
-    "LocalPart",
-    "ParameterTable",
-    "localize",
-    "variation_names",
-]
-
-
-@dataclass
-class ParameterTable:
-    """The parameters of a scene as symbols, with their values; filled while the laws are read."""
-
-    graph: Graph
-    values: dict[Expression, float] = field(default_factory=dict)
-    space: str = "plane"
-
-    def scalar(self, name: str, value: float, structural: bool = False) -> Scalar:
-        """Return the symbol of a parameter, or the plain number if it shapes the program (exact zero, structural)."""
-        if structural or value == 0.0:
-            return self.graph.constant(float(value))
-        symbol = self.graph.parameter(name)
-        self.values[symbol] = float(value)
-        return symbol
+__all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "localize"]
 
 
 def localize(
@@ -175,12 +151,12 @@ def _bind_part(
 ) -> _Bound:
     """Return the symbols of a part, and the numbers of its parameters."""
     graph, component = table.graph, part.component
-    values = {name: _parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
+    values = {name: read_parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
     signal_symbols: dict[str, Expression] = {}
     for name, given in part.signals.items():
-        value = _signal(part, name, given, flat, time, table, signal_symbols)
+        value = read_signal(part, name, given, flat, time, table, signal_symbols)
         is_varied = (part.path, name) in flat.varied
-        values[name] = value + _variation(f"{part.path}.{name}", flat, time, table) if is_varied else value
+        values[name] = value + read_variation(f"{part.path}.{name}", flat, time, table) if is_varied else value
     values |= state_values(part, graph)
     connectors = {
         name: _local_connector(f"{part.path}.{name}", isinstance(one, Frame), space, graph)
@@ -355,81 +331,6 @@ def _listed(bound: Any, law: Law) -> list[Any]:
     return listed(
         getattr(bound, law.name)(), (Load, CoordinateLoad) if law.kind == "force" else (PointInertia, BodyInertia)
     )
-
-
-def _parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
-    value, name = part.values[spec.name], f"{part.path}.{spec.name}"
-    if value is None or spec.integer or spec.choices or spec.text or spec.function_of or spec.array:
-        return value
-    if spec.turning and table.space == "plane" and (value[0] != 0.0 or value[2] != 0.0):
-        advice = "Leave its x and z components zero: (0, -1, 0) turns counter-clockwise."
-        raise ParameterError("in a plane things turn about its normal only", where=name, advice=advice)
-    if spec.direction and not spec.turning and table.space == "plane" and value[1] != 0.0:
-        raise ParameterError("it points out of the plane", where=name, advice="Leave its y component zero.")
-    if spec.size is None:
-        return table.scalar(name, value, spec.structural)
-    axes = "xyz" if spec.size == 3 else [str(i) for i in range(spec.size)]
-    made = [table.scalar(f"{name}.{axis}", one, spec.structural) for axis, one in zip(axes, value, strict=True)]
-    return Vector(*made) if spec.size == 3 else tuple(made)
-
-
-def _signal(
-    part: Part,
-    name: str,
-    given: Any,
-    flat: FlatScene,
-    time: Expression,
-    table: ParameterTable,
-    signal_symbols: dict[str, Expression],
-) -> Scalar:
-    path = f"{part.path}.{name}"
-    if (part.path, name) in flat.links:
-        source, observable = flat.links[part.path, name]
-        if _is_source(flat.parts[source], flat):
-            return _source_value(flat.parts[source], observable, flat, time, table)
-        signal_symbols[name] = table.graph.symbol(f"{path}()")
-        return signal_symbols[name]
-    if not callable(given):
-        return table.scalar(path, given)
-    try:
-        return table.graph.convert(given(time))
-    except (TypeError, AtwoodError) as error:
-        raise DeclarationError(
-            f"this function of time cannot be evaluated on an expression ({error})",
-            where=path,
-            advice="Write it in plain arithmetic with Atwood's own functions (atwood.sin, atwood.select, ...).",
-        ) from error
-
-
-def _variation(path: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
-    """Return the variation of an input; see `FlatScene.varied`."""
-    value, rate, second = (table.graph.parameter(name) for name in variation_names(path))
-    table.values.update(dict.fromkeys((value, rate, second), 0.0))
-    passed = time - flat.t_start
-    return value + passed * (rate + 0.5 * (passed * second))
-
-
-def variation_names(path: str) -> tuple[str, str, str]:
-    """Return the names of the parameters of an input's variation: its value, its rate and its second derivative."""
-    return f"{path} varied", f"{path} varied'", f"{path} varied''"
-
-
-def _is_source(part: Part, flat: FlatScene) -> bool:
-    """Return whether a part's outputs are functions of time, parameters and what is held alone."""
-    own = part.component
-    is_linked = any((part.path, name) in flat.links for name in part.signals)
-    moves = any(not spec.is_discrete for spec in own.state_specs().values())
-    return not own.connectors() and not moves and not is_linked
-
-
-def _source_value(source: Part, observable: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
-    """Return the output of a part that depends on time and parameters alone."""
-    values = {name: _parameter(source, spec, table) for name, spec in source.component.parameter_specs().items()}
-    values |= {name: _signal(source, name, given, flat, time, table, {}) for name, given in source.signals.items()}
-    values |= state_values(source, table.graph)
-    bound = bind(source.component, Binding(values=values, time=time))
-    law = next(law for law in source.component.laws("observable") if law.name == observable)
-    return table.graph.convert(call_law(source.path, law, partial(law_value, bound, law.name)))
 
 
 def _local_connector(path: str, is_frame: bool, space: Space, graph: Graph) -> LocalConnector:

@@ -10,7 +10,7 @@ from atwood.late import dataclass
 from atwood.model.declare.binding import Binding
 from atwood.model.declare.carried_inertia import Asked
 from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
-from atwood.model.declare.laws import Law
+from atwood.model.declare.law import Law
 from atwood.model.local.flatten import Part
 from atwood.model.values.rotation import Axes
 from atwood.model.values.vector import Vector

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,9 @@ from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rank import least_size
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank, kept_along
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, multiplier_sizes, scene_length
-from atwood.simulation.dynamics.sparse_states import States
+
+if TYPE_CHECKING:
+    from atwood.simulation.dynamics.sparse_states import States
 
 __all__ = ["ReactionSolver", "accelerations_and_multipliers", "accelerations_at", "maximal_state"]
 
@@ -91,6 +94,8 @@ _STATES: Key[States] = Key("balance of forces at many states")
 
 def _states(assembly: Assembly, form: FormName, kept: NDArray[np.intp]) -> States:
     chosen = tuple(kept.tolist())
+    from atwood.simulation.dynamics.sparse_states import States
+
     return assembly.shared.get(_STATES, lambda: States(assembly.balance(form), chosen), form, chosen)
 
 

@@ -19,7 +19,8 @@ from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
-from atwood.simulation.events.modes import EventRecord, generalized_speeds, plastic_impact
+from atwood.simulation.events.mode_change import generalized_speeds, plastic_impact
+from atwood.simulation.events.modes import EventRecord
 from atwood.tolerances import tolerances
 
 __all__ = ["pass_time_event"]

@@ -8,32 +8,27 @@ any Python.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen import BoundKernel
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, SolveError
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
-from atwood.forms.program import state_groups
 from atwood.late import dataclass
-from atwood.mechanics.build import resolve_signals
 from atwood.model.declare.binding import Binding
 from atwood.model.declare.component import Component, bind
-from atwood.model.declare.laws import Law
+from atwood.model.declare.law import Law
+
+if TYPE_CHECKING:
+    from atwood.simulation.events.update_inputs import UpdateInputs
 
 __all__ = ["Sampler", "Updated", "find_sampler"]
 
-_BOUND_KERNELS: Key[dict[bytes, BoundKernel]] = Key("what updates read, with parameters")
 
 _ROUNDING = 16.0
 """Times that are so many units of rounding apart are one moment."""
 
-_MOST_KERNELS = 64
-"""So many programs with other parameters are kept ready."""
 
 _MOST = 10_000_000
 """More sample times than these are no run."""
@@ -133,7 +128,11 @@ class Sampler:
         SolveError
             If one of them raises something, or returns what is no number for each state that it sets.
         """
-        reading = _reading_of(assembly)
+        from atwood.simulation.events.update_inputs import (
+            update_inputs_of,  # not with this module: few scenes have updates
+        )
+
+        reading = update_inputs_of(assembly)
         held = list(assembly.held_at_start if assembly.held is None else assembly.held)
         q, values = q.copy(), None
         order = _ordered([self.updates[i] for i in chosen], reading)
@@ -150,98 +149,7 @@ class Sampler:
         return Updated(tuple(held), q)
 
 
-@dataclass(frozen=True, eq=False)
-class _Reading:
-    """What updates read, as one program.
-
-    Attributes
-    ----------
-    program
-        Of (t, q, u, held), with the inputs of all parts that have updates.
-    inputs
-        Part and name of each of its results.
-    feeds
-        For each of these, the paths of the states that it depends on.
-    held, states
-        Numbers of discrete states among the assembly's, and of continuous ones among the coordinates, by path.
-    """
-
-    program: Program
-    inputs: tuple[tuple[str, str], ...]
-    feeds: Mapping[tuple[str, str], frozenset[str]]
-    held: Mapping[str, int]
-    states: Mapping[str, int]
-
-    def values(
-        self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray, held: Sequence[float]
-    ) -> dict[str, dict[str, Any]]:
-        """Return what the laws of parts read: inputs by part and name, and states by path under an empty name."""
-        (results,) = self._kernel(assembly)([t], q, u, held)
-        found: dict[str, dict[str, Any]] = {"": {path: float(q[i]) for path, i in self.states.items()}}
-        found[""] |= {path: held[i] for path, i in self.held.items()}
-        for (part, name), value in zip(self.inputs, results, strict=True):
-            found.setdefault(part, {})[name] = float(value)
-        return found
-
-    def _kernel(self, assembly: Assembly) -> BoundKernel:
-        """Return the program with the values of all parameters but the discrete states, which are arguments here."""
-        first = len(assembly.mechanism.table.values)
-        values = assembly.parameter_values
-        others = np.concatenate([values[:first], values[first + len(assembly.discrete_states) :]])
-        known, about = assembly.shared.get(_BOUND_KERNELS, dict), others.tobytes()
-        if about not in known:
-            if len(known) >= _MOST_KERNELS:
-                known.clear()
-            known[about] = assembly.compiled(self.program).bind(others)
-        return known[about]
-
-
-_READING: Key[_Reading] = Key("what updates read")
-
-
-def _reading_of(assembly: Assembly) -> _Reading:
-    return assembly.shared.get(_READING, lambda: _make_reading(assembly))
-
-
-def _make_reading(assembly: Assembly) -> _Reading:
-    mechanism, equations, graph = assembly.mechanism, assembly.own_equations, assembly.own_equations.graph
-    signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
-    places, expressions = [], []
-    for path, local in mechanism.locals_.items():
-        for name in local.part.signals if local.part.component.laws("update") else ():
-            symbol = local.signal_symbols.get(name)
-            places.append((path, name))
-            expressions.append(graph.convert(local.binding.values[name] if symbol is None else signals[symbol]))
-    late = [*equations.accelerations, *equations.multipliers, *(one.symbol for one in assembly.reactions)]
-    for (path, name), value in zip(places, expressions, strict=True):
-        if depends_on(value, late):
-            raise DeclarationError(
-                "it is sampled, and reads accelerations or reactions that no force reads",
-                where=f"{path}.{name}",
-                advice="Sample positions, velocities and states.",
-            )
-    symbols: dict[Expression, str] = {one.symbol: one.path for one in assembly.discrete_states}
-    symbols |= {one.symbol: one.path for one in equations.states}
-    feeds = {
-        place: frozenset(path for symbol, path in symbols.items() if depends_on(value, [symbol]))
-        for place, value in zip(places, expressions, strict=True)
-    }
-    held = tuple(one.symbol for one in assembly.discrete_states)
-    rest = tuple(one for one in assembly.parameters if one not in set(held))
-    groups = (*state_groups(equations), InputGroup("held", held))
-    program = Program(
-        f"{assembly.flat.name} sampled inputs", groups, rest, (OutputGroup("inputs", tuple(expressions)),)
-    )
-    return _Reading(
-        program,
-        tuple(places),
-        feeds,
-        {one.path: i for i, one in enumerate(assembly.discrete_states)},
-        {one.path: i for i, one in enumerate(equations.states, start=equations.placing)},
-    )
-
-
-def _ordered(updates: Sequence[_Update], reading: _Reading) -> list[_Update]:
+def _ordered(updates: Sequence[_Update], reading: UpdateInputs) -> list[_Update]:
     """Return updates of one moment, each after those that set what its inputs are made of.
 
     Raises
@@ -283,7 +191,7 @@ def _circle(waiting: Mapping[str, _Update], before: Mapping[str, set[str]]) -> l
 
 
 def _evaluated(
-    one: _Update, assembly: Assembly, t: float, values: Mapping[str, Mapping[str, Any]], reading: _Reading
+    one: _Update, assembly: Assembly, t: float, values: Mapping[str, Mapping[str, Any]], reading: UpdateInputs
 ) -> list[float]:
     """Return the numbers that one update returns."""
     part, space = assembly.flat.parts[one.path], assembly.mechanism.space
@@ -356,7 +264,9 @@ def find_sampler(assembly: Assembly, start: float, end: float, moments: FloatArr
             merged.append(t)
             due.append(tuple(times[t]))
     if updates:
-        reading = _reading_of(assembly)
+        from atwood.simulation.events.update_inputs import update_inputs_of
+
+        reading = update_inputs_of(assembly)
         for chosen in set(due):
             _ordered([updates[i] for i in chosen], reading)
     return Sampler(updates, _snapped(np.array(merged), moments), due)

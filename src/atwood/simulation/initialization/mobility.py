@@ -6,23 +6,29 @@ from typing import Any, get_args
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import TopologyError
-from atwood.expr import depends_on
+from atwood.expr import Program, depends_on
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
+from atwood.forms.quantities import known_program
 from atwood.late import dataclass
 from atwood.linalg.matrices import LARGEST_FULL, scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.model.declare.component import Component
-from atwood.model.declare.laws import Kind
+from atwood.model.declare.law import Kind
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.rank import independent_rows
-from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.dynamics.scales import motion_scales, scene_length
 from atwood.simulation.initialization.start import Start, maximal_state
+from atwood.tolerances import tolerances
 
-__all__ = ["Immobile", "find_immobile", "refuse_immobile"]
+__all__ = ["Immobile", "check_prescribed", "find_immobile", "refuse_immobile"]
 
 
 _SHOWN = 4
+
+_PRESCRIBED: Key[Program] = Key("prescribed")
 
 
 @dataclass(frozen=True)
@@ -144,3 +150,24 @@ def _name(assembly: Assembly, one: Constraint) -> str:
     part, law, _ = one.key
     laws = {other.key[1] for other in assembly.maximal.constraints if other.key[0] == part}
     return part if len(laws) == 1 else f"{part}.{law}"
+
+
+def check_prescribed(assembly: Assembly, times: FloatArray) -> None:
+    """Refuse motions that are prescribed for what is held, or twice over, where they contradict each other."""
+    prescribed = assembly.own_equations.prescribed
+    if not prescribed:
+        return
+    program = known_program(assembly, _PRESCRIBED, lambda: [value for _, value in prescribed])
+    n, m = len(assembly.own_equations.coordinates), len(assembly.own_equations.speeds)
+    idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
+    misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])
+    if float(np.max(misses)) > tolerances.CLOSED * scene_length(assembly):
+        worst, moment = np.unravel_index(int(np.argmax(misses)), misses.shape)
+        part, law, _ = prescribed[int(worst)][0]
+        raise TopologyError(
+            f"the constraint cannot be satisfied: at t = {times[moment]:.6g} a prescribed motion contradicts a "
+            "fixed part, by "
+            f"{misses[worst, moment]:.3g}",
+            where=f"{part}.{law}",
+            advice="Two drives, or a drive and a fixed part, prescribe the same motion differently.",
+        )

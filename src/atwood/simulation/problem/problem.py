@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
-from atwood.errors import KernelEvaluationError, SolveError, StartError
+from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import keep_constraints
 from atwood.forms.kept import Key
@@ -20,15 +20,11 @@ from atwood.forms.program import FormProgram
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.late import dataclass
 from atwood.linalg.matrices import to_array
-from atwood.simulation.dynamics.balance import Balance, balance_of, solve_balance
+from atwood.simulation.dynamics.balance import Balance, balance_of
 from atwood.simulation.dynamics.columns import columns_of
-from atwood.simulation.dynamics.determined_reactions import check_read_reactions
 from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates, review_partitioning
-from atwood.simulation.dynamics.redundancy import RankFinding, find_rank, review_kept
-from atwood.simulation.dynamics.scales import Scales, coordinate_scales, find_scales, motion_scales
-from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START
-from atwood.simulation.initialization.massless import check_massless_directions
-from atwood.simulation.problem.not_compilable import announce, find_not_compilable
+from atwood.simulation.dynamics.redundancy import RankFinding, review_kept
+from atwood.simulation.dynamics.scales import Scales
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
@@ -38,7 +34,7 @@ if TYPE_CHECKING:
     from atwood.forms.null_space import NullSpaceProgram
     from atwood.simulation.problem.native_null_space import CompiledNullSpace
 
-__all__ = ["Plan", "make_plan", "pack_state"]
+__all__ = ["Plan", "dependent_speeds_of", "kept_rows"]
 
 _IDA: Key[IdaCallbacks] = Key("machine code for IDA")
 _NULL_SPACE: Key[NullSpaceProgram] = Key("program of the null space")
@@ -134,7 +130,7 @@ class Plan:
         """The form's programs for the present dependent coordinates."""
         if not self.dependent_speeds:
             return self.program
-        return self.assembly.form_program(_kept_or_none(self.finding), self.dependent, self.dependent_speeds)
+        return self.assembly.form_program(kept_rows(self.finding), self.dependent, self.dependent_speeds)
 
     def review_partitioning(self, t: float, q: FloatArray) -> bool:
         """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
@@ -163,8 +159,8 @@ class Plan:
         """Keep other constraints from a place on; programs and sessions for those before have had their day."""
         self.finding, self._kernels, self._null_space = finding, None, None
         if self.dependent_speeds:
-            constraint_jacobian = to_array(self.balance.constraints_at(t, q, np.zeros_like(self.sizes)).jacobian)
-            self.dependent, self.dependent_speeds = _dependent(self.balance, finding, constraint_jacobian, self.sizes)
+            now = to_array(self.balance.constraints_at(t, q, np.zeros_like(self.sizes)).jacobian)
+            self.dependent, self.dependent_speeds = dependent_speeds_of(self.balance, finding, now, self.sizes)
         self.program = self.assembly.form_program(finding.kept, self.dependent, self.dependent_speeds)
 
     @property
@@ -325,7 +321,7 @@ def _restored(
     not_compilable: str,
 ) -> Plan:
     """Return a plan from what a pickle has of it."""
-    program = assembly.form_program(_kept_or_none(finding), dependent, dependent_speeds)
+    program = assembly.form_program(kept_rows(finding), dependent, dependent_speeds)
     parts = assembly, balance_of(assembly, assembly.form), finding, scales, sizes, coordinate_sizes, program
     return Plan(*parts, dependent, dependent_speeds, switches, not_compilable)
 
@@ -337,71 +333,12 @@ def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceP
     return null_space_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)
 
 
-def _kept_or_none(finding: RankFinding) -> tuple[int, ...] | None:
+def kept_rows(finding: RankFinding) -> tuple[int, ...] | None:
+    """Return the numbers of the independent constraints; None if all are."""
     return finding.kept if finding.redundant else None
 
 
-_PLAN: Key[Plan] = Key("plan")
-
-
-def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
-    """Prepare a run from a consistent state in the coordinates of the form.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    t, q, u
-        The state.
-    length
-        Extent of the scene, m.
-    span
-        Length of the run, s.
-
-    Raises
-    ------
-    StartError
-        If the forces do not determine the accelerations.
-    """
-    about = t, q.tobytes(), u.tobytes(), length, span
-    made = assembly.kept.get(_PLAN, lambda: _make_plan(assembly, t, q, u, length, span), *about)
-    if made.not_compilable:
-        announce(assembly, made.not_compilable)
-    return replace(made)  # its dependent coordinates change on the way
-
-
-def _make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
-    equations = assembly.own_equations
-    balance = balance_of(assembly, assembly.form)
-    sizes, coordinate_sizes = motion_scales(equations, length), coordinate_scales(equations, length)
-    finding = find_rank(balance, t, q, sizes)
-    check_read_reactions(assembly, t, q, u, length)
-    try:
-        now = balance.at(t, q, u)
-    except KernelEvaluationError as error:
-        raise StartError(
-            f"at the start a law has no value: {error.message}",
-            where=assembly.flat.name,
-            advice=ADVICE_AT_START,
-        ) from error
-    constraint_jacobian = now.jacobian[list(finding.kept)] if finding.kept else now.jacobian[:0]
-    check_massless_directions(assembly, now.mass, constraint_jacobian, sizes)
-    if finding.starts_singular:
-        raise _singular_start(assembly, finding)
-    dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
-    if assembly.form == "reduced" and finding.kept:
-        dependent = _dependent(balance, finding, to_array(now.jacobian), sizes)
-    program = assembly.form_program(_kept_or_none(finding), *dependent)
-    kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
-    accelerations, _ = solve_balance(now, kept, t)
-    scales = find_scales(assembly, length, u, accelerations, sizes, span)
-    not_compilable = find_not_compilable(assembly, program.residual)
-    return Plan(
-        assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent, not_compilable=not_compilable
-    )
-
-
-def _dependent(
+def dependent_speeds_of(
     balance: Balance, finding: RankFinding, constraint_jacobian: FloatArray, sizes: FloatArray
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the speeds whose displacements follow from constraints on positions, and those that follow from all."""
@@ -410,28 +347,3 @@ def _dependent(
         for one in (balance.holding(finding.kept), finding.kept)
     )
     return places, speeds
-
-
-def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
-    constraints = assembly.own_equations.constraints
-    lost = [constraints[i].label for i in finding.lost_at_start]
-    return StartError(
-        "the start is a singular position, from which the mechanism has more than one possible motion: "
-        f"{', '.join(lost)} {'follows' if len(lost) == 1 else 'follow'} from the other constraints here "
-        "and nowhere near",
-        where=constraints[finding.lost_at_start[0]].key[0],
-        advice="Start at a small distance from it, on the branch that you want.",
-    )
-
-
-def pack_state(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return consistent y and y' from a state that fulfils the constraints."""
-    now = plan.balance.at(t, q, u)
-    accelerations, multipliers = solve_balance(now, plan.kept, t)
-    if plan.assembly.form == "dae":
-        tail = [multipliers, np.zeros(plan.program.extra)]
-    else:
-        tail = []
-    y = np.concatenate([q, u, *tail])
-    yp = np.concatenate([plan.balance.kinematic_map.rates(t, q, u), accelerations, *(np.zeros_like(x) for x in tail)])
-    return y, yp

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,9 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of, project_safely, project_states
-from atwood.simulation.singular.crossing import SingularCrossing
+
+if TYPE_CHECKING:
+    from atwood.simulation.singular.crossing import SingularCrossing
 
 __all__ = ["Recorder", "SegmentRecord"]
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from atwood.errors import AtwoodError
 from atwood.integrators.protocol import FloatArray
-from atwood.simulation.run.run import Run
+from atwood.simulation.run.made import Run
 
 __all__ = ["run_again", "times_of_steps"]
 

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.clock import GRACE, Clock, TimeIsUp
-from atwood.errors import AtwoodError, SolveError, StartError, TopologyError, UnsupportedError
-from atwood.expr import Program
+from atwood.errors import AtwoodError, SolveError, StartError, UnsupportedError
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
-from atwood.forms.quantities import known_program
 from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
-from atwood.late import dataclass
 from atwood.mechanics.outputs.event_functions import UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
@@ -28,103 +22,30 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     switch_coordinates,
     to_regular,
 )
-from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START, undefined_value_at
-from atwood.simulation.events.impacts_in_time import pass_time_event
-from atwood.simulation.events.modes import EventProbe, EventRecord, enter_mode
+from atwood.simulation.events.modes import EventProbe, EventRecord
 from atwood.simulation.events.sampling import Updated, find_sampler
 from atwood.simulation.events.time_events import Schedule, find_schedule
-from atwood.simulation.initialization.mobility import refuse_immobile
+from atwood.simulation.initialization.mobility import check_prescribed, refuse_immobile
 from atwood.simulation.initialization.start import Start, settle
 from atwood.simulation.problem.arguments import check_span
 from atwood.simulation.problem.options import RunOptions, Samples, sample_times
-from atwood.simulation.problem.problem import Plan, make_plan
-from atwood.simulation.run.choice import Choice, check_solver, choose, describe_choices
+from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.problem import Plan
+from atwood.simulation.run.choice import Choice, check_solver, choose
+from atwood.simulation.run.made import Run, as_asked
 from atwood.simulation.run.record import Recorder, SegmentRecord
 from atwood.simulation.run.segment import Outcome, Segment, run_segment
 from atwood.simulation.run.session import KeptSession
 from atwood.simulation.run.tolerances import allowed
-from atwood.simulation.singular.crossing import SingularCrossing
 from atwood.stages import stage
-from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import Orientation
 
-__all__ = ["Run", "run", "run_out_of_time"]
-
-_PRESCRIBED: Key[Program] = Key("prescribed")
+__all__ = ["run", "run_out_of_time"]
 
 
 _CHATTER = 50
 """So many changes of mode without time passing end a run."""
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """What a run produced.
-
-    Attributes
-    ----------
-    assembly
-        The scene as it was assembled at the start.
-    segments
-        The stretches between changes of mode; none where time was used up before the start was recorded.
-    events
-        Events, in order.
-    statistics
-        What the solver did.
-    status
-        ``"finished"``, ``"stopped"`` by an event, or ``"step_limit"``, ``"time_limit"``, ``"interrupted"``,
-        ``"failed"``.
-    message
-        Why it ended, in words.
-    start
-        The start; None where time was used up before it was found.
-    options
-        What was asked for.
-    choices
-        What solved it and why, one after the other.
-    coordinate_switches
-        When which orientation went on in other coordinates, since these came near to where they are singular.
-    again
-        Makes the same run with other options, and with samples in between that change nothing.
-    timings
-        What each stage took, s; see `atwood.stages`.
-    """
-
-    assembly: Assembly
-    segments: tuple[SegmentRecord, ...]
-    events: tuple[EventRecord, ...]
-    statistics: Statistics
-    status: str
-    message: str
-    start: Start | None
-    options: RunOptions
-    choices: tuple[Choice, ...]
-    coordinate_switches: tuple[CoordinateSwitch, ...] = ()
-    again: Callable[[RunOptions, FloatArray], Run] | None = None
-    timings: Mapping[str, float] = field(default_factory=dict)
-
-    def __getstate__(self) -> dict[str, Any]:
-        # Whoever watched the run is not there where it is read, nor are functions that it was watched for.
-        texts = tuple(one for one in self.options.conditions if isinstance(one.given, str))
-        options = replace(self.options, progress=None, on_step=None, conditions=texts)
-        again = self.again if len(texts) == len(self.options.conditions) else None
-        return {**vars(self), "options": options, "again": again}
-
-    @property
-    def singular_crossings(self) -> tuple[SingularCrossing, ...]:
-        """Singular positions that it passed through, or came too close to, in order."""
-        return tuple(one for segment in self.segments for one in segment.singular_crossings if one.is_told)
-
-    @property
-    def solver(self) -> str:
-        """What solved it, at last: a key of `SOLVERS`."""
-        return self.choices[-1].solver
-
-    @property
-    def why(self) -> str:
-        """What solved it and why, as a sentence."""
-        return describe_choices(self.choices)
 
 
 def run(
@@ -180,7 +101,7 @@ def _prepared(
     """
     samples = sample_times(start.time, options)
     schedule = find_schedule(assembly, start.time, options.t_end).at_samples(samples.times)
-    _check_prescribed(schedule.rows(assembly, samples.times), samples.times)
+    check_prescribed(schedule.rows(assembly, samples.times), samples.times)
     log: list[Updated] = []
     again = partial(_again, assembly, start, reassemble, log)
     walk = _Walk(assembly, start, options, reassemble, samples.with_more(between), again, log, known)
@@ -394,6 +315,8 @@ class _Walk:
 
     def _pass_time_event(self) -> None:
         """Go on with the relations of functions of time that hold after a time event."""
+        from atwood.simulation.events.impacts_in_time import pass_time_event
+
         self._piece_start, before = self.t, self.assembly
         self.assembly = self._in_piece(before)
         length = self.start.length
@@ -412,6 +335,8 @@ class _Walk:
 
     def _update(self, due: Sequence[int]) -> None:
         """Go on with what updates make of the state."""
+        from atwood.simulation.events.impacts_in_time import pass_time_event
+
         before = self.assembly
         if self._known is not None and len(self.log) < len(self._known):
             made = self._known[len(self.log)]
@@ -444,6 +369,8 @@ class _Walk:
         if event.target == UPDATE:
             self.q, self.u = q, u
         else:
+            from atwood.simulation.events.mode_change import enter_mode
+
             self.assembly, self.q, self.u = enter_mode(
                 (self.t, q, u), self.assembly, event, self._reassemble, self.start.length
             )
@@ -466,46 +393,6 @@ class _Walk:
         return made
 
     def _run_so_far(self, status: str, message: str) -> Run:
-        segments = _as_asked(self.segments, self.options.outputs)
+        segments = as_asked(self.segments, self.options.outputs)
         parts = (self.first, segments, tuple(self.events), self.statistics, status, message)
         return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.coordinate_switches), self.again)
-
-
-def _as_asked(segments: Sequence[SegmentRecord], outputs: int | FloatArray) -> tuple[SegmentRecord, ...]:
-    """Return segments that show just the times that were asked for, if these were given.
-
-    At an event the state after it is shown. Where no time that was asked for is reached, the last state is.
-    """
-    if isinstance(outputs, (int, np.integer)):
-        return tuple(segments)
-    made: list[SegmentRecord] = []
-    later = np.inf
-    for one in reversed(segments):
-        place = np.minimum(np.searchsorted(outputs, one.time), len(outputs) - 1)
-        shown = (outputs[place] == one.time) & (one.time < later)
-        later = min(later, float(one.time[0])) if len(one.time) else later
-        made.append(replace(one, shown=shown))
-    if made and not any(one.shown.any() for one in made):
-        made[0].shown[-1] = True
-    return tuple(reversed(made))
-
-
-def _check_prescribed(assembly: Assembly, times: FloatArray) -> None:
-    """Refuse motions that are prescribed for what is held, or twice over, where they contradict each other."""
-    prescribed = assembly.own_equations.prescribed
-    if not prescribed:
-        return
-    program = known_program(assembly, _PRESCRIBED, lambda: [value for _, value in prescribed])
-    n, m = len(assembly.own_equations.coordinates), len(assembly.own_equations.speeds)
-    idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
-    misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])
-    if float(np.max(misses)) > tolerances.CLOSED * scene_length(assembly):
-        worst, moment = np.unravel_index(int(np.argmax(misses)), misses.shape)
-        part, law, _ = prescribed[int(worst)][0]
-        raise TopologyError(
-            f"the constraint cannot be satisfied: at t = {times[moment]:.6g} a prescribed motion contradicts a "
-            "fixed part, by "
-            f"{misses[worst, moment]:.3g}",
-            where=f"{part}.{law}",
-            advice="Two drives, or a drive and a fixed part, prescribe the same motion differently.",
-        )

@@ -23,16 +23,16 @@ from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.dynamics.undefined_values import find_undefined_value, states_ahead
 from atwood.simulation.events.modes import EventProbe, EventRecord
 from atwood.simulation.problem.options import RunOptions, Samples
-from atwood.simulation.problem.problem import Plan, pack_state
+from atwood.simulation.problem.preparation import pack_state
+from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import Choice, stiffness_of, turned_stiff
 from atwood.simulation.run.record import Recorder
 from atwood.simulation.run.session import KeptSession, SolverRequest, open_explicit_session, open_implicit_session
-from atwood.simulation.run.stuck import explain_stuck
 from atwood.simulation.run.tolerances import too_tight
-from atwood.simulation.singular.crossing import SingularCrossing, events_on
 
 if TYPE_CHECKING:
+    from atwood.simulation.singular.crossing import SingularCrossing
     from atwood.simulation.singular.monitor import SingularityMonitor
 
 __all__ = ["Outcome", "Segment", "run_segment"]
@@ -296,6 +296,8 @@ class _Runner:
             tight = (
                 None if stuck or self.request is None else too_tight(self.request, self.choices[-1].solver, step_result)
             )
+            from atwood.simulation.run.stuck import explain_stuck
+
             return stuck or tight or explain_stuck(self.segment.plan, step_result)
         return SolveError(
             f"{found.describe()}, so that the run cannot go on: {step_result.message}",
@@ -443,6 +445,8 @@ class _Runner:
         segment, plan, path = self.segment, self.segment.plan, crossing.path
         assert path is not None
         times = segment.samples.times
+        from atwood.simulation.singular.crossing import events_on
+
         root = events_on(path, plan, segment.probe)
         end = path.end if root is None else min(path.end, root.state[0])
         first, done = (int(np.searchsorted(times, one, side="right")) for one in (path.start, end))

@@ -30,7 +30,7 @@ from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.initialization.many import size_rows
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.explicit_scene import compiled_rates, explicit_problem
-from atwood.simulation.problem.problem import make_plan
+from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.run.choice import choose
 from atwood.simulation.run.stiffness import can_be_stiff
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows

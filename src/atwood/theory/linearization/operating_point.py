@@ -18,7 +18,7 @@ from atwood.late import dataclass
 from atwood.linalg.matrices import to_array
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene
-from atwood.model.local.laws import variation_names
+from atwood.model.local.parameters import variation_names
 from atwood.pipeline import assemble, assemble_flat
 from atwood.result.result import Result
 from atwood.simulation.dynamics.balance import balance_of

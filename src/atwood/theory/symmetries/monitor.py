@@ -15,7 +15,7 @@ from atwood.forms.program import state_groups
 from atwood.result.result import Result
 from atwood.simulation.dynamics.orientation_coordinates import from_regular, to_regular
 from atwood.simulation.dynamics.reactions import maximal_state
-from atwood.simulation.events.modes import generalized_state
+from atwood.simulation.events.mode_change import generalized_state
 from atwood.simulation.run.record import SegmentRecord
 from atwood.tolerances import tolerances
 

@@ -1,0 +1,129 @@
+"""What a law of a component is: its kind, and what was said of it."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from atwood.late import dataclass
+
+__all__ = [
+    "ActingOptions",
+    "ConstraintOptions",
+    "DerivativeOptions",
+    "EventOptions",
+    "JointOptions",
+    "Kind",
+    "Law",
+    "ObservableOptions",
+    "UpdateOptions",
+]
+
+
+Kind = Literal[
+    "potential",
+    "dissipation",
+    "force",
+    "inertia",
+    "lagrangian",
+    "constraint",
+    "joint",
+    "observable",
+    "event",
+    "derivative",
+    "update",
+]
+
+
+@dataclass(frozen=True)
+class Law:
+    """A marked method of a component; `options` is one of the `...Options` below, or None."""
+
+    kind: Kind
+    name: str
+    options: Any = None
+
+    def holds_in(self, space: str) -> bool:
+        """Return whether the law has a meaning in a space."""
+        return self.options is None or space in getattr(self.options, "spaces", (space,))
+
+    def acts_in(self, mode: str) -> bool:
+        """Return whether the law acts while its component is in a mode."""
+        modes = getattr(self.options, "modes", ())
+        return not modes or mode in modes
+
+
+@dataclass(frozen=True)
+class ActingOptions:
+    """In which modes a potential, a Rayleigh function or loads act; in all when empty."""
+
+    modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ConstraintOptions:
+    """See `constraint`."""
+
+    reactions: tuple[str, ...]
+    unit: str
+    sign: float
+    doc: str
+    modes: tuple[str, ...]
+    spaces: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class JointOptions:
+    """See `joint`."""
+
+    a: str
+    b: str
+    coordinates: tuple[str, ...]
+    solves: tuple[str, ...]
+    spaces: tuple[str, ...]
+    rigid: bool
+    reaction_doc: str
+    modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ObservableOptions:
+    """See `observable`."""
+
+    unit: str
+    doc: str
+    periodic: bool
+    rate: str
+    spaces: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class EventOptions:
+    """See `event`."""
+
+    modes: tuple[str, ...]
+    direction: int
+    target: str
+    message: str
+    unit: str
+    impact: bool
+    spaces: tuple[str, ...] = ("line", "plane", "space")
+
+
+@dataclass(frozen=True)
+class DerivativeOptions:
+    """See `derivative`."""
+
+    states: tuple[str, ...]
+    modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class UpdateOptions:
+    """See `update`."""
+
+    sets: tuple[str, ...]
+    every: str | float | None
+    offset: str | float
+    at: str
+    when: str
+    reads: tuple[str, ...] | None

@@ -1,0 +1,289 @@
+"""The state just after an event: the mode that is entered, impacts, and the same state in other coordinates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import SolveError
+from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, jacobian
+from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
+from atwood.forms.places import to_maximal
+from atwood.forms.quantities import observer
+from atwood.linalg.matrices import is_full, scaled, to_array
+from atwood.mechanics.dynamics.equations import Constraint
+from atwood.mechanics.outputs.event_functions import EventFunction, list_event_functions
+from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
+from atwood.simulation.dynamics.line_signs import actual_line_signs
+from atwood.simulation.dynamics.orientation_coordinates import (
+    Reassemble,
+    switch_coordinates,
+)
+from atwood.simulation.dynamics.rank import least_norm
+from atwood.simulation.dynamics.reactions import maximal_state
+from atwood.simulation.dynamics.scales import motion_scales
+from atwood.tolerances import tolerances
+
+if TYPE_CHECKING:
+    pass
+from atwood.simulation.events.modes import EventRecord
+
+__all__ = ["enter_mode", "generalized_speeds", "generalized_state", "plastic_impact"]
+
+
+_REACTION_EVENTS: Key[tuple[EventFunction, ...]] = Key("event functions that read reactions")
+
+
+_MAXIMAL: Key[tuple[Program, tuple[int, ...], tuple[int, ...]]] = Key("maximal coordinates and their Jacobian")
+
+
+def enter_mode(
+    state: tuple[float, FloatArray, FloatArray],
+    assembly: Assembly,
+    event: EventRecord,
+    reassemble: Reassemble,
+    length: float,
+) -> tuple[Assembly, FloatArray, FloatArray]:
+    """Return the scene in the mode that an event leads to, with its state.
+
+    Parameters
+    ----------
+    state
+        Time, coordinates and speeds just before the event.
+    assembly
+        The scene before the event.
+    event
+        The event.
+    reassemble
+        Gives the scene in other modes and orientation coordinates.
+    length
+        Extent of the scene, m.
+    """
+    t, q, u = state
+    big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
+    line_signs = actual_line_signs(assembly, t, q, u, assembly.form)
+    after = reassemble({**assembly.modes, event.part: event.target}, line_signs, assembly.orientation)
+    sizes = motion_scales(after.maximal, length)
+    balance = balance_of(after, "dae")
+    if event.impact:
+        met, _ = balance.project(t, big_q, big_u, sizes)
+        _check_in_place(event, balance.kinematic_map.difference(t, big_q, met) / sizes)
+        big_u = plastic_impact(after, balance, event, (t, met, big_u), sizes)
+        big_q = met
+    if after.form == "dae":
+        return after, big_q, big_u
+    q, u, miss = generalized_state(assembly, after, t, (q, u), (big_q, big_u), length)
+    _check_in_place(event, miss)
+    return *switch_coordinates(after, q, reassemble), u
+
+
+def _check_in_place(event: EventRecord, moved: FloatArray) -> None:
+    """Refuse a change of mode that would move bodies."""
+    farthest = float(np.max(np.abs(moved), initial=0.0))
+    if not farthest <= tolerances.IN_PLACE:
+        raise SolveError(
+            f"at t = {event.time:.6g} a change of mode ({event.message}) would change a position discontinuously by "
+            f"{farthest:.3g} of the scene's size",
+            where=event.part,
+            advice="The position violates the constraints of the new mode: change the start, or the condition of "
+            "the event.",
+        )
+
+
+def plastic_impact(
+    after: Assembly,
+    balance: Balance,
+    event: EventRecord,
+    state: tuple[float, FloatArray, FloatArray],
+    sizes: FloatArray,
+) -> FloatArray:
+    """Return the velocities after an impact: the nearest admissible ones in the metric of the masses.
+
+    Impulses act along the constraints only: ``M (u+ - u-) = G^T Lambda``, ``G u+ + g_t = 0``. One that is one-sided, as
+    a rope is that can only pull, bears impulses of one sign: an impact that needs the other one is refused.
+
+    Parameters
+    ----------
+    after, balance
+        The scene after the impact, and its balance of forces in maximal coordinates.
+    event
+        What the impact is told as.
+    state
+        Time, coordinates and speeds just before it, in maximal coordinates.
+    sizes
+        Size of a displacement along each speed.
+    """
+    t, q, u = state
+    now = balance.at(t, q, u)
+    velocities, impulses = _solve_impact(now, u, sizes, balance.row_scales(now, t, q, sizes))
+    size = float(np.max(np.abs(impulses), initial=0.0))
+    for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
+        if abs(impulse) > 1e-9 * size and _is_refused(after, one, state, one.sign * impulse):
+            raise SolveError(
+                f"at t = {t:.6g} the impact ({event.message}, {event.part}) needs an impulse of the sign that "
+                "this one-sided constraint cannot transmit: a rope would have to push",
+                where=one.key[0],
+                advice="Simultaneous impacts of several one-sided constraints, some of which open, are not supported.",
+            )
+    return velocities
+
+
+_SIZES = (1e-9, 1e9)
+"""Between these, beside the impulses, lies any force that an event could compare a reaction with."""
+
+
+def _is_refused(
+    after: Assembly, constraint: Constraint, state: tuple[float, FloatArray, FloatArray], impulse: float
+) -> bool:
+    """Return whether events of its part let go of a constraint for a reaction of this sign, however small or large.
+
+    A limit in both directions, or one that is not zero, makes no constraint one-sided.
+    """
+    part, own = constraint.key[0], [one.symbol for one in after.reactions if one.key == constraint.key]
+    event_functions = [
+        one for one in _reaction_event_functions(after) if one.part == part and depends_on(one.value, own)
+    ]
+    if not event_functions:
+        return False
+    t, q, u = state
+    equations = after.maximal
+    known: dict[Expression, float] = dict(zip(after.parameters, after.parameter_values, strict=True))
+    known |= {equations.time: t, **dict(zip(equations.coordinates, q, strict=True))}
+    known |= dict(zip((*equations.speeds, *equations.accelerations), (*u, *np.zeros_like(u)), strict=True))
+    known |= dict.fromkeys((one.symbol for one in after.reactions), 0.0)
+
+    def lets_go(reaction: float) -> bool:
+        values = evaluate([one.value for one in event_functions], {**known, **dict.fromkeys(own, reaction)})
+        return any(one.direction * value > 0.0 for one, value in zip(event_functions, values, strict=True))
+
+    refused, other = (all(lets_go(sign * size * impulse) for size in _SIZES) for sign in (1.0, -1.0))
+    return refused and not other
+
+
+def _reaction_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
+    """Return the events that read reactions, in maximal coordinates."""
+    symbols = [one.symbol for one in assembly.reactions]
+
+    def make() -> tuple[EventFunction, ...]:
+        every = list_event_functions(assembly.mechanism, assembly.maximal, assembly.reactions, assembly.modes)
+        return tuple(one for one in every if depends_on(one.value, symbols))
+
+    return assembly.shared.get(_REACTION_EVENTS, make)
+
+
+def _solve_impact(
+    now: BalanceValues, u: FloatArray, sizes: FloatArray, rows: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return velocities after an impact, and impulses: those of least size where constraints depend on each other.
+
+    All is written in displacements of the scene's size, and impulses come out as their work along these: what is small
+    beside the rest is then small in truth, and not in its unit.
+    """
+    if not is_full(now.mass):
+        from atwood.linalg.sparse import solve_bordered
+
+        solved = solve_bordered(now.mass, now.jacobian, -(now.mass @ u), now.explicit_rate)
+        if solved is not None:
+            return solved[0], solved[1] * rows
+    m, n = len(now.gamma), len(u)
+    mass, slope = sizes[:, None] * to_array(now.mass) * sizes, to_array(scaled(now.jacobian, sizes, rows))
+    mass = mass / (np.max(np.abs(mass), initial=0.0) or 1.0)
+    matrix = np.block([[mass, -slope.T], [slope, np.zeros((m, m))]])
+    found = np.linalg.lstsq(matrix, np.concatenate([mass @ (u / sizes), -now.explicit_rate / rows]), rcond=1e-12)[0]
+    return found[:n] * sizes, found[n:]
+
+
+def generalized_state(
+    before: Assembly,
+    after: Assembly,
+    t: float,
+    own: tuple[FloatArray, FloatArray],
+    maximal: tuple[FloatArray, FloatArray],
+    length: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the generalized coordinates and speeds, with quaternions, that give the same maximal ones.
+
+    Parameters
+    ----------
+    before, after
+        The scene that a state is of, and that whose generalized coordinates are sought.
+    t
+        Time.
+    own, maximal
+        The state in the coordinates of its own form, and in maximal ones.
+    length
+        Extent of the scene, m.
+
+    Returns
+    -------
+    coordinates, speeds, miss
+        The state, and by how much it misses the maximal coordinates, each in its own size.
+    """
+    equations = after.regular
+    reduced_map, maximal_map = kinematic_map_of(after, "regular"), kinematic_map_of(after, "dae")
+    program, rows, columns = _maximal_places(after)
+    kernel = after.kernel(program)
+    names = tuple(c.name for c in equations.names)
+    known = [name for name in names if name in before.observables]
+    q, still = reference_coordinates(equations), np.zeros(len(equations.speeds))
+    if known:
+        read = before.kernel(observer(before, tuple(known)))
+        idle = [0.0] * len(before.reactions)
+        values = read([t], *own, np.zeros_like(own[1]), idle)[0]
+        for name, value in zip(known, values, strict=True):
+            q[names.index(name)] = value
+    turned = {orientation.body: list(orientation.coordinates) for orientation in after.maximal.orientation_coordinates}
+    for orientation in equations.orientation_coordinates:
+        if orientation.body in turned:
+            q[list(orientation.coordinates)] = maximal[0][turned[orientation.body]]
+    q = reduced_map.normalized(q)
+    scales = motion_scales(after.maximal, length)
+    matrix = np.zeros((len(scales), len(still)))
+    for _ in range(30):
+        now, _, entries = kernel([t], q, still)
+        matrix[rows, columns] = entries
+        miss = maximal_map.difference(t, maximal_map.normalized(np.asarray(now)), maximal[0]) / scales
+        step = least_norm(matrix / scales[:, None], miss)
+        q = reduced_map.moved(t, q, step)
+        if float(np.max(np.abs(step), initial=0.0)) < 1e-14 * max(1.0, float(np.max(np.abs(q), initial=0.0))):
+            break
+    return q, generalized_speeds(after, t, q, maximal[1], scales), miss
+
+
+def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return the generalized speeds, with quaternions, that give the same speeds in maximal coordinates.
+
+    Parameters
+    ----------
+    after
+        The scene.
+    t, q
+        Time and generalized coordinates.
+    speeds, sizes
+        Speeds in maximal coordinates, and the size of a displacement along each.
+    """
+    program, rows, columns = _maximal_places(after)
+    still = np.zeros(len(after.regular.speeds))
+    matrix = np.zeros((len(sizes), len(still)))
+    _, explicit_rate, matrix[rows, columns] = after.kernel(program)([t], q, still)
+    return least_norm(matrix / sizes[:, None], (speeds - np.asarray(explicit_rate)) / sizes)
+
+
+def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
+    """Return the program that gives maximal coordinates, their speeds, the Jacobian of these, and its pattern.
+
+    Speeds of bodies change with generalized speeds as their places do with displacements along these.
+    """
+
+    def make() -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
+        placing = to_maximal(after, "regular")
+        derivative = jacobian(list(placing.outputs[1].expressions), list(after.regular.speeds))
+        outputs = (*placing.outputs, OutputGroup("jacobian", tuple(derivative.entries)))
+        program = Program(f"{after.flat.name} change of mode", placing.inputs, after.parameters, outputs)
+        return program, derivative.rows, derivative.columns
+
+    return after.shared.get(_MAXIMAL, make)
