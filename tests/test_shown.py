@@ -16,7 +16,7 @@ import atwood.study
 from atwood.result.trajectories import Group
 from atwood.showing import LINES, WIDTH, fitted, html_table
 from atwood_library import Ground, PointMass, Rod
-from atwood_library.scenes import Chain, DoublePendulum, FourBar, HeavyTop, SimplePendulum
+from atwood_library.scenes import Chain, DoublePendulum, FourBar, HeavyTop, Kepler, SimplePendulum
 
 FACADES = (atwood, atwood.checking, atwood.plotting, atwood.reporting, atwood.solids, atwood.study)
 PUBLIC = {one for room in FACADES for one in (getattr(room, name) for name in room.__all__) if isinstance(one, type)}
@@ -103,6 +103,11 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "exponents": atwood.lyapunov_exponents(DoublePendulum(), t_end=0.5),
         "portrait": atwood.phase_portrait(SimplePendulum(), speeds=(-1.0, 1.0)),
         "section": atwood.poincare_section(DoublePendulum(), "rod1.angle crosses 0", ["rod2.angle"]),
+        "action": atwood.action(DoublePendulum(), t_end=0.1),
+        "variation": atwood.action(DoublePendulum(), t_end=0.1).variation(),
+        "joining": atwood.motions_between(SimplePendulum(), {"rod.angle": 0.5}, t_end=0.3),
+        "separated": _separated(),
+        "action and angle": atwood.action_angle(SimplePendulum()),
         "linear": atwood.linearize(scene, at=hanging, inputs=[], outputs=["bob[0].position.x"]),
         "dynamics": atwood.dynamics(scene),
         "conserved": atwood.conserved(FourBar()),
@@ -118,6 +123,12 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "declared": _declared(),
         "box": atwood.solids.box(1.0, 2.0, 3.0, density=1e3),
     }
+
+
+def _separated() -> tuple[object, object]:
+    polar = {"body.position.x": "r*cos(phi)", "body.position.z": "r*sin(phi)"}
+    found = atwood.separation(Kepler(), polar)
+    return found, found.motion("r", [0.0, 0.5], [0.8, 0.0])
 
 
 def _reachable(roots: Mapping[str, object]) -> Iterator[tuple[str, object]]:

@@ -95,6 +95,18 @@ if TYPE_CHECKING:
     from atwood.study.comparison.compare import Comparison, ComparisonRow, compare
     from atwood.study.sweeps.files import load_sweep
     from atwood.study.sweeps.sweep import Sweep, sweep
+    from atwood.theory.action import (
+        Action,
+        ActionAngle,
+        JoiningMotion,
+        SeparatedMotion,
+        Separation,
+        Variation,
+        action,
+        action_angle,
+        motions_between,
+        separation,
+    )
     from atwood.theory.canonical import (
         CanonicalTransformation,
         PointTransformation,
@@ -175,6 +187,8 @@ __all__ += [
 
 # Equations and what follows from them
 __all__ += [
+    "Action",
+    "ActionAngle",
     "BranchPoint",
     "CanonicalTransformation",
     "Conserved",
@@ -186,6 +200,7 @@ __all__ += [
     "EquilibriumBranch",
     "EquilibriumBranches",
     "Hamiltonian",
+    "JoiningMotion",
     "LinearModel",
     "LyapunovExponents",
     "NormalModes",
@@ -195,9 +210,14 @@ __all__ += [
     "PointTransformation",
     "RestPoint",
     "RootLocus",
+    "SeparatedMotion",
+    "Separation",
     "Symmetry",
     "TangentFlow",
     "Trim",
+    "Variation",
+    "action",
+    "action_angle",
     "canonical_transformation",
     "conserved",
     "dynamics",
@@ -209,6 +229,7 @@ __all__ += [
     "hamiltonian",
     "linearize",
     "lyapunov_exponents",
+    "motions_between",
     "normal_modes",
     "phase_portrait",
     "poincare_section",
@@ -216,6 +237,7 @@ __all__ += [
     "poisson_bracket",
     "poisson_brackets",
     "root_locus",
+    "separation",
     "tangent_flow",
     "total_derivative",
     "trim",
@@ -320,6 +342,10 @@ _ROOMS = {
     "atwood.result.files": ("SavedResult", "load_result", "save_result"),
     "atwood.result.result": ("Result",),
     "atwood.study": ("Comparison", "ComparisonRow", "Sweep", "compare", "load_sweep", "sweep"),
+    "atwood.theory.action": (
+        "Action", "ActionAngle", "JoiningMotion", "SeparatedMotion", "Separation", "Variation",
+        "action", "action_angle", "motions_between", "separation",
+    ),
     "atwood.theory.canonical": (
         "CanonicalTransformation", "PointTransformation", "canonical_transformation", "fundamental_brackets",
         "generated_transformation", "point_transformation", "poisson_bracket", "poisson_brackets", "total_derivative",

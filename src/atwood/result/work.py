@@ -13,7 +13,7 @@ from atwood.result.energy import EnergyLedger, Piece, make_ledger
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.simulation.run.made import Run
 
-__all__ = ["find_ledger", "integral_in_steps", "integral_of_samples", "nodes_between"]
+__all__ = ["find_ledger", "integral_in_steps", "integral_of_samples", "joined_times", "nodes_between"]
 
 
 _CLEAR, _PART = 0.01, 0.1
@@ -135,7 +135,7 @@ def _work_in_steps(run: Run, pieces: Sequence[Piece], count: int) -> tuple[list[
     from atwood.simulation.run.retrace import run_again, times_of_steps
 
     steps = times_of_steps(run)
-    grids = [_joined(one.time, steps) for one in pieces]
+    grids = [joined_times(one.time, steps) for one in pieces]
     nodes = [nodes_between(grid, count) for grid in grids]
     again = run_again(run, np.concatenate(nodes))
     if again is None:
@@ -153,7 +153,7 @@ def _work_in_steps(run: Run, pieces: Sequence[Piece], count: int) -> tuple[list[
     return work, unsure
 
 
-def _joined(t: FloatArray, steps: FloatArray) -> FloatArray:
+def joined_times(t: FloatArray, steps: FloatArray) -> FloatArray:
     """Return sample times together with the times of steps between them, as far as these are told from each other."""
     inside = steps[(steps > t[0]) & (steps < t[-1])]
     places = np.searchsorted(t, inside)

@@ -1,0 +1,19 @@
+"""The action of motions and paths, motions between given ends, and the theory of Hamilton and Jacobi."""
+
+from atwood.theory.action.action_angle import ActionAngle, action_angle
+from atwood.theory.action.between import JoiningMotion, motions_between
+from atwood.theory.action.integral import Action, Variation, action
+from atwood.theory.action.separation import SeparatedMotion, Separation, separation
+
+__all__ = [
+    "Action",
+    "ActionAngle",
+    "JoiningMotion",
+    "SeparatedMotion",
+    "Separation",
+    "Variation",
+    "action",
+    "action_angle",
+    "motions_between",
+    "separation",
+]

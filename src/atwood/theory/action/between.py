@@ -1,0 +1,245 @@
+"""`motions_between`: the motions of a scene that join two places in a given time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from atwood.arguments import BY_PATH, optional, takes
+from atwood.arrays import FloatArray
+from atwood.errors import AtwoodError, SolveError, UsageError, suggestion
+from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
+from atwood.model.compose.composite import Model
+from atwood.model.values.units import parse_quantity, parse_unit
+from atwood.pipeline import SCENE, assembly_of
+from atwood.result.result import Result
+from atwood.showing import count_of
+from atwood.simulation.initialization.start import find_start
+from atwood.simulation.problem.arguments import T_END, check_span
+from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.run.run import run
+from atwood.theory.action.integral import Action, action_of_run
+from atwood.theory.action.shooting import Shooter, refuse_tied
+
+__all__ = ["JoiningMotion", "motions_between"]
+
+_GRID, _TRIES = 401, 40
+"""So many velocities are tried for one coordinate, and so many begins of Newton's method for several."""
+
+_FASTEST = 6.0
+"""Velocities are sought up to so many times what is typical of the scene and of the ends."""
+
+_JOINED = 1e-9
+"""Of the scene's sizes: what ends so near has joined its ends; solutions that differ by less are one."""
+
+_TIMES, _CONJUGATE = 400, 1e-6
+"""Times at which neighbours are looked at, and the share of their largest spread that is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class JoiningMotion:
+    """A motion that joins two places in a given time.
+
+    Attributes
+    ----------
+    velocities
+        At the start, by the path of the coordinate.
+    result
+        The motion.
+    action
+        Its action: Hamilton's principal function of these ends, for this motion.
+    conjugate_times
+        When neighbours that started from the same place meet it again, up to the end, s: the start's conjugate points.
+        Where there is none before the end, S is a minimum among paths with these ends; each more is a direction in
+        which it is not (Morse). Those of even multiplicity are not seen.
+    ends_are_conjugate
+        Whether the end is such a point itself, so that other motions all but join the same ends.
+    """
+
+    velocities: Mapping[str, float]
+    result: Result
+    action: Action
+    conjugate_times: tuple[float, ...]
+    ends_are_conjugate: bool
+
+    @property
+    def is_minimum(self) -> bool:
+        """Whether its action is a minimum among neighbouring paths."""
+        return not self.conjugate_times and not self.ends_are_conjugate
+
+    def __repr__(self) -> str:
+        speeds = ", ".join(f"{path}' = {value:.6g}" for path, value in self.velocities.items())
+        points = count_of(len(self.conjugate_times), "conjugate point")
+        return f"<JoiningMotion: {speeds}; S = {self.action.value:.9g} J s, {points}>"
+
+
+@takes(scene=SCENE, end=BY_PATH, t_end=T_END, start=optional(BY_PATH))
+def motions_between(
+    scene: Model | Assembly,
+    end: Mapping[str, Any],
+    *,
+    t_end: float | str | None = None,
+    start: Mapping[str, Any] | None = None,
+) -> tuple[JoiningMotion, ...]:
+    """Return the motions that lead from one place to another in a given time: Hamilton's boundary value problem.
+
+    For one coordinate all velocities up to several times what is typical of the scene are looked through; for more,
+    Newton's method begins at a straight line and at velocities chosen at random, the same each time, so that there may
+    be motions that it does not find.
+
+    Parameters
+    ----------
+    scene
+        The scene, whose coordinates are free.
+    end
+        Where it ends: each coordinate by its path, in SI units or as text with a unit. Angles count their turns.
+    t_end
+        When, s; the scene's own end if not given.
+    start
+        Where it starts, for coordinates that are not to be where the scene has them.
+
+    Returns
+    -------
+    tuple of JoiningMotion
+        In the order of their actions.
+
+    Raises
+    ------
+    SolveError
+        If no motion was found that joins the ends.
+    UsageError
+        If a coordinate of the end is missing, or unknown.
+    UnsupportedError
+        If the coordinates are tied by constraints, or the equations switch on the way.
+    """
+    assembly = assembly_of(scene)
+    refuse_tied(assembly)
+    begun = find_start(assembly)
+    last = assembly.flat.t_end if t_end is None else float(t_end)
+    check_span(begun.time, last)
+    names = assembly.own_equations.names
+    place = _read(start or {}, names, begun.coordinates, assembly.flat.name)
+    target = _read(end, names, place, assembly.flat.name)
+    missing = [one.name for one in names if one.name not in end]
+    if missing:
+        raise UsageError(f"the end leaves out {', '.join(missing)}", where=assembly.flat.name)
+    shooter = Shooter(assembly, place, begun.length, begun.time, last)
+    found = _joining(shooter, target, assembly.flat.name)
+    made = []
+    for velocity in found:
+        options = RunOptions(t_end=last, relative_tolerance=1e-12)
+        there = replace(begun, coordinates=place, speeds=velocity)
+        whole = run(assembly, there, options, assembly.other_mode)
+        times, at_end = _conjugate_times(shooter, velocity)
+        velocities = dict(zip(shooter.names, velocity.tolist(), strict=True))
+        made.append(JoiningMotion(velocities, Result(whole), action_of_run(whole), times, at_end))
+    return tuple(sorted(made, key=lambda one: one.action.value))
+
+
+def _read(given: Mapping[str, Any], names: Sequence[Any], values: FloatArray, where: str) -> FloatArray:
+    """Return coordinates, of which some are given."""
+    found = np.array(values, dtype=float)
+    known = {one.name: (k, one.unit) for k, one in enumerate(names)}
+    for path, value in given.items():
+        if path not in known:
+            raise UsageError(f"{path!r} is no coordinate of it", where=where, advice=suggestion(path, list(known)))
+        number, unit = known[path]
+        try:
+            found[number] = parse_quantity(value, parse_unit(unit), path) if isinstance(value, str) else float(value)
+        except (TypeError, ValueError):
+            raise UsageError(f"{value!r} is no number", where=path) from None
+    if not np.all(np.isfinite(found)):
+        raise UsageError("its ends are not all finite numbers", where=where)
+    return found
+
+
+def _joining(shooter: Shooter, target: FloatArray, name: str) -> list[FloatArray]:
+    """Return the velocities with which motions reach a place at the end."""
+    span, apart = shooter.end - shooter.begin, np.abs(target - shooter.place)
+    fastest = _FASTEST * (shooter.sizes / shooter.time + np.maximum(apart, shooter.sizes) / span)
+    misses: list[float] = []
+
+    def miss(velocity: FloatArray) -> FloatArray:
+        found = (shooter.arrival(velocity) - target) / shooter.sizes
+        if np.all(np.isfinite(found)):
+            misses.append(float(np.max(np.abs(found))))
+        return found
+
+    found: list[FloatArray] = []
+    tried = _brackets(miss, float(fastest[0])) if shooter.size == 1 else _guesses(miss, target, shooter, fastest)
+    for velocity in tried:
+        near = miss(velocity)
+        if not np.max(np.abs(near)) < _JOINED:
+            continue
+        if all(np.max(np.abs(velocity - other) / fastest) > _JOINED for other in found):
+            found.append(velocity)
+    if found:
+        return found
+    if misses and max(misses) < _JOINED:
+        raise SolveError(
+            "every motion from the start joins these ends: they are conjugate points",
+            where=name,
+            advice="Give another time, for which there are single motions.",
+        )
+    nearest = f"the nearest misses by {min(misses):.3g} of the scene's size" if misses else "none comes to the end"
+    raise SolveError(
+        f"no motion was found that joins these ends in {span:g} s: of {len(misses)} that were tried {nearest}",
+        where=name,
+        advice="Give other ends or another time; ends that are conjugate points are joined by none, or by very many.",
+    )
+
+
+def _brackets(miss: Any, fastest: float) -> Iterator[FloatArray]:
+    """Yield the zeros of what is missed by one coordinate, between velocities at which it changes its sign."""
+    from scipy.optimize import brentq
+
+    # Closer together where velocities are small, and the same for motions there and back.
+    grid = fastest * np.sinh(np.linspace(-4.0, 4.0, _GRID)) / np.sinh(4.0)
+    values = np.array([miss(np.array([one]))[0] for one in grid])
+    for k in np.flatnonzero(np.abs(values) < _JOINED**1.5):
+        if not np.all(np.abs(values) < _JOINED):
+            yield grid[k : k + 1]
+    for k in np.flatnonzero(np.sign(values[1:]) * np.sign(values[:-1]) < 0.0):
+        if np.all(np.abs(values) < _JOINED):
+            return
+        root = brentq(lambda v: miss(np.array([v]))[0], grid[k], grid[k + 1], xtol=1e-15 * fastest, rtol=4e-16 * 4)
+        yield np.array([root])
+
+
+def _guesses(miss: Any, target: FloatArray, shooter: Shooter, fastest: FloatArray) -> Iterator[FloatArray]:
+    """Yield where Newton's method ends from many velocities."""
+    from scipy.optimize import root
+
+    random = np.random.default_rng(7)
+    straight = (target - shooter.place) / (shooter.end - shooter.begin)
+    begins = [straight, *(0.5 * fastest * random.uniform(-1.0, 1.0, (_TRIES, shooter.size)) ** 3 + straight)]
+    for begin in begins:
+
+        def scaled(x: FloatArray) -> FloatArray:
+            found = miss(x * fastest)
+            return found if np.all(np.isfinite(found)) else np.full(len(x), 1e3)
+
+        try:
+            ended = root(scaled, begin / fastest, method="hybr", options={"xtol": 1e-14})
+        except (AtwoodError, ArithmeticError):
+            continue
+        yield ended.x * fastest
+
+
+def _conjugate_times(shooter: Shooter, velocity: FloatArray) -> tuple[tuple[float, ...], bool]:
+    """Return when neighbours from the same place come together again, and whether they do at the end."""
+    from scipy.interpolate import CubicSpline
+
+    span = shooter.end - shooter.begin
+    times = shooter.begin + span * np.arange(1, _TIMES + 1) / _TIMES
+    spread = np.linalg.det(shooter.fields(velocity, times) / (times - shooter.begin)[:, None, None])
+    if not np.all(np.isfinite(spread)):
+        return (), False
+    found = CubicSpline(times, spread).roots(extrapolate=False)
+    at_end = abs(spread[-1]) < _CONJUGATE * float(np.max(np.abs(spread)))
+    inside = [float(t) for t in found if not (at_end and t > shooter.end - 2.0 * span / _TIMES)]
+    return tuple(inside), bool(at_end)

@@ -1,0 +1,370 @@
+"""`action`: the integral of the Lagrangian along a run or a path, and what it does when these are varied."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from typing import Any
+
+import numpy as np
+
+from atwood.arguments import instance, optional, takes
+from atwood.arrays import FloatArray
+from atwood.errors import UnsupportedError, UsageError
+from atwood.expr import OutputGroup, Program, vjp
+from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
+from atwood.forms.lagrangian import lagrangian_along_speeds
+from atwood.forms.program import rates_are_speeds, state_groups
+from atwood.late import dataclass
+from atwood.model.compose.composite import Model
+from atwood.pipeline import assembly_of, simulate
+from atwood.result.result import Result
+from atwood.result.work import joined_times
+from atwood.simulation.problem.arguments import RTOL, T_END, check_span
+from atwood.simulation.run.retrace import run_again, times_of_steps
+from atwood.simulation.run.run import Run
+from atwood.theory.action.curves import Nodes, curves_at, panels
+
+__all__ = ["Action", "Variation", "action", "action_of_run"]
+
+PATH = instance("a dictionary of functions of time by path", Mapping)
+
+_PROGRAM: Key[Program] = Key("action")
+_PANELS, _MODES = 64, 8
+_AT_ENDS = 1e-9
+"""A direction vanishes at the ends where it is so small, of its largest size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variation:
+    """First variations of an action.
+
+    Attributes
+    ----------
+    names
+        The directions.
+    values
+        The variations, J s for a direction in the units of the coordinates.
+    relative
+        The same divided by the integral of the sizes of the terms that cancel.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    relative: FloatArray
+
+    @property
+    def largest(self) -> float:
+        """The largest relative variation."""
+        return float(np.max(np.abs(self.relative), initial=0.0))
+
+    def __repr__(self) -> str:
+        return f"<Variation in {len(self.names)} directions: at most {self.largest:.2g} of the terms that cancel>"
+
+
+@dataclass(frozen=True, eq=False)
+class Action:
+    """The action ``S``, the integral of L along a motion or a path, and its derivatives by the ends.
+
+    For a motion, S as a function of its ends is Hamilton's principal function: ``dS/dq = p`` and ``dS/dt = -H`` at the
+    end, with the other signs at the start (Landau and Lifshitz, Mechanics, section 43).
+
+    Attributes
+    ----------
+    name
+        The scene.
+    value
+        S, J s.
+    error
+        Of the quadrature, as estimated by half as many points.
+    time
+        Of start and end, s.
+    coordinates
+        Their paths.
+    ends
+        Coordinates at start and end, a row each.
+    momenta
+        Momenta at start and end, a row each; None where speeds are no derivatives of the coordinates.
+    energies
+        ``p q' - L`` at start and end, J.
+    """
+
+    name: str
+    value: float
+    error: float
+    time: tuple[float, float]
+    coordinates: tuple[str, ...]
+    ends: FloatArray
+    momenta: FloatArray | None
+    energies: tuple[float, float]
+    _pieces: tuple[_Piece, ...] = field(repr=False)
+
+    @property
+    def gradient(self) -> dict[str, float]:
+        """``dS/dq = p`` at the end, by path.
+
+        Raises
+        ------
+        UnsupportedError
+            If velocities are no derivatives of the coordinates, as for orientations in space.
+        """
+        return dict(zip(self.coordinates, self._momenta()[1].tolist(), strict=True))
+
+    @property
+    def time_derivative(self) -> float:
+        """``dS/dt = -H`` at the end, J."""
+        return -self.energies[1]
+
+    @property
+    def initial_gradient(self) -> dict[str, float]:
+        """``dS/dq = -p`` at the start, by path; errors as of `gradient`."""
+        return dict(zip(self.coordinates, (-self._momenta()[0]).tolist(), strict=True))
+
+    @property
+    def initial_time_derivative(self) -> float:
+        """``dS/dt = H`` at the start, J."""
+        return self.energies[0]
+
+    def variation(self, direction: Mapping[str, Any] | None = None) -> Variation:
+        """Return the first variation, the integral of ``dL/dq eta + p eta'`` for directions eta with fixed ends.
+
+        It is computed as it stands, by quadrature in each step of the solver: nothing is integrated by parts, which
+        would give the equations of motion, and with them zero. So on a motion it is as small as the solver is accurate.
+
+        Parameters
+        ----------
+        direction
+            By path: numbers, text or sympy expressions in t, or functions of arrays of times. If not given, each
+            coordinate moves as ``sin(k pi (t - t0)/(t1 - t0))``, k from 1 to 8: any direction is a sum of such.
+
+        Raises
+        ------
+        UsageError
+            If a direction does not vanish at the ends.
+        UnsupportedError
+            See `gradient`.
+        """
+        self._momenta()
+        chosen = self._sines() if direction is None else {"the direction": direction}
+        values, sizes = [], []
+        for given in chosen.values():
+            total = size = 0.0
+            largest, last = 0.0, np.zeros(0)
+            for piece in self._pieces:
+                eta, rate, at_ends = curves_at(given, self.coordinates, piece.nodes, self.name)
+                total += piece.nodes.integral(np.sum(piece.slopes * eta + piece.momenta * rate, axis=0))
+                size += piece.nodes.integral(np.sum(np.abs(piece.slopes * eta) + np.abs(piece.momenta * rate), axis=0))
+                largest = max(largest, float(np.max(np.abs(eta), initial=0.0)))
+                first = at_ends[:, 0] if piece is self._pieces[0] else np.zeros(1)
+                last = at_ends[:, 1]
+                if np.max(np.abs(first)) > _AT_ENDS * largest:
+                    raise self._does_not_vanish()
+            if np.max(np.abs(last)) > _AT_ENDS * largest:
+                raise self._does_not_vanish()
+            values.append(total)
+            sizes.append(size)
+        relative = np.divide(values, sizes, out=np.zeros(len(values)), where=np.array(sizes) > 0.0)
+        return Variation(tuple(chosen), np.array(values), relative)
+
+    def _sines(self) -> dict[str, dict[str, Any]]:
+        begin, end = self.time
+
+        def wave(k: int) -> Any:
+            return lambda t: np.sin(k * np.pi * (t - begin) / (end - begin))
+
+        return {
+            f"{path}, {k} half wave{'s' if k > 1 else ''}": {path: wave(k)}
+            for path in self.coordinates
+            for k in range(1, _MODES + 1)
+        }
+
+    def _does_not_vanish(self) -> UsageError:
+        return UsageError(
+            "the direction does not vanish at both ends", where=self.name, advice="Multiply it by (t - t0)*(t1 - t)."
+        )
+
+    def _momenta(self) -> FloatArray:
+        if self.momenta is None:
+            raise UnsupportedError(
+                "its speeds are no derivatives of its coordinates, as angular velocities of bodies in space, so that "
+                "these have no momenta",
+                where=self.name,
+                advice="`hamiltonian` has momenta of Euler angles.",
+            )
+        return self.momenta
+
+    def __repr__(self) -> str:
+        begin, end = self.time
+        return f"<Action of {self.name} from t = {begin:g} to {end:g} s: {self.value:.12g} J s>"
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A stretch without jumps: L, dL/dq, dL/du and the energy at the nodes, rows of one number for each."""
+
+    nodes: Nodes
+    values: FloatArray
+    slopes: FloatArray
+    momenta: FloatArray
+
+
+@takes(
+    scene=instance("a scene, an assembly of one, or a result", Model, Assembly, Result),
+    path=optional(PATH),
+    t_end=T_END,
+    rtol=RTOL,
+)
+def action(
+    scene: Model | Assembly | Result,
+    path: Mapping[str, Any] | None = None,
+    *,
+    t_end: float | str | None = None,
+    rtol: float = 1e-12,
+) -> Action:
+    """Return the action of a scene's motion, of a run, or of a path that need not be a motion.
+
+    Parameters
+    ----------
+    scene
+        The scene, which is run from its start; or the result of a run.
+    path
+        A path instead: for each coordinate by its path a number, text or a sympy expression in t, or a function of an
+        array of times.
+    t_end
+        Time of the end, s; the scene's own if not given. A result has its end.
+    rtol
+        Relative tolerance of the run.
+
+    Returns
+    -------
+    Action
+        S, its derivatives by the ends, and its first variation.
+
+    Raises
+    ------
+    UsageError
+        If a path leaves a coordinate out, or a result is given a path or an end.
+    """
+    if isinstance(scene, Result):
+        if path is not None or t_end is not None:
+            raise UsageError("a result has its motion and its end", advice="Give the scene, with a path or an end.")
+        return action_of_run(scene.run)
+    if path is None:
+        assembly = assembly_of(scene)
+        return action_of_run(simulate(assembly, t_end=t_end, rtol=rtol).run)
+    return _of_path(assembly_of(scene), path, t_end)
+
+
+def action_of_run(run: Run) -> Action:
+    """Return the action of a run; it is made again to look at it within its steps.
+
+    Parameters
+    ----------
+    run
+        The run.
+    """
+    steps = times_of_steps(run)
+    nodes = [panels(joined_times(one.time, steps)) for one in run.segments if len(one.time) > 1]
+    again = run_again(run, np.concatenate([one.times.ravel() for one in nodes])) if nodes else None
+    segments = [one for one in again.segments if len(one.time) > 1] if again is not None else []
+    if len(segments) != len(nodes):
+        raise UsageError("the run cannot be made again to be looked at", where=run.assembly.flat.name)
+    pieces, ends = [], []
+    for points, segment in zip(nodes, segments, strict=True):
+        places = np.searchsorted(segment.time, points.times.ravel())
+        q, u = segment.coordinates[:, places], segment.speeds[:, places]
+        pieces.append(_piece(segment.assembly, points, q, u))
+        edge = [0, -1]
+        ends.append((segment.assembly, segment.time[edge], segment.coordinates[:, edge], segment.speeds[:, edge]))
+    return _made(pieces, ends)
+
+
+def _of_path(assembly: Assembly, path: Mapping[str, Any], t_end: float | str | None) -> Action:
+    """Return the action of a path; velocities at its ends are those of its polynomials."""
+    equations, name = assembly.own_equations, assembly.flat.name
+    names = tuple(one.name for one in equations.names)
+    missing = [one for one in names if one not in path]
+    if missing or not rates_are_speeds(equations):
+        if not missing:
+            raise UnsupportedError("its speeds are no derivatives of its coordinates", where=name)
+        raise UsageError(f"the path leaves out {', '.join(missing)}", where=name, advice="Give each coordinate.")
+    begin, end = assembly.flat.t_start, assembly.flat.t_end if t_end is None else float(t_end)
+    check_span(begin, end)
+    points = panels(np.linspace(begin, end, _PANELS + 1))
+    q, v, at_ends = curves_at(path, names, points, name)
+    piece = _piece(assembly, points, q, v)
+    speeds = np.array([points.derivative_at_ends(row) for row in q])
+    return _made([piece], [(assembly, np.array([begin, end]), at_ends, speeds)])
+
+
+def _program(assembly: Assembly) -> Program:
+    """Return the program of (t, q, u) with L, dL/dq and dL/du."""
+
+    def make() -> Program:
+        equations = assembly.own_equations
+        found = lagrangian_along_speeds(assembly, equations)
+        value, one = found.lagrangian, [found.graph.one]
+        outputs = (
+            OutputGroup("L", (value,)),
+            OutputGroup("dL/dq", tuple(vjp([value], one, list(found.coordinates)))),
+            OutputGroup("dL/du", tuple(vjp([value], one, list(found.velocities)))),
+        )
+        return Program(f"{assembly.flat.name} (action)", state_groups(equations), assembly.parameters, outputs)
+
+    return assembly.shared.get(_PROGRAM, make, assembly.form, assembly.orientation.kind)
+
+
+def _evaluated(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> list[FloatArray]:
+    found = assembly.kernel(_program(assembly), vectorized=True)(t[None, :], q, u)
+    sizes = 1, len(q), len(u)
+    return [
+        np.broadcast_to(np.asarray(one, dtype=float), (size, len(t))) for one, size in zip(found, sizes, strict=True)
+    ]
+
+
+def _piece(assembly: Assembly, points: Nodes, q: FloatArray, u: FloatArray) -> _Piece:
+    value, slopes, momenta = _evaluated(assembly, points.times.ravel(), q, u)
+    return _Piece(points, value[0], slopes, momenta)
+
+
+_End = tuple[Assembly, FloatArray, FloatArray, FloatArray]
+"""A scene, two times, and coordinates and speeds at these, a column each."""
+
+
+def _made(pieces: list[_Piece], ends: list[_End]) -> Action:
+    total = sum(one.nodes.integral(one.values) for one in pieces)
+    rough = sum(_rougher(one) for one in pieces)
+    (before, t0, q0, u0), (after, t1, q1, u1) = ends[0], ends[-1]
+    first, last = _evaluated(before, t0, q0, u0), _evaluated(after, t1, q1, u1)
+    equations = before.own_equations
+    plain = rates_are_speeds(equations) and rates_are_speeds(after.own_equations)
+    return Action(
+        name=before.flat.name,
+        value=total,
+        error=abs(total - rough),
+        time=(float(t0[0]), float(t1[-1])),
+        coordinates=tuple(one.name for one in equations.names),
+        ends=np.array([q0[:, 0], q1[:, -1]]),
+        momenta=np.array([first[2][:, 0], last[2][:, -1]]) if plain else None,
+        energies=(
+            float(first[2][:, 0] @ u0[:, 0] - first[0][0, 0]),
+            float(last[2][:, -1] @ u1[:, -1] - last[0][0, -1]),
+        ),
+        _pieces=tuple(pieces),
+    )
+
+
+def _rougher(piece: _Piece) -> float:
+    """Return the integral of L by the polynomials through every second point, which errs more."""
+    from numpy.polynomial import legendre
+
+    count = piece.nodes.times.shape[1]
+    points = legendre.leggauss(count)[0]
+    chosen = np.arange(0, count, 2)
+    powers = legendre.legvander(points[chosen], len(chosen) - 1)
+    whole = np.zeros(len(chosen))
+    whole[0] = 2.0  # the integral of each Legendre polynomial
+    weights = np.linalg.solve(powers.T, whole)
+    values = piece.values.reshape(-1, count)[:, chosen]
+    return float(np.sum(0.5 * np.diff(piece.nodes.edges) * (values @ weights)))

@@ -1,0 +1,242 @@
+"""One coordinate and its momentum on a level of H: turning points, the integral of p, and the time, by quadrature.
+
+Where H is quadratic in p, ``H = A p^2 + B p + C``, the momentum at the energy E is ``(-B +- sqrt(D))/(2 A)`` with
+``D = B^2 - 4 A (C - E)``, and ``dp/dE = +-1/sqrt(D)`` is the time (Landau and Lifshitz, Mechanics, section 49). With
+``q = m - r cos(x)`` between the turning points both integrands are smooth and periodic in x, so that the rule of
+equal steps converges faster than any power.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import SolveError, UnsupportedError
+from atwood.late import dataclass
+
+__all__ = ["Level", "level_through"]
+
+Energy = Callable[[FloatArray, FloatArray], FloatArray]
+"""H of arrays of q and p."""
+
+_FIRST, _STEEPER, _FARTHEST, _LONGEST = 1e-3, 1.05, 1e6, 0.01
+"""Turning points are sought in steps that begin with this share of a size and grow so, up to so many sizes.
+
+Where the coordinate has a period, no step is longer than the last share of it.
+"""
+
+_POINTS, _MOST, _SAME, _NOISE = 16, 2**15, 3e-14, 2e-14
+"""Points at first and at most; the share that halved steps may change, and its part that goes with cancellation."""
+
+_QUADRATIC = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """The closed curve of a coordinate and its momentum on a level of H.
+
+    Attributes
+    ----------
+    kind
+        ``"libration"`` between two turning points, or ``"rotation"``, through all of a periodic coordinate.
+    energy
+        E, J.
+    ends
+        The turning points, or the begin and the end of the period.
+    action
+        The integral of p dq over one turn, J s.
+    period
+        The derivative of that by E, s.
+    """
+
+    kind: str
+    energy: float
+    ends: tuple[float, float]
+    action: float
+    period: float
+    _coefficients: Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+
+    def momentum(self, q: FloatArray, sign: float = 1.0) -> FloatArray:
+        """Return the momentum at places, on the branch where the coordinate rises (1) or falls (-1); nan beyond."""
+        a, b, c = self._coefficients(np.asarray(q, dtype=float))
+        with np.errstate(invalid="ignore"):
+            root = np.sqrt(b * b - 4.0 * a * (c - self.energy))
+        return np.asarray((-b + np.sign(sign) * np.sign(a) * root) / (2.0 * a))
+
+    def time_to(self, q: float) -> float:
+        """Return the time from the first of the ends to a place, on the branch where the coordinate rises, s."""
+        low, high = self.ends
+        points, weights = np.polynomial.legendre.leggauss(200)
+        if self.kind == "rotation":
+            places = low + 0.5 * (q - low) * (1.0 + points)
+            return float(0.5 * (q - low) * np.sum(weights / self._root(places)))
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        x = 0.5 * np.arccos(np.clip((middle - q) / half, -1.0, 1.0)) * (1.0 + points)
+        if not x[-1] > 0.0:
+            return 0.0
+        width = 0.5 * np.arccos(np.clip((middle - q) / half, -1.0, 1.0))
+        return float(width * np.sum(weights * half * np.sin(x) / self._root(middle - half * np.cos(x))))
+
+    def _root(self, q: FloatArray) -> FloatArray:
+        a, b, c = self._coefficients(q)
+        return np.asarray(np.sqrt(np.abs(b * b - 4.0 * a * (c - self.energy))))
+
+
+def level_through(
+    energy: Energy, q: float, p: float, size: float, turn: float | None = None, name: str = "it"
+) -> Level:
+    """Return the level of H through a state of one coordinate and its momentum.
+
+    Parameters
+    ----------
+    energy
+        H, of arrays.
+    q, p
+        The state.
+    size
+        How large q is.
+    turn
+        The period of the coordinate, if it may be one.
+    name
+        What is spoken of in errors.
+
+    Raises
+    ------
+    UnsupportedError
+        If H is not quadratic in p.
+    SolveError
+        If the motion has no end within reach, is at rest, or takes for ever.
+    """
+    total = float(energy(np.array([q]), np.array([p]))[0])
+    unit = _unit(energy, q, p, total)
+
+    def coefficients(places: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        up, none, down = (energy(places, np.full(places.shape, k * unit)) for k in (1.0, 0.0, -1.0))
+        return (up + down - 2.0 * none) / (2.0 * unit**2), (up - down) / (2.0 * unit), none
+
+    a, b, c = coefficients(np.array([q]))
+    twice = float(energy(np.array([q]), np.array([2.0 * unit]))[0])
+    there = float((a * 4.0 * unit**2 + 2.0 * b * unit + c)[0])
+    if not abs(twice - there) <= _QUADRATIC * (abs(twice) + abs(there) + abs(total)):
+        raise UnsupportedError(
+            f"H of {name} is not quadratic in the momentum",
+            where=name,
+            advice="Its motion has a period all the same: `simulate` with a condition finds it.",
+        )
+
+    def discriminant(place: float) -> float:
+        a, b, c = (float(one[0]) for one in coefficients(np.array([place])))
+        return b * b - 4.0 * a * (c - total)
+
+    ends = [_turning_point(discriminant, q, sign, size, turn) for sign in (-1.0, 1.0)]
+    if ends[0] is not None and ends[1] is not None:
+        kind, low, high = "libration", ends[0], ends[1]
+        if not high - low > 1e-7 * size:
+            raise SolveError(f"{name} is at rest there", where=name, advice="Take a start with more energy.")
+    elif turn is not None and ends[0] is None and ends[1] is None:
+        kind, low, high = "rotation", q, q + turn
+    else:
+        raise SolveError(f"{name} comes back to no turning point: its motion has no period", where=name)
+    action, period = _integrals(coefficients, total, kind, low, high, name)
+    return Level(kind, total, (low, high), action, period, coefficients)
+
+
+def _unit(energy: Energy, q: float, p: float, total: float) -> float:
+    """Return a momentum with which the terms of H are as large as H."""
+    unit = abs(p) or 1.0
+    for _ in range(8):
+        up, none, down = (float(energy(np.array([q]), np.array([k * unit]))[0]) for k in (1.0, 0.0, -1.0))
+        kinetic = 0.5 * abs(up + down - 2.0 * none)
+        wanted = max(abs(total), abs(none), 1e-300)
+        if 0.1 * wanted <= kinetic <= 10.0 * wanted or not kinetic > 0.0 or not np.isfinite(kinetic):
+            break
+        unit *= float(np.sqrt(wanted / kinetic))
+    return unit
+
+
+def _turning_point(
+    discriminant: Callable[[float], float], q: float, sign: float, size: float, turn: float | None
+) -> float | None:
+    """Return where the discriminant comes to zero first, on one side; None where it does not."""
+    from scipy.optimize import brentq
+
+    step = _FIRST * size
+    places, values = [q], [discriminant(q)]
+    if values[0] <= 0.0:  # at a turning point itself: is the motion on this side?
+        step = _way_inside(discriminant, q, sign, step)
+        if step == 0.0:
+            return q
+        places, values = [q + sign * step], [discriminant(q + sign * step)]
+    farthest = turn if turn is not None else _FARTHEST * size
+    longest = np.inf if turn is None else _LONGEST * turn
+    while abs(places[-1] - q) < farthest:
+        places.append(places[-1] + sign * step)
+        values.append(discriminant(places[-1]))
+        if not np.isfinite(values[-1]):
+            return None
+        if not values[-1] > 0.0:
+            return float(brentq(discriminant, places[-2], places[-1], xtol=1e-15 * size, rtol=1e-15))
+        if len(values) > 2 and values[-2] < min(values[-1], values[-3]):  # it may dip below zero between two steps
+            lowest = _lowest(discriminant, places[-3], places[-1])
+            if not discriminant(lowest) > 0.0:
+                return float(brentq(discriminant, places[-3], lowest, xtol=1e-15 * size, rtol=1e-15))
+        step = min(step * _STEEPER, longest)
+    return None
+
+
+def _lowest(discriminant: Callable[[float], float], one: float, other: float) -> float:
+    from scipy.optimize import minimize_scalar
+
+    bounds = (min(one, other), max(one, other))
+    return float(minimize_scalar(discriminant, bounds=bounds, method="bounded", options={"xatol": 1e-12}).x)
+
+
+def _way_inside(discriminant: Callable[[float], float], q: float, sign: float, step: float) -> float:
+    """Return a small way from a turning point to where the motion is; zero if it is not on that side."""
+    for _ in range(20):
+        if discriminant(q + sign * step) > 0.0:
+            return step
+        step *= 0.5
+    return 0.0
+
+
+def _integrals(
+    coefficients: Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]],
+    total: float,
+    kind: str,
+    low: float,
+    high: float,
+    name: str,
+) -> tuple[float, float]:
+    """Return the integral of p over one turn, and of dp/dE, by equal steps that are halved until nothing changes."""
+    before: tuple[float, float] | None = None
+    count = _POINTS
+    while count <= _MOST:
+        x = np.pi * (np.arange(count) + 0.5) / count
+        if kind == "libration":
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            places, weights = middle - half * np.cos(x), half * np.sin(x) * np.pi / count
+        else:
+            places, weights = low + (high - low) * x / np.pi, np.full(count, (high - low) / count)
+        a, b, c = coefficients(places)
+        root = np.sqrt(np.abs(b * b - 4.0 * a * (c - total)))
+        if kind == "libration":
+            found = float(np.sum(weights * root / np.abs(a))), float(2.0 * np.sum(weights / root))
+        else:
+            found = float(np.sum(weights * (root - b) / (2.0 * np.abs(a)))), float(np.sum(weights / root))
+        # Where H is far larger than what the motion exchanges, less is known of the difference.
+        lost = float(np.max(np.abs(c)) + abs(total)) / max(float(np.max(np.abs(c - total))), 1e-300)
+        same = _SAME + _NOISE * lost
+        if before is not None and all(abs(n - o) <= same * abs(n) for n, o in zip(found, before, strict=True)):
+            return found
+        before, count = found, 2 * count
+    assert before is not None
+    if all(abs(now - then) <= 1e-9 * abs(now) for now, then in zip(found, before, strict=True)):
+        return found
+    raise SolveError(
+        f"{name} takes for ever to come back: its energy is that of a separatrix",
+        where=name,
+        advice="Take a start with a little more or less energy.",
+    )

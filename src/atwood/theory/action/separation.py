@@ -1,0 +1,324 @@
+"""`separation`: whether the equation of Hamilton and Jacobi separates in given coordinates, and its quadratures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from atwood.analysis.formulas.objects import Sympy
+from atwood.analysis.hamiltonian import Hamiltonian
+from atwood.arguments import ANYTHING, instance, optional, takes
+from atwood.arrays import FloatArray
+from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
+from atwood.model.compose.composite import Model
+from atwood.theory.action.quadrature import Level, level_through
+from atwood.theory.hamiltonian import hamiltonian
+
+__all__ = ["SeparatedMotion", "Separation", "separation"]
+
+_STATES, _TRIALS = 6, 200
+"""So many random states at which H is real are enough, among so many."""
+
+_DIGITS, _ZERO = 40, 1e-12
+"""Conditions are evaluated with so many digits, and hold where their terms cancel to the second.
+
+Parameters are known to 16 digits: a condition that holds by a relation between their values holds to these.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class SeparatedMotion:
+    """The motion of one coordinate of those in which H separates.
+
+    Attributes
+    ----------
+    coordinate
+        Its name.
+    kind
+        ``"libration"`` between two turning points, or ``"rotation"``.
+    ends
+        The turning points, or the begin and the end of the coordinate's period.
+    action
+        The action variable ``J_i``, the integral of ``p_i dq_i`` over one turn of this coordinate, J s.
+    """
+
+    coordinate: str
+    kind: str
+    ends: tuple[float, float]
+    action: float
+    _level: Level
+
+    def momentum(self, q: Any, sign: float = 1.0) -> FloatArray:
+        """Return ``p_i = dW_i/dq_i`` at values of the coordinate; nan where the motion does not come to.
+
+        Parameters
+        ----------
+        q
+            Values of the coordinate.
+        sign
+            1 for the branch on which it rises, -1 for that on which it falls.
+        """
+        return self._level.momentum(np.asarray(q, dtype=float), sign)
+
+    def __repr__(self) -> str:
+        low, high = self.ends
+        return f"<SeparatedMotion of {self.coordinate}: {self.kind}, {low:.6g} to {high:.6g}, J = {self.action:.9g}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """Whether H separates in some coordinates, by the conditions of Levi-Civita.
+
+    The equation ``H(q, dW/dq) = E`` has a complete integral ``W = sum of W_i(q_i)`` if and only if, for each two
+    different i and j,
+
+        H_pi H_pj H_qiqj - H_pi H_qj H_qipj - H_qi H_pj H_piqj + H_qi H_qj H_pipj = 0
+
+    (Levi-Civita, Mathematische Annalen 59, 1904; Landau and Lifshitz, Mechanics, section 48).
+
+    Attributes
+    ----------
+    name
+        The scene.
+    coordinates, momenta
+        sympy symbols.
+    expression
+        H of these.
+    values
+        The value of each parameter's symbol.
+    separates
+        Whether all conditions hold at random states, with 40 digits.
+    worst
+        The two coordinates whose condition holds least, and by which share of its terms it is missed.
+    """
+
+    name: str
+    coordinates: tuple[Sympy, ...]
+    momenta: tuple[Sympy, ...]
+    expression: Sympy
+    values: Mapping[Sympy, float]
+    separates: bool
+    worst: tuple[str, str, float]
+
+    @property
+    def sentence(self) -> str:
+        """The answer in words, and how it was found."""
+        names = ", ".join(map(str, self.coordinates))
+        if len(self.coordinates) == 1:
+            return f"{self.name} has one coordinate, {names}, and separates."
+        if self.separates:
+            return (
+                f"{self.name} separates in {names}: Levi-Civita's conditions hold at {_STATES} random states, to "
+                f"{_DIGITS} digits."
+            )
+        one, other, miss = self.worst
+        return f"{self.name} does not separate in {names}: the condition of {one} and {other} is missed by {miss:.2g}."
+
+    def motion(
+        self, coordinate: str, q: Sequence[float], p: Sequence[float], turn: float | None = None
+    ) -> SeparatedMotion:
+        """Return the separated motion of one coordinate through a state: turning points and action variable.
+
+        ``W_i' = p_i(q_i)`` is what H = E gives while the other coordinates and their momenta stay as they are in the
+        state: where H separates, all their values on the same motion give the same.
+
+        Parameters
+        ----------
+        coordinate
+            Its name.
+        q, p
+            A state in the coordinates of the separation.
+        turn
+            The period of the coordinate, such as 2 pi, if it may go round.
+
+        Raises
+        ------
+        UsageError
+            If there is no such coordinate, or H does not separate.
+        SolveError
+            If its motion has no period.
+        """
+        names = [str(one) for one in self.coordinates]
+        if coordinate not in names:
+            raise UsageError("it is none of the coordinates", where=coordinate, advice=suggestion(coordinate, names))
+        if not self.separates:
+            raise UsageError(self.sentence, where=self.name)
+        here, momenta, i = np.array(q, dtype=float), np.array(p, dtype=float), names.index(coordinate)
+        if here.shape != (len(names),) or momenta.shape != here.shape:
+            raise UsageError(f"a state has {len(names)} coordinates and momenta", where=self.name)
+
+        def energy(places: FloatArray, along: FloatArray) -> FloatArray:
+            others = [np.full(places.shape, one) for one in (*here, *momenta)]
+            others[i], others[len(names) + i] = places, along
+            return np.broadcast_to(np.asarray(self._function(*others), dtype=float), places.shape)
+
+        size = max(abs(here[i]), 0.1)
+        found = level_through(energy, float(here[i]), float(momenta[i]), size, turn, coordinate)
+        return SeparatedMotion(coordinate, found.kind, found.ends, found.action, found)
+
+    def momentum_squared(self, coordinate: str) -> Sympy:
+        """Return ``p_i^2`` of a coordinate as H = E gives it, where H has no term linear in that momentum.
+
+        In it E is the energy; the other coordinates and momenta stand for constants of the motion.
+
+        Raises
+        ------
+        UnsupportedError
+            If H is not of this kind.
+        """
+        import sympy
+
+        names = [str(one) for one in self.coordinates]
+        if coordinate not in names:
+            raise UsageError("it is none of the coordinates", where=coordinate, advice=suggestion(coordinate, names))
+        p = self.momenta[names.index(coordinate)]
+        second = self.expression.diff(p, 2)
+        if second.has(p) or self.expression.diff(p).subs(p, 0).expand() != 0:
+            raise UnsupportedError("H has more than its square in this momentum", where=coordinate)
+        return 2 * (sympy.Symbol("E") - self.expression.subs(p, 0)) / second
+
+    @cached_property
+    def _function(self) -> Any:
+        import sympy
+
+        made = self.expression.subs(self.values)
+        return sympy.lambdify((*self.coordinates, *self.momenta), made, "numpy")
+
+    def __repr__(self) -> str:
+        return f"<Separation: {self.sentence}>"
+
+
+@takes(
+    scene=instance("a scene, an assembly of one, or a Hamiltonian", Model, Assembly, Hamiltonian),
+    coordinates=optional(ANYTHING),
+)
+def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, Any] | None = None) -> Separation:
+    """Return whether the equation of Hamilton and Jacobi of a scene separates in given coordinates.
+
+    Parameters
+    ----------
+    scene
+        The scene, or its Hamiltonian.
+    coordinates
+        The scene's coordinates, by their paths, as text or sympy expressions of others, which are those that are asked
+        about: ``{"body.position.x": "r*cos(phi)", "body.position.z": "r*sin(phi)"}``. If not given, the scene's own.
+
+    Returns
+    -------
+    Separation
+        The answer; where it is yes, turning points and action variables of each coordinate.
+
+    Raises
+    ------
+    UsageError
+        If coordinates are missing, or there are more or fewer of the others.
+    UnsupportedError
+        If the scene has no Hamiltonian, none that is short enough to be written down, or one that depends on time.
+    """
+    import sympy
+
+    h = scene if isinstance(scene, Hamiltonian) else hamiltonian(scene)
+    if h.depends_on_time:
+        raise UnsupportedError("H depends on time", where=h.name)
+    old = dict(zip(h.paths, zip(h.coordinates, h.momenta, strict=True), strict=True))
+    if coordinates is None:
+        plain = [(sympy.Symbol(q.func.__name__), sympy.Symbol(p.func.__name__)) for q, p in old.values()]
+        places = {path: q for path, (q, _) in zip(old, plain, strict=True)}
+    else:
+        places = _read(coordinates, list(old), h.name)
+    named = {symbol for one in places.values() for symbol in one.free_symbols} - set(h.values)
+    new = tuple(sorted(named, key=str))
+    if len(new) != len(old):
+        raise UsageError(
+            f"its {len(old)} coordinates are given by {len(new)} others: {', '.join(map(str, new))}", where=h.name
+        )
+    momenta = tuple(sympy.Symbol(f"p_{one}") for one in new)
+    jacobian = sympy.Matrix([[places[path].diff(one) for one in new] for path in old])
+    along = jacobian.T.LUsolve(sympy.Matrix(momenta))
+    by = {q: places[path] for path, (q, _) in old.items()}
+    by |= {p: along[k] for k, (_, p) in enumerate(old.values())}
+    made = h.expression.xreplace(by)
+    made = sympy.trigsimp(made) if made.count_ops() < 150 else made
+    worst = _worst(made, new, momenta, h.values, h.name)
+    return Separation(h.name, new, momenta, made, h.values, worst[2] <= _ZERO, worst)
+
+
+def _read(given: Any, paths: list[str], where: str) -> dict[str, Sympy]:
+    import sympy
+
+    if not isinstance(given, Mapping):
+        raise UsageError("coordinates are a dictionary by path", where=where)
+    for path in given:
+        if path not in paths:
+            raise UsageError(f"{path!r} is no coordinate of it", where=where, advice=suggestion(path, paths))
+    missing = [path for path in paths if path not in given]
+    if missing:
+        raise UsageError(f"the coordinates leave out {', '.join(missing)}", where=where)
+    try:
+        return {path: sympy.sympify(given[path]) for path in paths}
+    except (sympy.SympifyError, TypeError) as error:
+        raise UsageError(f"a coordinate is no expression: {error}", where=where) from None
+
+
+def _worst(
+    h: Sympy, q: Sequence[Sympy], p: Sequence[Sympy], values: Mapping[Sympy, float], where: str
+) -> tuple[str, str, float]:
+    """Return by how much Levi-Civita's conditions are missed at random states, relative to their terms."""
+    import sympy
+
+    exact = h.subs({symbol: sympy.Float(value, _DIGITS) for symbol, value in values.items()})
+    by_q, by_p = [exact.diff(one) for one in q], [exact.diff(one) for one in p]
+    worst = (str(q[0]), str(q[0]), 0.0)
+    if len(q) == 1:
+        return worst
+    states = _states(sympy.lambdify((*q, *p), [exact, *by_q, *by_p], "mpmath"), len(q), where)
+    for i in range(len(q)):
+        for j in range(i):
+            seconds = [by_q[i].diff(q[j]), by_q[i].diff(p[j]), by_p[i].diff(q[j]), by_p[i].diff(p[j])]
+            evaluate = sympy.lambdify((*q, *p), seconds, "mpmath")
+            for state, (_, *slopes) in states:
+                qq, qp, pq, pp = _evaluated(evaluate, state) or [0] * 4
+                hq, hp = slopes[: len(q)], slopes[len(q) :]
+                terms = (hp[i] * hp[j] * qq, -hp[i] * hq[j] * qp, -hq[i] * hp[j] * pq, hq[i] * hq[j] * pp)
+                size = sum(abs(one) for one in terms)
+                miss = float(abs(sum(terms)) / size) if size else 0.0
+                if miss > worst[2]:
+                    worst = (str(q[j]), str(q[i]), miss)
+            if worst[2] > _ZERO:
+                return worst
+    return worst
+
+
+def _states(evaluate: Any, n: int, where: str) -> list[tuple[list[Sympy], list[Any]]]:
+    """Return random states at which H is real, with H and its derivatives there."""
+    import sympy
+
+    random = np.random.default_rng(3)
+    found: list[tuple[list[Sympy], list[Any]]] = []
+    for _ in range(_TRIALS):
+        state = [sympy.Rational(int(k), 10**6) for k in random.integers(2 * 10**5, 18 * 10**5, 2 * n)]
+        values = _evaluated(evaluate, state)
+        if values is not None:
+            found.append((state, values))
+        if len(found) == _STATES:
+            return found
+    raise UnsupportedError("H is real at too few random states to be looked at", where=where)
+
+
+def _evaluated(evaluate: Any, state: Sequence[Sympy]) -> list[Any] | None:
+    """Return real values with many digits, None where there are none."""
+    import mpmath  # type: ignore[import-untyped]
+
+    with mpmath.workdps(_DIGITS):
+        try:
+            found = evaluate(*[mpmath.mpf(one.p) / one.q for one in state])
+        except (ZeroDivisionError, ValueError, TypeError, ArithmeticError):
+            return None
+        values = [one if isinstance(one, mpmath.mpf) else mpmath.mpmathify(one) for one in found]
+        finite = all(isinstance(one, mpmath.mpf) and mpmath.isfinite(one) for one in values)
+        return values if finite else None

@@ -1,0 +1,149 @@
+"""The theory of Hamilton and Jacobi: separation, and action and angle variables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import ellipe, ellipk
+
+from atwood import SolveError, UsageError, action_angle, hamiltonian, separation
+from atwood_library.scenes import (
+    DoublePendulum,
+    DrivenPendulum,
+    Kepler,
+    LagrangeTop,
+    NBody,
+    RotatingHoopDriven,
+    SimplePendulum,
+    SphericalPendulum,
+)
+
+POLAR = {"body.position.x": "r*cos(phi)", "body.position.z": "r*sin(phi)"}
+PARABOLIC = {"body.position.x": "xi*eta", "body.position.z": "(xi**2 - eta**2)/2"}
+
+
+def test_kepler_separates_in_polar_and_parabolic_coordinates():
+    scene = Kepler(eccentricity=0.5)
+    assert not separation(scene).separates
+    assert separation(scene, POLAR).separates
+    assert separation(scene, PARABOLIC).separates
+    assert not separation(scene, {"body.position.x": "a*b", "body.position.z": "a + b"}).separates
+
+
+def test_three_bodies_do_not_separate():
+    found = separation(NBody())
+    assert not found.separates
+    assert "does not separate" in found.sentence
+
+
+def test_other_scenes():
+    assert separation(SphericalPendulum(coordinates="angles")).separates
+    assert separation(LagrangeTop()).separates
+    assert not separation(DoublePendulum()).separates
+    assert separation(SimplePendulum()).separates
+
+
+def test_action_variables_of_the_planet():
+    """``E = -2 pi^2 m k^2/(J_r + J_phi)^2`` (Goldstein, equation 10.139), and the radial action itself."""
+    found = separation(Kepler(eccentricity=0.5), POLAR)
+    assert [str(one) for one in found.coordinates] == ["phi", "r"]
+    q, p = [0.0, 0.5], [0.5 * np.sqrt(3.0), 0.0]
+    radial, around = found.motion("r", q, p), found.motion("phi", q, p, turn=2.0 * np.pi)
+    assert (radial.kind, around.kind) == ("libration", "rotation")
+    np.testing.assert_allclose(radial.ends, [0.5, 1.5], rtol=1e-12)
+    assert around.action == pytest.approx(np.pi * np.sqrt(3.0), rel=1e-13)
+    assert radial.action + around.action == pytest.approx(2.0 * np.pi, rel=1e-12)
+    # The same from another state of the same orbit, and the momentum that the quadrature is of.
+    momentum = float(radial.momentum(1.2))
+    other = found.motion("r", [2.0, 1.2], [0.5 * np.sqrt(3.0), momentum])
+    assert other.action == pytest.approx(radial.action, rel=1e-11)
+    h = hamiltonian(Kepler(eccentricity=0.5))
+    assert float(h([0.5, 0.0], [0.0, np.sqrt(3.0)])) == pytest.approx(
+        0.5 * (momentum**2 + 0.75 / 1.44) - 1.0 / 1.2, rel=1e-12
+    )
+
+
+def test_parabolic_action_variables_of_the_planet():
+    """A turn of xi and of eta is two of the orbit, since a place has two pairs of them."""
+    found = separation(Kepler(eccentricity=0.5), PARABOLIC)
+    xi = eta = np.sqrt(0.5)
+    p_x, p_z = 0.0, np.sqrt(3.0)
+    q, p = [eta, xi], [p_x * xi - p_z * eta, p_x * eta + p_z * xi]
+    total = sum(found.motion(name, q, p).action for name in ("xi", "eta"))
+    assert total == pytest.approx(2.0 * 2.0 * np.pi, rel=1e-11)
+
+
+def test_the_separated_momentum_in_symbols():
+    import sympy
+
+    found = separation(Kepler(eccentricity=0.5), POLAR)
+    made = found.momentum_squared("r").subs(found.values)
+    there = made.subs({"E": -0.5, "p_phi": 0.5 * sympy.sqrt(3)})
+    assert abs(float(there.subs({"r": 0.5}))) < 1e-14
+    assert float(there.subs({"r": 1.0})) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("amplitude", [0.5, 1.0, 2.5, 3.1])
+def test_the_pendulum_that_swings(amplitude):
+    """``T = 4 K(k)/w`` and ``J = 16 w (E(k) - (1 - k^2) K(k))`` with ``k = sin(amplitude/2)`` for m = l = 1."""
+    found = action_angle(SimplePendulum(release_angle=amplitude))
+    w, square = np.sqrt(9.81), np.sin(amplitude / 2.0) ** 2
+    assert found.kind == "libration"
+    assert found.period == pytest.approx(4.0 * ellipk(square) / w, rel=1e-9)
+    assert found.action == pytest.approx(16.0 * w * (ellipe(square) - (1.0 - square) * ellipk(square)), rel=1e-12)
+    np.testing.assert_allclose(found.turning_points, [-amplitude, amplitude], rtol=1e-12)
+
+
+def test_the_pendulum_that_goes_round():
+    scene = SimplePendulum(release_angle=0.3)
+    scene.start["rod.angular_velocity"] = 9.0
+    found = action_angle(scene)
+    energy = 40.5 - 9.81 * np.cos(0.3)
+    square = 2.0 * 9.81 / (energy + 9.81)
+    assert found.kind == "rotation"
+    assert found.turning_points is None
+    assert found.period == pytest.approx(2.0 * np.sqrt(2.0 / (energy + 9.81)) * ellipk(square), rel=1e-12)
+
+
+def test_the_frequency_is_the_derivative_of_h_by_j():
+    levels = [action_angle(SimplePendulum(release_angle=1.0 + step)) for step in (-1e-3, 0.0, 1e-3)]
+    slope = (levels[2].energy - levels[0].energy) / (levels[2].action - levels[0].action)
+    assert levels[1].frequency == pytest.approx(slope, rel=1e-6)
+
+
+def test_the_angle_rises_evenly_in_time():
+    from atwood import simulate
+
+    scene = SimplePendulum(release_angle=1.0)
+    found = action_angle(scene)
+    times = np.linspace(0.0, 0.95 * found.period, 12)
+    run = simulate(scene, t_end=float(times[-1]), rtol=1e-12, outputs=times)
+    angles = [found.angle(q, v) for q, v in zip(run["rod.angle"], run["rod.angular_velocity"], strict=True)]
+    np.testing.assert_allclose((np.array(angles) - 0.5) % 1.0, times / found.period, atol=1e-6)
+
+
+def test_a_hoop_that_is_driven_has_action_and_angle():
+    """H is conserved and not the energy; the bead swings about its place of rest at the side."""
+    found = action_angle(RotatingHoopDriven())
+    low, high = found.turning_points
+    assert low < np.arccos(-9.81 / 25.0) < high or low < -np.arccos(-9.81 / 25.0) < high
+
+
+def test_what_has_no_period_is_told():
+    with pytest.raises(SolveError, match="at rest"):
+        action_angle(SimplePendulum(release_angle=0.0))
+    with pytest.raises(SolveError):
+        action_angle(SimplePendulum(release_angle=np.pi))
+    with pytest.raises(UsageError, match="2 degrees of freedom"):
+        action_angle(DoublePendulum())
+    with pytest.raises(UsageError, match="no level of H that it stays on"):
+        action_angle(DrivenPendulum())
+
+
+def test_wrong_coordinates_are_named():
+    with pytest.raises(UsageError, match=r"leave out body\.position\.z"):
+        separation(Kepler(), {"body.position.x": "r"})
+    with pytest.raises(UsageError, match="2 coordinates are given by 3 others"):
+        separation(Kepler(), {"body.position.x": "a*b", "body.position.z": "c"})
+    with pytest.raises(UsageError, match="none of the coordinates"):
+        separation(Kepler(), POLAR).motion("x", [0.0, 1.0], [1.0, 0.0])
