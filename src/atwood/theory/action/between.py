@@ -221,7 +221,7 @@ def _guesses(miss: Any, target: FloatArray, shooter: Shooter, fastest: FloatArra
 
         def scaled(x: FloatArray) -> FloatArray:
             found = miss(x * fastest)
-            return found if np.all(np.isfinite(found)) else np.full(len(x), 1e3)
+            return np.where(np.all(np.isfinite(found)), found, 1e3)
 
         try:
             ended = root(scaled, begin / fastest, method="hybr", options={"xtol": 1e-14})

@@ -22,8 +22,8 @@ from atwood.pipeline import assembly_of, simulate
 from atwood.result.result import Result
 from atwood.result.work import joined_times
 from atwood.simulation.problem.arguments import RTOL, T_END, check_span
+from atwood.simulation.run.made import Run
 from atwood.simulation.run.retrace import run_again, times_of_steps
-from atwood.simulation.run.run import Run
 from atwood.theory.action.curves import Nodes, curves_at, panels
 
 __all__ = ["Action", "Variation", "action", "action_of_run"]

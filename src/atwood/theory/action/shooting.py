@@ -11,7 +11,7 @@ from atwood.forms.program import rates_are_speeds
 from atwood.integrators.explicit_session import open_explicit
 from atwood.integrators.protocol import SolverOptions, Status
 from atwood.simulation.problem.explicit_scene import explicit_problem
-from atwood.simulation.problem.problem import make_plan
+from atwood.simulation.problem.preparation import make_plan
 
 __all__ = ["Shooter", "refuse_tied"]
 
