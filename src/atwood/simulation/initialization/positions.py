@@ -23,7 +23,7 @@ from atwood.simulation.initialization.body_by_body import placed_in_turn
 from atwood.simulation.initialization.errors import Failed, explain_positions, far_from_guess, wrong_way_round
 from atwood.simulation.initialization.loop_closure import closest, places_around, units_of_rows
 from atwood.simulation.initialization.system import System, counted, newton
-from atwood.simulation.initialization.targets import Level, said
+from atwood.simulation.initialization.targets import Level, named_once, said
 from atwood.simulation.initialization.whole_turns import unwound
 from atwood.tolerances import tolerances
 
@@ -81,6 +81,10 @@ def solve_positions(
     every = [*level.guessed, *level.fixed]
     kinematic_map = kinematic_map_of(assembly, "regular")
     q, is_direct = said(equations.coordinates, every, start)
+    fixed = named_once(equations.coordinates, level.fixed)
+    if is_direct and fixed is not None and kinematic_map.is_plain and _is_open(equations):  # no iteration, no rank
+        free = (one.name for i, one in enumerate(equations.names[: equations.placing]) if i not in fixed)
+        return Positions(q, q.copy(), tuple(free), ())
     q = near_to = _turned(equations, kinematic_map, q)
     if not is_direct:
         system = System(assembly, equations, every, False)
@@ -107,6 +111,11 @@ def solve_positions(
     names = [one.name for one in equations.names[: equations.placing]]
     tangent = None if tangent is None else tangent[: equations.placing]
     return Positions(q, rough, *counted(names, tangent, level.fixed, system.constraints, matrix, errors))
+
+
+def _is_open(equations: Equations) -> bool:
+    """Return whether no constraint is left on positions."""
+    return not equations.forest.loop_joints and all(one.value is None for one in equations.constraints)
 
 
 def _without_states(assembly: Assembly, equations: Equations, level: Level, t: float) -> tuple[Level, FloatArray]:

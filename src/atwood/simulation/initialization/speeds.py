@@ -6,8 +6,10 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
 from atwood.linalg.matrices import scaled
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rank import certain, least_norm, row_scales
 from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.errors import contradicted, contradiction, freedom_at
@@ -40,6 +42,35 @@ def _least_rates(assembly: Assembly, level: Level, rows: FloatArray, length: flo
     return rate * certain(np.zeros_like(sizes), sizes)
 
 
+def _told(
+    assembly: Assembly, equations: Equations, level: Level
+) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]] | None:
+    """Return what `solve_speeds` does where all that is said is of speeds themselves, and nothing twice; else None."""
+    places = assembly.shared.get(_PLACES, lambda: _speeds_by_path(assembly, equations))
+    fixed = {places[one.path] for one in level.fixed if one.path in places}
+    if len(fixed) < len(level.fixed) or not all(one.path in places for one in level.guessed):
+        return None
+    u = np.zeros(len(equations.speeds))
+    for one in (*level.guessed, *level.fixed):
+        u[places[one.path]] = one.value
+    return u, tuple(name for i, name in enumerate(motion_names(equations)) if i not in fixed), ()
+
+
+_PLACES: Key[dict[str, int]] = Key("speeds by path")
+
+
+def _speeds_by_path(assembly: Assembly, equations: Equations) -> dict[str, int]:
+    """Return the numbers of speeds by the paths of quantities that are these speeds, or rates of their coordinates."""
+    observables = assembly.start_observables
+    speeds = {symbol: i for i, symbol in enumerate(equations.speeds)}
+    found = {path: speeds[one.value] for path, one in observables.items() if one.value in speeds}
+    if kinematic_map_of(assembly, "regular").is_plain:
+        coordinates = {symbol: i for i, symbol in enumerate(equations.coordinates[: equations.placing])}
+        shown = (one for one in observables.values() if one.rate and one.value in coordinates)
+        found |= {one.rate: coordinates[one.value] for one in shown}
+    return found
+
+
 def solve_speeds(
     assembly: Assembly, equations: Equations, level: Level, scales: FloatArray, length: float, t: float, q: FloatArray
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
@@ -64,6 +95,10 @@ def solve_speeds(
         If what is fixed contradicts itself or the constraints.
     """
     u, is_direct = said(equations.speeds, [*level.guessed, *level.fixed], np.zeros(len(equations.speeds)))
+    if not equations.constraints:
+        told = _told(assembly, equations, level)
+        if told is not None:  # no iteration, no rank
+            return told
     if level.guessed and not is_direct:
         rough = System(assembly, equations, level.guessed, False, of_speeds=True)
         residual, matrix = rough.at(t, q, u)
@@ -92,5 +127,4 @@ def solve_speeds(
             held = contradicted(equations, share[: system.constraints])
             raise contradiction(level.fixed, share[system.constraints :], freedom, held=held)
         matrix = scaled(matrix, scales)
-    names = motion_names(equations)
-    return u, *counted(names, None, level.fixed, system.constraints, matrix, errors)
+    return u, *counted(motion_names(equations), None, level.fixed, system.constraints, matrix, errors)

@@ -16,7 +16,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable
 from atwood.tolerances import tolerances
 
-__all__ = ["Level", "Target", "as_said", "find_level", "said", "sort_targets"]
+__all__ = ["Level", "Target", "as_said", "find_level", "named_once", "said", "sort_targets"]
 
 
 @dataclass(frozen=True)
@@ -157,3 +157,10 @@ def said(unknowns: Sequence[Expression], targets: Sequence[Target], otherwise: F
         else:
             is_direct = False
     return values, is_direct
+
+
+def named_once(unknowns: Sequence[Expression], fixed: Sequence[Target]) -> set[int] | None:
+    """Return which unknowns fixed values are of; None if one of these is of something else, or two are of one."""
+    places = {symbol: i for i, symbol in enumerate(unknowns)} if fixed else {}
+    found = {places[one.observable.value] for one in fixed if one.observable.value in places}
+    return found if len(found) == len(fixed) else None
