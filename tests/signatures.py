@@ -133,7 +133,9 @@ def _plain(annotation: Any) -> str:
 def _commands() -> Iterator[str]:
     from atwood.cli.app import main
 
-    for name, command in sorted(typing.cast(click.Group, main).commands.items()):
+    group = typing.cast(click.Group, main)
+    context = click.Context(group)
+    for name, command in ((one, group.get_command(context, one)) for one in group.list_commands(context)):
         context = click.Context(command)
         arguments = [one.make_metavar(context) for one in command.params if isinstance(one, click.Argument)]
         yield " ".join(["atwood", name, *arguments])

@@ -33,6 +33,7 @@ from atwood.result.result import Result
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
 from atwood.simulation.initialization.start import Start, find_start
 from atwood.simulation.problem.arguments import (
+    ACCURACY,
     ATOL,
     CONDITIONS,
     FORM,
@@ -50,6 +51,7 @@ from atwood.simulation.problem.arguments import (
     STRUCTURE,
     T_END,
     refuse_idle_settings,
+    refuse_two_accuracies,
 )
 from atwood.simulation.problem.conditions import Condition
 from atwood.simulation.problem.options import RunOptions
@@ -196,6 +198,7 @@ def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str |
     progress=PROGRESS,
     until=CONDITIONS,
     record=CONDITIONS,
+    accuracy=ACCURACY,
     monitor=MONITOR,
     **LIMITS,
 )
@@ -220,6 +223,7 @@ def simulate(
     progress: Callable[[float], object] | bool | None = None,
     until: Any = None,
     record: Any = None,
+    accuracy: float | None = None,
     monitor: Any = None,
 ) -> Result:
     """Simulate a scene from its start to its end.
@@ -270,6 +274,10 @@ def simulate(
         comparison that becomes true, or what passes zero; or a list of these. It stops at `t_end` at the latest.
     record
         The same, where the run goes on; `Result.events` has when. It changes nothing in the run.
+    accuracy
+        The largest error of the motion at the outputs, of positions relative to the extent of the scene, and of
+        angles, rad, such as 1e-8. The tolerance is chosen for it, in place of `rtol`, by a second solution; where it
+        cannot be met, as in chaos, a warning says what was reached and until when. See `Result.accuracy`.
     monitor
         What `atwood.conserved(scene)` returns: `Result.conserved` then has these quantities along the run, and by how
         much they drift.
@@ -292,6 +300,7 @@ def simulate(
     """
     clock = Clock(max_seconds)
     refuse_idle_settings(solver, order, step)
+    refuse_two_accuracies(accuracy, rtol, atol, step)
     with watching() as stopwatch:
         assembly = assembly_of(scene, form=form, level=level, orientation=orientation)
         flat = assembly.flat
@@ -316,8 +325,8 @@ def simulate(
                     *(Condition(one, "") for one in _listed(record)),
                 ),
             )
-            made = _solve(assembly, options, clock)
-    result = Result(replace(made, timings=stopwatch.in_order()))
+            made, second = _solve_to(accuracy, assembly, options, clock)
+    result = Result(replace(made, timings=stopwatch.in_order()), second=second)
     if monitor is not None and made.segments:
         result.conserved = monitor.along(result)
     return result
@@ -332,6 +341,16 @@ def _solve(assembly: Assembly, options: RunOptions, clock: Clock) -> Run:
         return run_out_of_time(assembly, None, options)
     with stage("integration"):
         return run(assembly, start, options, assembly.other_mode, clock)
+
+
+def _solve_to(accuracy: float | None, assembly: Assembly, options: RunOptions, clock: Clock) -> tuple[Run, Run | None]:
+    """Run an assembly, with tolerances for the accuracy that was asked for, if any; and the second solution, if any."""
+    if accuracy is None:
+        return _solve(assembly, options, clock), None
+    from atwood.result.accurate import accurate_run
+
+    by_ida = assembly.form == "dae" or bool(assembly.own_equations.constraints) or options.solver.startswith("ida")
+    return accurate_run(lambda given: _solve(assembly, given, clock), options, accuracy, by_ida)
 
 
 def _share(begin: float, end: float, t: float) -> tuple[float, str]:

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
 from atwood.cli.errors import FAILED, reporting_errors
+from atwood.cli.options import FILE, FORM, LEVEL, ORIENTATION, SCENE_HELP, SOLVER, scene_options
+from atwood.errors import near_matches
 from atwood.tolerances import tolerances
 
 __all__ = ["main"]
-
-F = TypeVar("F", bound=Callable[..., Any])
-
-_SCENE_HELP = """SCENE is the name of a scene of an installed library (see `atwood list`), or FILE.py:NAME, where NAME
-is a Scene class, a scene, or a function that returns one."""
 
 
 def _version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -29,8 +24,33 @@ def _version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
         ctx.exit()
 
 
+_THEORY = ("conserved", "equations", "equilibria", "linearize", "modes", "phase")
+"""Commands that are loaded when they are called, or listed."""
+
+
 class _Commands(click.Group):
     """Commands whose output may have no place to go to."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return their names."""
+        return sorted([*super().list_commands(ctx), *_THEORY])
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command that is called, or say which there are that are called nearly so."""
+        near = near_matches(args[0], self.list_commands(ctx))
+        if args[0] not in self.list_commands(ctx) and near:
+            ctx.fail(f"No such command {args[0]!r}. Did you mean {' or '.join(map(repr, near))}?")
+        return super().resolve_command(ctx, args)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a command by its name."""
+        if cmd_name not in _THEORY:
+            return super().get_command(ctx, cmd_name)
+        from atwood.cli.theory.commands import COMMANDS
+
+        return COMMANDS[cmd_name]
 
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run; standard output that is full, or closed, ends it with an exit code and no traceback."""
@@ -72,24 +92,6 @@ def main() -> None:
     """  # noqa: D301 - click reads the backspace, not the two letters
 
 
-def _scene_options(function: F) -> F:
-    """Add the scene, and what changes it."""
-    for option in (
-        click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output."),
-        click.option(
-            "--start", "starts", multiple=True, metavar="PATH=VALUE",
-            help="Start value, such as rod1.angle='30 deg'; =free lets one go that the scene fixes. Can be repeated.",
-        ),
-        click.option(
-            "--set", "settings", multiple=True, metavar="PATH=VALUE",
-            help="Parameter, such as rod1.length='30 cm'. Can be repeated.",
-        ),
-        click.argument("scene"),
-    ):  # fmt: skip
-        function = option(function)
-    return function
-
-
 @main.command("list", short_help="List the scenes of the installed libraries.")
 @click.option("--parts", is_flag=True, help="List the parts instead: bodies, joints, forces, sensors.")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output.")
@@ -106,19 +108,10 @@ def list_command(parts: bool, as_json: bool) -> None:
     list_scenes(as_json)
 
 
-_ORIENTATION = click.option(
-    "--orientation",
-    default="quaternion",
-    show_default=True,
-    metavar="NAME",
-    help="Coordinates of orientations in space: quaternion, or Euler angles such as euler-zyz.",
-)
-
-
-@main.command("info", short_help="Say what a scene is made of, before any run.", epilog=_SCENE_HELP)
-@_scene_options
+@main.command("info", short_help="Say what a scene is made of, before any run.", epilog=SCENE_HELP)
+@scene_options
 @click.option("--moved", is_flag=True, help="Show in full what the start moved from where it was guessed.")
-@_ORIENTATION
+@ORIENTATION
 @reporting_errors
 def info_command(
     scene: str, settings: tuple[str, ...], starts: tuple[str, ...], as_json: bool, moved: bool, orientation: str
@@ -138,19 +131,11 @@ def info_command(
     show_info(scene, settings, starts, as_json, moved, orientation)
 
 
-_FORM = click.Choice(["reduced", "dae"])
-_LEVEL = click.Choice(["ggl", "index1", "index1-projected"])
-_SOLVER = click.Choice(["auto", "ida", "ida-sundae", "explicit", "taylor", "gauss"])
-_FILE = click.Path(dir_okay=False, path_type=Path)
-
-
-@main.command("run", short_help="Simulate a scene.", epilog=_SCENE_HELP)
-@_scene_options
-@click.option("--form", type=_FORM, default="reduced", show_default=True, help="Constraints eliminated, or kept.")
-@click.option(
-    "--level", type=_LEVEL, default="ggl", show_default=True, help="Level of the constraints of the dae form."
-)
-@_ORIENTATION
+@main.command("run", short_help="Simulate a scene.", epilog=SCENE_HELP)
+@scene_options
+@click.option("--form", type=FORM, default="reduced", show_default=True, help="Constraints eliminated, or kept.")
+@click.option("--level", type=LEVEL, default="ggl", show_default=True, help="Level of the constraints of the dae form.")
+@ORIENTATION
 @click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
 @click.option(
     "--rtol", type=float, default=tolerances.RTOL, show_default=True, help="Relative tolerance of the solver."
@@ -158,7 +143,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--atol", type=float, help="Absolute tolerance, as a share of the scene's sizes; as --rtol if not given.")
 @click.option(
     "--solver",
-    type=_SOLVER,
+    type=SOLVER,
     default="auto",
     show_default=True,
     help="IDA with compiled equations, or through scikit-sundae with equations in Python; or an explicit method: "
@@ -178,14 +163,19 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
     help="Stop where a quantity passes a value, as 'rod1.angle crosses 30 deg' (or rises above, falls below).",
 )
 @click.option("--record", multiple=True, metavar="CONDITION", help="Note when that happens, and go on.")
+@click.option(
+    "--accuracy",
+    type=click.FloatRange(min=1e-15, max=0.1),
+    help="Largest error of the motion, of positions relative to the scene's extent and of angles; tolerances follow.",
+)
 @click.option("--conserved", is_flag=True, help="Show by how much what the scene conserves drifts along the run.")
 @click.option("--timings", is_flag=True, help="Show what each stage from the scene to the motion took.")
-@click.option("--plot", type=_FILE, help="Save a plot; the suffix says how (.png, .svg, .pdf).")
-@click.option("--draw", type=_FILE, help="Save a picture of the mechanism (.png, .svg, .pdf), or its motion (.gif).")
+@click.option("--plot", type=FILE, help="Save a plot; the suffix says how (.png, .svg, .pdf).")
+@click.option("--draw", type=FILE, help="Save a picture of the mechanism (.png, .svg, .pdf), or its motion (.gif).")
 @click.option(
     "--view", metavar="AZ,EL", help="From where a scene in space is drawn: azimuth and elevation, degrees.  [30,20]"
 )
-@click.option("--save", type=_FILE, help="Save all trajectories (.nc, .npz, .mat or .csv).")
+@click.option("--save", type=FILE, help="Save all trajectories (.nc, .npz, .mat or .csv).")
 @click.option("--progress/--no-progress", default=True, help="Show progress where there is a terminal.")
 @reporting_errors
 def run_command(scene: str, as_json: bool, **options: Any) -> None:
@@ -195,44 +185,8 @@ def run_command(scene: str, as_json: bool, **options: Any) -> None:
     run_scene(RunRequest(scene=scene, as_json=as_json, **options))
 
 
-@main.command("equations", short_help="Write the equations of motion of a scene.", epilog=_SCENE_HELP)
-@_scene_options
-@click.option("--form", type=_FORM, default="reduced", show_default=True, help="Constraints eliminated, or kept.")
-@_ORIENTATION
-@click.option("--values", is_flag=True, help="Put the values of parameters in place of their symbols.")
-@click.option("--latex", is_flag=True, help="Write the equations of motion in LaTeX.")
-@click.option("--markdown", is_flag=True, help="Write a page: symbols, energies, momenta, equations, matrices.")
-@click.option("--python", is_flag=True, help="Write a module of Python that computes them.")
-@click.option("--hamiltonian", is_flag=True, help="Write the Hamiltonian and the momenta instead.")
-@reporting_errors
-def equations_command(scene: str, as_json: bool, **options: Any) -> None:
-    """Write the equations of motion of SCENE: Lagrange's equations, with symbols as in a textbook.
-
-    In space, --orientation euler-zxz gives them in Euler angles; else angular velocities are in the axes of the body.
-    """
-    from atwood.cli.equations import EquationsRequest, show_equations
-
-    show_equations(EquationsRequest(scene=scene, as_json=as_json, **options))
-
-
-@main.command("conserved", short_help="List what a scene conserves, and how that is known.", epilog=_SCENE_HELP)
-@_scene_options
-@_ORIENTATION
-@reporting_errors
-def conserved_command(
-    scene: str, settings: tuple[str, ...], starts: tuple[str, ...], as_json: bool, orientation: str
-) -> None:
-    """List what is conserved along all motions of SCENE: momenta, energy function, boosts; proven or checked.
-
-    In space, --orientation euler-zxz gives momenta of Euler angles.
-    """
-    from atwood.cli.conserved import show_conserved
-
-    show_conserved(scene, settings, starts, as_json, orientation)
-
-
-@main.command("compare", short_help="Compare what each form costs for which error.", epilog=_SCENE_HELP)
-@_scene_options
+@main.command("compare", short_help="Compare what each form costs for which error.", epilog=SCENE_HELP)
+@scene_options
 @click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
 @click.option(
     "--rtol", "rtols", type=float, multiple=True, help="Relative tolerance; can be repeated.  [default: 1e-4 to 1e-10]"
@@ -240,7 +194,7 @@ def conserved_command(
 @click.option(
     "--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Give up a run after so many seconds."
 )
-@click.option("--plot", type=_FILE, help="Save a work-precision diagram; the suffix says how (.png, .svg, .pdf).")
+@click.option("--plot", type=FILE, help="Save a work-precision diagram; the suffix says how (.png, .svg, .pdf).")
 @click.option("--progress/--no-progress", default=True, help="Show progress where there is a terminal.")
 @reporting_errors
 def compare_command(scene: str, as_json: bool, **options: Any) -> None:
@@ -250,8 +204,8 @@ def compare_command(scene: str, as_json: bool, **options: Any) -> None:
     compare_scene(CompareRequest(scene=scene, as_json=as_json, **options))
 
 
-@main.command("sweep", short_help="Simulate a scene with many parameters and starts.", epilog=_SCENE_HELP)
-@_scene_options
+@main.command("sweep", short_help="Simulate a scene with many parameters and starts.", epilog=SCENE_HELP)
+@scene_options
 @click.option(
     "--vary",
     multiple=True,
@@ -278,23 +232,21 @@ def compare_command(scene: str, as_json: bool, **options: Any) -> None:
     metavar="PATH",
     help="What to keep, such as bob2.position.x; the coordinates if not given. Can be repeated.",
 )
-@click.option("--form", type=_FORM, default="reduced", show_default=True, help="Constraints eliminated, or kept.")
-@click.option(
-    "--level", type=_LEVEL, default="ggl", show_default=True, help="Level of the constraints of the dae form."
-)
+@click.option("--form", type=FORM, default="reduced", show_default=True, help="Constraints eliminated, or kept.")
+@click.option("--level", type=LEVEL, default="ggl", show_default=True, help="Level of the constraints of the dae form.")
 @click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
 @click.option(
     "--rtol", type=float, default=tolerances.RTOL, show_default=True, help="Relative tolerance of the solver."
 )
-@click.option("--solver", type=_SOLVER, default="auto", show_default=True, help="As for `atwood run`.")
+@click.option("--solver", type=SOLVER, default="auto", show_default=True, help="As for `atwood run`.")
 @click.option("--outputs", type=click.IntRange(min=2), help="Number of output times; the end alone if not given.")
 @click.option("--max-steps", type=click.IntRange(min=1), help="Stop a run after so many steps.")
 @click.option("--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop a run after so many seconds.")
 @click.option(
     "--threads", type=click.IntRange(min=1), help="How many threads share the runs.  [default: all processors]"
 )
-@click.option("--plot", type=_FILE, help="Save a picture of the ends; the suffix says how (.png, .svg, .pdf).")
-@click.option("--save", type=_FILE, help="Save all quantities of all runs (.nc, .npz, .mat, .csv or .json).")
+@click.option("--plot", type=FILE, help="Save a picture of the ends; the suffix says how (.png, .svg, .pdf).")
+@click.option("--save", type=FILE, help="Save all quantities of all runs (.nc, .npz, .mat, .csv or .json).")
 @click.option("--progress/--no-progress", default=True, help="Show progress where there is a terminal.")
 @reporting_errors
 def sweep_command(scene: str, as_json: bool, **options: Any) -> None:
@@ -302,85 +254,6 @@ def sweep_command(scene: str, as_json: bool, **options: Any) -> None:
     from atwood.cli.sweeping import SweepRequest, sweep_scene
 
     sweep_scene(SweepRequest(scene=scene, as_json=as_json, **options))
-
-
-def _state_options(function: F) -> F:
-    """Add the scene, its parameters, and the state about which it is looked at."""
-    for option in (
-        click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output."),
-        click.option(
-            "--at", multiple=True, metavar="PATH=VALUE",
-            help="The state, such as rod.angle='180 deg' or wheel.angular_velocity=3: speeds that are not named are "
-            "zero. The scene's own start if not given. Can be repeated.",
-        ),
-        click.option(
-            "--set", "settings", multiple=True, metavar="PATH=VALUE",
-            help="Parameter, such as rod1.length='30 cm'. Can be repeated.",
-        ),
-        click.argument("scene"),
-    ):  # fmt: skip
-        function = option(function)
-    return function
-
-
-@main.command("linearize", short_help="Show the linear model of a scene about a state.", epilog=_SCENE_HELP)
-@_state_options
-@click.option("--input", "inputs", multiple=True, metavar="PATH", help="Input, such as push.value. Can be repeated.")
-@click.option("--output", "outputs", multiple=True, metavar="PATH", help="Quantity, such as bob.position.x.")
-@click.option("--form", type=_FORM, default="reduced", show_default=True, help="Whose equations are linearised.")
-@click.option("--bode", type=_FILE, help="Save gain and phase over the frequency (.png, .svg, .pdf).")
-@reporting_errors
-def linearize_command(scene: str, **options: Any) -> None:
-    """Show A, B, C, D and the eigenvalues of SCENE about rest or a steady motion."""
-    from atwood.cli.linear import show_linear_model
-
-    show_linear_model(scene, **options)
-
-
-@main.command("modes", short_help="Show the frequencies and shapes of small oscillations.", epilog=_SCENE_HELP)
-@_state_options
-@click.option("--plot", type=_FILE, help="Save a picture of each mode, numbered (.png, .svg, .pdf).")
-@reporting_errors
-def modes_command(scene: str, **options: Any) -> None:
-    """Show the normal modes of SCENE: about its start if it is at rest there, else about its stable equilibria."""
-    from atwood.cli.linear import show_modes
-
-    show_modes(scene, **options)
-
-
-@main.command("equilibria", short_help="Find where a scene can stay at rest.", epilog=_SCENE_HELP)
-@click.argument("scene")
-@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Parameter. Can be repeated.")
-@click.option(
-    "--region",
-    multiple=True,
-    metavar="PATH=FROM:TO",
-    help="Where to look, such as rod.angle=-90deg:90deg; everywhere if not given. Can be repeated.",
-)
-@click.option("--along", metavar="PATH=FROM:TO", help="Follow them while a parameter changes, SI units.")
-@click.option("--plot", type=_FILE, help="With --along: save a picture of the branches (.png, .svg, .pdf).")
-@click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output.")
-@reporting_errors
-def equilibria_command(scene: str, **options: Any) -> None:
-    """Find the equilibria of SCENE, and whether they are stable."""
-    from atwood.cli.linear import show_equilibria
-
-    show_equilibria(scene, **options)
-
-
-@main.command("phase", short_help="Draw the phase portrait of a scene.", epilog=_SCENE_HELP)
-@click.argument("scene")
-@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Parameter. Can be repeated.")
-@click.option("--coordinates", metavar="FROM:TO", help="Range of the coordinate, with units; chosen if not given.")
-@click.option("--speeds", metavar="FROM:TO", help="Range of its rate, with units; chosen if not given.")
-@click.option("--plot", type=_FILE, help="Where to save the picture (.png, .svg, .pdf).")
-@click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output.")
-@reporting_errors
-def phase_command(scene: str, **options: Any) -> None:
-    """Find the states of rest and the separatrices of SCENE, and draw its motions over coordinate and speed."""
-    from atwood.cli.phase import show_phase_portrait
-
-    show_phase_portrait(scene, **options)
 
 
 @main.command("check", short_help="Check components of one's own.")

@@ -49,6 +49,7 @@ class RunRequest:
     until: tuple[str, ...] = ()
     record: tuple[str, ...] = ()
     conserved: bool = False
+    accuracy: float | None = None
     plot: Path | None = None
     draw: Path | None = None
     view: str | None = None
@@ -112,6 +113,7 @@ def _run(request: RunRequest) -> Result:
                 structure=request.structure,
                 until=request.until or None,
                 record=request.record or None,
+                accuracy=request.accuracy,
                 monitor=monitor,
                 solver=request.solver,
                 order=None if request.order is None else int(request.order),
@@ -212,6 +214,7 @@ def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
         "energy": data.pop("energy"),
         "constraint_max": data.pop("constraint_max"),
         **data,
+        **({} if request.accuracy is None else {"accuracy": result.accuracy.to_data()}),
         "asked": asked,
         **({"timings": dict(result.timings)} if request.timings else {}),
     }

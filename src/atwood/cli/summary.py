@@ -108,6 +108,8 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     )
     if result.run.options.solver == "auto":
         yield "chosen", result.run.why
+    if result.run.options.accuracy is not None:
+        yield "accuracy", result.accuracy.describe()
     yield "energy", _energy(result)
     if result.conserved is not None:
         yield "conserved", result.conserved.describe()

@@ -31,6 +31,7 @@ from atwood.simulation.events.modes import EventRecord
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
 from atwood.simulation.initialization.start import Start, own_state
+from atwood.simulation.problem.options import SOLVERS
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
 from atwood.simulation.run.made import Run
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from atwood.simulation.singular.crossing import SingularCrossing
 
 if TYPE_CHECKING:
+    from atwood.result.accuracy import Accuracy
     from atwood.result.conserved import ConservedLedger
 
 __all__ = ["Result"]
@@ -61,15 +63,17 @@ class Result(Trajectories):
         What the solver gave.
     conserved
         Conserved quantities along it; see `simulate(..., monitor=)`.
+    second
+        A second solution, if there is one already; see `error`.
     """
 
-    @takes(run=instance("a run, as solve.run makes it", Run), conserved=ANYTHING)
-    def __init__(self, run: Run, conserved: ConservedLedger | None = None) -> None:
-        self.run, self.conserved = run, conserved
+    @takes(run=instance("a run, as solve.run makes it", Run), conserved=ANYTHING, second=ANYTHING)
+    def __init__(self, run: Run, conserved: ConservedLedger | None = None, second: Run | None = None) -> None:
+        self.run, self.conserved, self._second_run = run, conserved, second
         self._cache: dict[str, FloatArray] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Result, (self.run, self.conserved)
+        return Result, (self.run, self.conserved, self._second_run)
 
     # -- what it is of --------------------------------------------------------------------------------------------
 
@@ -170,6 +174,61 @@ class Result(Trajectories):
     def statistics(self) -> Statistics:
         """What the solver did."""
         return self.run.statistics
+
+    # -- how right it is ------------------------------------------------------------------------------------------
+
+    @cached_property
+    def second(self) -> Result:
+        """A second, more accurate solution, which is solved when it is first asked for.
+
+        Raises
+        ------
+        UsageError
+            If there is none: of a scene whose parts call functions at sample times, and where nothing more accurate
+            can be solved.
+        """
+        from atwood.result.second_run import second_run
+
+        if self._second_run is None:
+            self._second_run = second_run(self.run, np.unique(self.time))
+        return Result(self._second_run)
+
+    def error(self, path: str) -> FloatArray:
+        """Return an estimate of the error of a quantity at the output times, shape (times,), in its unit.
+
+        It is the distance from the `second` solution. Where neighbouring motions have parted, it is of the size of the
+        quantity itself; `accuracy` says until when it is not.
+
+        Raises
+        ------
+        ResultError
+            If there is no such quantity.
+        UsageError
+            If there is no second solution.
+        """
+        from atwood.result.accuracy import difference
+
+        known, other = self._known(path), self.second
+        return difference(self.time, self[known], other.time, other[known])
+
+    @cached_property
+    def accuracy(self) -> Accuracy:
+        """How right the motion is as a whole: what was asked for and what is reached, by the `second` solution.
+
+        Raises
+        ------
+        UsageError
+            If there is no second solution.
+        """
+        from atwood.result.accuracy import compared_paths, estimate_accuracy
+
+        other, assembly = self.second, self.assembly
+        paths = [path for path in compared_paths(assembly) if path in other]
+        scales = {path: self.start.length if self.unit(path) == "m" else 1.0 for path in paths}
+        how = f"a second solution, {other.form} form, {SOLVERS[other.run.solver]}"
+        how += f", rtol {other.run.options.relative_tolerance:.1g}"
+        events = self.events, other.events
+        return estimate_accuracy(self.run.options.accuracy, self.error, scales, self.time, events, how)
 
     # -- quantities -----------------------------------------------------------------------------------------------
 

@@ -25,9 +25,11 @@ from atwood.errors import AtwoodError, UsageError
 from atwood.forms.dae import LEVELS
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.simulation.problem.options import SOLVERS
+from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import ORIENTATIONS
 
 __all__ = [
+    "ACCURACY",
     "ATOL",
     "CONDITIONS",
     "FORM",
@@ -47,6 +49,7 @@ __all__ = [
     "T_END",
     "check_span",
     "refuse_idle_settings",
+    "refuse_two_accuracies",
 ]
 
 FORMS = ("reduced", "dae")
@@ -101,6 +104,7 @@ LEVEL = one_of(LEVELS)
 ORIENTATION = one_of(ORIENTATIONS)
 SOLVER = one_of(("auto", *SOLVERS))
 NAME = optional(TEXT)
+ACCURACY = optional(number("an error between 1e-15 and 0.1, such as 1e-8", least=1e-15, most=0.1))
 T_END = optional(Kind(f"seconds, at most {_LONGEST:g}, or text such as '2 min'", _time))
 RTOL = number("a relative tolerance between 0 and 1, such as 1e-8", above=0.0, below=1.0)
 ATOL = optional(number("an absolute tolerance between 0 and 1, as a share of the scene's sizes", above=0.0, below=1.0))
@@ -150,6 +154,28 @@ def refuse_idle_settings(solver: str, order: int | None, step: float | None) -> 
             raise UsageError(
                 f"{name}={value!r} is for the solver 'gauss'; {solver!r} chooses its own",
                 advice="Give solver='gauss', or rtol for the accuracy.",
+            )
+
+
+def refuse_two_accuracies(accuracy: float | None, rtol: float, atol: float | None, step: float | None) -> None:
+    """Refuse an accuracy of the motion together with a tolerance or a step, of which one would be ignored.
+
+    Parameters
+    ----------
+    accuracy, rtol, atol, step
+        What was asked for.
+
+    Raises
+    ------
+    UsageError
+        If it is so.
+    """
+    given = [("rtol", rtol, tolerances.RTOL), ("atol", atol, None), ("step", step, None)]
+    for name, value, usual in given:
+        if accuracy is not None and value != usual:
+            raise UsageError(
+                f"{name}={value!r} and accuracy={accuracy!r} ask for two things",
+                advice="Leave one out: with an accuracy, tolerances are chosen for it.",
             )
 
 

@@ -58,6 +58,8 @@ class RunOptions:
         What is looked for along the run, besides the events of parts.
     order, step
         Of a method with fixed steps: its order, and the step, s.
+    accuracy
+        The error of the motion that was asked for; tolerances are chosen for it.
     """
 
     t_end: float
@@ -76,6 +78,7 @@ class RunOptions:
     conditions: tuple[Condition, ...] = ()
     order: int | None = None
     step: float | None = None
+    accuracy: float | None = None
 
     def out_of_time(self, t: float) -> str:
         """Return what is said of a run that its limit of time ended, at a time of its own."""

@@ -15,9 +15,10 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene
 from atwood.pipeline import simulate
+from atwood.result.accuracy import compared_paths
 from atwood.result.result import Result
 
-__all__ = ["Assembled", "Reference", "compared_paths", "find_reference", "run_form", "scaled_difference", "table_at"]
+__all__ = ["Assembled", "Reference", "find_reference", "run_form", "scaled_difference", "table_at"]
 
 Assembled = Callable[[str, str], Assembly]
 """Gives a scene in a form and at a level of the constraints."""
@@ -100,7 +101,7 @@ def find_reference(
     """
     tight, note = _tight_solutions(flat, assembled, t_end, outputs, max_seconds, watch)
     (best, said), (second, other) = tight
-    paths = compared_paths(best)
+    paths = compared_paths(best.assembly)
     scales = {path: best.start.length if best.unit(path) == "m" else 1.0 for path in paths}
     time = np.linspace(best.time[0], best.time[-1], outputs)
     quantities = table_at(best, paths, time)
@@ -205,28 +206,6 @@ def table_at(result: Result, paths: Iterable[str], times: FloatArray) -> dict[st
 
 def _places(result: Result, times: FloatArray) -> NDArray[np.intp]:
     return np.searchsorted(result.time, times, side="right") - 1
-
-
-def compared_paths(result: Result) -> list[str]:
-    """Return the positions of all bodies with mass, the coordinates that are angles, and, in space, axes of bodies.
-
-    Axes that differ by less than they are long differ by the angle between two orientations, in radians; coordinates
-    of orientations differ where nothing does.
-
-    Parameters
-    ----------
-    result
-        A run in either form.
-    """
-    assembly = result.assembly
-    owners = [path for path, local in assembly.mechanism.locals_.items() if local.point_inertias or local.body_inertias]
-    paths = [f"{owner}.position.{axis}" for owner in owners for axis in "xyz"]
-    paths += [one.name for one in assembly.reduced.names]
-    found = [path for path in dict.fromkeys(paths) if path in result and result.unit(path) in ("m", "rad")]
-    if assembly.mechanism.space.name == "space":
-        axes = [f"{owner}.{axis}_axis.{part}" for owner in owners for axis in "xyz" for part in "xyz"]
-        found += [path for path in axes if path in result]
-    return found
 
 
 def scaled_difference(

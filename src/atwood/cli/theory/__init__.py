@@ -1,0 +1,1 @@
+"""What theory knows of a scene, on the command line."""

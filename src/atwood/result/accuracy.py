@@ -1,0 +1,158 @@
+"""How far two solutions of a scene are apart: errors of quantities, and of the motion as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
+from atwood.simulation.events.modes import EventRecord
+
+__all__ = ["Accuracy", "compared_paths", "difference", "estimate_accuracy"]
+
+_LOST = 0.1
+"""Errors beyond this share of the scene's size are no longer those of the same motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """How right a run is, as far as a second, more accurate solution tells.
+
+    Attributes
+    ----------
+    asked
+        The largest error that was asked for; None if none was.
+    reached
+        The estimated error of positions, relative to the extent of the scene, and of angles, rad: the largest over all
+        outputs.
+    path
+        Which quantity it is of.
+    until
+        Until when the error is within what was asked, or, where nothing was asked, within a tenth of the scene's size:
+        beyond, neighbouring motions have parted, and the run tells little of the motion; s.
+    events
+        Estimated errors of the times of events, s; nan where the second solution has no such event.
+    how
+        What the second solution is.
+    """
+
+    asked: float | None
+    reached: float
+    path: str
+    until: float
+    events: FloatArray
+    how: str
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the error is within what was asked."""
+        return self.asked is None or self.reached <= self.asked
+
+    def to_data(self) -> dict[str, Any]:
+        """Return it as plain data, for JSON."""
+        events = [None if np.isnan(one) else float(one) for one in self.events]
+        own = {"asked": self.asked, "reached": self.reached, "path": self.path, "until": self.until}
+        return {**own, "events": events, "how": self.how}
+
+    def describe(self) -> str:
+        """Return it in a sentence."""
+        found = f"error {self.reached:.1e} at most, of {self.path}" if self.path else "nothing has an error"
+        if self.asked is not None and not self.is_met:
+            found += f"; {self.asked:g} was asked for, and holds until t = {self.until:.6g} s"
+        elif self.reached > _LOST:
+            found += f"; it tells little of the motion after t = {self.until:.6g} s"
+        return f"{found} (estimated by {self.how})"
+
+
+def compared_paths(assembly: Assembly) -> list[str]:
+    """Return the positions of all bodies with mass, the coordinates that are angles, and, in space, axes of bodies.
+
+    Axes that differ by less than they are long differ by the angle between two orientations, in radians; coordinates
+    of orientations differ where nothing does.
+
+    Parameters
+    ----------
+    assembly
+        The scene in either form.
+    """
+    known = assembly.observables
+    owners = [path for path, local in assembly.mechanism.locals_.items() if local.point_inertias or local.body_inertias]
+    paths = [f"{owner}.position.{axis}" for owner in owners for axis in "xyz"]
+    paths += [one.name for one in assembly.reduced.names]
+    found = [path for path in dict.fromkeys(paths) if path in known and known[path].unit in ("m", "rad")]
+    if assembly.mechanism.space.name == "space":
+        axes = [f"{owner}.{axis}_axis.{part}" for owner in owners for axis in "xyz" for part in "xyz"]
+        found += [path for path in axes if path in known]
+    return found
+
+
+def difference(time: FloatArray, values: FloatArray, other_time: FloatArray, other: FloatArray) -> FloatArray:
+    """Return by how much two solutions differ at the output times of the first, shape (times,).
+
+    At an event the first has states before and after; which of them the other one has there is not known, and the
+    larger error beside the event is taken.
+
+    Parameters
+    ----------
+    time, values
+        Output times of the first, s, and its quantity.
+    other_time, other
+        The same of the second, whose times are rising.
+    """
+    at = np.minimum(np.searchsorted(other_time, time), len(other_time) - 1)
+    twice = np.zeros(len(time), dtype=bool)
+    twice[1:] = np.diff(time) == 0.0
+    twice[:-1] |= twice[1:]
+    found = np.where((other_time[at] == time) & ~twice, np.abs(values - other[at]), np.nan)
+    known = np.flatnonzero(~np.isnan(found))
+    if len(known):
+        before = known[np.maximum(np.searchsorted(known, np.arange(len(time)), side="right") - 1, 0)]
+        after = known[np.minimum(np.searchsorted(known, np.arange(len(time))), len(known) - 1)]
+        found = np.maximum(found[before], found[after])
+    return found
+
+
+def estimate_accuracy(
+    asked: float | None,
+    errors: Callable[[str], FloatArray],
+    scales: Mapping[str, float],
+    time: FloatArray,
+    events: tuple[Sequence[EventRecord], Sequence[EventRecord]],
+    how: str,
+) -> Accuracy:
+    """Return how right a motion is from the errors of its positions and angles.
+
+    Parameters
+    ----------
+    asked
+        See `Accuracy`.
+    errors
+        Gives the error of a quantity at all outputs.
+    scales
+        The quantities that count, each with what its error is compared with.
+    time
+        Output times, s.
+    events
+        Those of both solutions.
+    how
+        What the second solution is.
+    """
+    worst, path, limit = 0.0, "", _LOST if asked is None else asked
+    late = len(time)
+    for one, scale in scales.items():
+        found = errors(one) / scale
+        largest = float(np.max(found, initial=0.0))
+        if not largest <= worst:
+            worst, path = largest, one
+        beyond = np.flatnonzero(~(found <= limit))
+        late = min(late, int(beyond[0]) if len(beyond) else late)
+    until = float(time[late - 1]) if late else float(time[0])
+    first, second = events
+    alike = [(a.part, a.law) == (b.part, b.law) for a, b in zip(first, second, strict=False)]
+    missed = [abs(a.time - b.time) if same else np.nan for a, b, same in zip(first, second, alike, strict=False)]
+    missed += [np.nan] * (len(first) - len(missed))
+    return Accuracy(asked, worst, path, until, np.array(missed, dtype=float), how)
