@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.simulation.events.modes import EventRecord
+from atwood.simulation.problem.options import SOLVERS
+from atwood.simulation.run.made import Run
 
 __all__ = ["Accuracy", "compared_paths", "difference", "estimate_accuracy"]
 
@@ -116,43 +117,37 @@ def difference(time: FloatArray, values: FloatArray, other_time: FloatArray, oth
     return found
 
 
-def estimate_accuracy(
-    asked: float | None,
-    errors: Callable[[str], FloatArray],
-    scales: Mapping[str, float],
-    time: FloatArray,
-    events: tuple[Sequence[EventRecord], Sequence[EventRecord]],
-    how: str,
-) -> Accuracy:
+def estimate_accuracy(first: Run, second: Run, time: FloatArray, error: Callable[[str], FloatArray]) -> Accuracy:
     """Return how right a motion is from the errors of its positions and angles.
 
     Parameters
     ----------
-    asked
-        See `Accuracy`.
-    errors
-        Gives the error of a quantity at all outputs.
-    scales
-        The quantities that count, each with what its error is compared with.
+    first, second
+        The run, and the more accurate one.
     time
         Output times, s.
-    events
-        Those of both solutions.
-    how
-        What the second solution is.
+    error
+        Gives the error of a quantity at these.
     """
+    asked, known = first.options.accuracy, first.assembly.observables
+    length = first.start.length if first.start is not None else 1.0
+    paths = [path for path in compared_paths(first.assembly) if path in second.assembly.observables]
+    scales = {path: length if known[path].unit == "m" else 1.0 for path in paths}
     worst, path, limit = 0.0, "", _LOST if asked is None else asked
     late = len(time)
     for one, scale in scales.items():
-        found = errors(one) / scale
+        found = error(one) / scale
         largest = float(np.max(found, initial=0.0))
         if not largest <= worst:
             worst, path = largest, one
         beyond = np.flatnonzero(~(found <= limit))
         late = min(late, int(beyond[0]) if len(beyond) else late)
     until = float(time[late - 1]) if late else float(time[0])
-    first, second = events
-    alike = [(a.part, a.law) == (b.part, b.law) for a, b in zip(first, second, strict=False)]
-    missed = [abs(a.time - b.time) if same else np.nan for a, b, same in zip(first, second, alike, strict=False)]
-    missed += [np.nan] * (len(first) - len(missed))
+    alike = [(a.part, a.law) == (b.part, b.law) for a, b in zip(first.events, second.events, strict=False)]
+    missed = [
+        abs(a.time - b.time) if same else np.nan for a, b, same in zip(first.events, second.events, alike, strict=False)
+    ]
+    missed += [np.nan] * (len(first.events) - len(missed))
+    form, solver = second.assembly.form, SOLVERS[second.solver]
+    how = f"a second solution, {form} form, {solver}, rtol {second.options.relative_tolerance:.1g}"
     return Accuracy(asked, worst, path, until, np.array(missed, dtype=float), how)

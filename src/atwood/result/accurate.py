@@ -9,7 +9,7 @@ from dataclasses import replace
 from atwood.errors import SolveError
 from atwood.result.result import Result
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.run.run import Run
+from atwood.simulation.run.made import Run
 
 __all__ = ["accurate_run"]
 

@@ -31,7 +31,6 @@ from atwood.simulation.events.modes import EventRecord
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
 from atwood.simulation.initialization.start import Start, own_state
-from atwood.simulation.problem.options import SOLVERS
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
 from atwood.simulation.run.made import Run
@@ -220,15 +219,9 @@ class Result(Trajectories):
         UsageError
             If there is no second solution.
         """
-        from atwood.result.accuracy import compared_paths, estimate_accuracy
+        from atwood.result.accuracy import estimate_accuracy
 
-        other, assembly = self.second, self.assembly
-        paths = [path for path in compared_paths(assembly) if path in other]
-        scales = {path: self.start.length if self.unit(path) == "m" else 1.0 for path in paths}
-        how = f"a second solution, {other.form} form, {SOLVERS[other.run.solver]}"
-        how += f", rtol {other.run.options.relative_tolerance:.1g}"
-        events = self.events, other.events
-        return estimate_accuracy(self.run.options.accuracy, self.error, scales, self.time, events, how)
+        return estimate_accuracy(self.run, self.second.run, self.time, self.error)
 
     # -- quantities -----------------------------------------------------------------------------------------------
 

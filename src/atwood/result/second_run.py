@@ -17,7 +17,8 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.simulation.events.sampling import find_sampler
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.run.run import Run, run
+from atwood.simulation.run.made import Run
+from atwood.simulation.run.run import run
 
 __all__ = ["TIGHTER", "second_run"]
 
