@@ -62,9 +62,9 @@ def box(
     return _placed(way, shape, across)
 
 
-def cylinder(way: tuple[float, float, float], diameter: float | None = None) -> Body:
-    """Return a BodyCylinder of steel along the way."""
-    length = float(np.linalg.norm(way))
+def cylinder(way: tuple[float, float, float], diameter: float | None = None, long: float | None = None) -> Body:
+    """Return a BodyCylinder of steel along the way, which may be longer than that at both ends alike."""
+    length = float(np.linalg.norm(way)) if long is None else long
     radius = length / 40.0 if diameter is None else diameter / 2.0
     across = (0.0, 1.0, 0.0) if way[0] or way[2] else (1.0, 0.0, 0.0)
     return _placed(way, solids.cylinder(radius, length, density=STEEL, axis="x"), across)
