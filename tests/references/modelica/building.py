@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from atwood import Component, Frame, Model, Result, Scene, connect, connector, parameter, solids
-from atwood_library import RigidBody, Weld
+from atwood import Component, Frame, Model, Result, Scene, connect, connector, parameter
+from atwood_library import Box, Cylinder, RigidBody, Weld
 
 __all__ = [
     "STEEL",
@@ -21,10 +21,13 @@ __all__ = [
     "box",
     "cylinder",
     "made",
+    "moments",
     "orientation",
+    "overlong",
     "rotation",
-    "turned_weld",
 ]
+
+Way = tuple[float, float, float]
 
 WORLD: Mapping[str, Any] = {"space": "space", "gravity": 9.80665, "gravity_direction": (0.0, -1.0, 0.0)}
 """Settings of a scene as of Modelica's worlds: y upwards, and gravity Modelica.Constants.g_n."""
@@ -44,40 +47,41 @@ class Body(Model):
     connections = [connect(a, solid.frame), connect(a, end.a), connect(b, end.b)]
 
 
-def bar(way: tuple[float, float, float], mass: float, center: tuple[float, float, float], *moments: float) -> Body:
+def bar(way: Way, mass: float, center: Way, *inertia: float) -> Body:
     """Return a body by its numbers, with moments of 0.001 about its centre of mass if none are given."""
-    return Body(way=way, solid=RigidBody(mass=mass, center=center, moments=moments or (1e-3, 1e-3, 1e-3)))
+    return Body(way=way, solid=RigidBody(mass=mass, center=center, moments=inertia or (1e-3, 1e-3, 1e-3)))
 
 
-def box(
-    way: tuple[float, float, float],
-    width: float | None = None,
-    height: float | None = None,
-    across: tuple[float, float, float] = (0.0, 1.0, 0.0),
-) -> Body:
+def box(way: Way, width: float | None = None, height: float | None = None, across: Way = (0.0, 1.0, 0.0)) -> Box:
     """Return a BodyBox of steel: along the way, its width along the part of `across` that is square to it."""
     length = float(np.linalg.norm(way))
     wide = length / 20.0 if width is None else width
-    shape = solids.box(length, wide, wide if height is None else height, density=STEEL)
-    return _placed(way, shape, across)
-
-
-def cylinder(way: tuple[float, float, float], diameter: float | None = None, long: float | None = None) -> Body:
-    """Return a BodyCylinder of steel along the way, which may be longer than that at both ends alike."""
-    length = float(np.linalg.norm(way)) if long is None else long
-    radius = length / 40.0 if diameter is None else diameter / 2.0
-    across = (0.0, 1.0, 0.0) if way[0] or way[2] else (1.0, 0.0, 0.0)
-    return _placed(way, solids.cylinder(radius, length, density=STEEL, axis="x"), across)
-
-
-def _placed(way: tuple[float, float, float], shape: solids.MassProperties, across: Any) -> Body:
-    """Return a shape along x with its middle half the way on."""
-    along = np.array(way) / np.linalg.norm(way)
-    up = np.cross(along, across)
-    up /= np.linalg.norm(up)
-    return Body(
-        way=way, solid=RigidBody.of(shape.placed(np.array([along, np.cross(up, along), up]).T, np.array(way) / 2))
+    return Box(
+        length_x=length,
+        length_y=wide,
+        length_z=wide if height is None else height,
+        direction=way,
+        upward=tuple(np.cross(way, across)),
+        density=STEEL,
     )
+
+
+def cylinder(way: Way, diameter: float | None = None) -> Cylinder:
+    """Return a BodyCylinder of steel along the way."""
+    length = float(np.linalg.norm(way))
+    radius = length / 40.0 if diameter is None else diameter / 2.0
+    return Cylinder(length=length, radius=radius, axis="direction", direction=way, density=STEEL)
+
+
+def overlong(way: Way, shape: Box | Cylinder, centre: Way) -> Body:
+    """Return a body whose shape is longer than the way from frame a to frame b, with its middle at a given place."""
+    return Body(way=way, solid=RigidBody(mass=float(shape.total_mass()), center=centre, moments=moments(shape)))
+
+
+def moments(shape: Box | Cylinder) -> Way:
+    """Return the moments of inertia of a shape along an axis of its frame."""
+    tensor = shape.tensor()
+    return float(tensor[0][0]), float(tensor[1][1]), float(tensor[2][2])
 
 
 def rotation(sequence: str, *degrees: float) -> np.ndarray:
@@ -90,14 +94,6 @@ def rotation(sequence: str, *degrees: float) -> np.ndarray:
         one[k, j], one[j, k] = np.sin(angle), -np.sin(angle)
         total = total @ one
     return total
-
-
-def turned_weld(displacement: tuple[float, float, float], axes: np.ndarray) -> Weld:
-    """Return a connection that displaces and turns."""
-    vector = np.array([axes[2, 1] - axes[1, 2], axes[0, 2] - axes[2, 0], axes[1, 0] - axes[0, 1]])
-    sine = np.linalg.norm(vector) / 2.0
-    angle = float(np.arctan2(sine, (np.trace(axes) - 1.0) / 2.0))
-    return Weld(displacement=displacement, angle=angle, axis=tuple(vector / (2.0 * sine)))
 
 
 def orientation(path: str, axes: np.ndarray) -> dict[str, float]:

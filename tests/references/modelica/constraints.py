@@ -5,10 +5,12 @@ Here a joint is both: there is one body, and what is published of either is comp
 
 from __future__ import annotations
 
+from math import radians
+
 from atwood import Component, Scene
 from atwood_library import Ground, Pivot, PositionSensor, Slider, Spherical, Spring, Universal, Weld
 
-from .building import WORLD, Example, bar, made, orientation, rotation, turned_weld
+from .building import WORLD, Example, bar, made, orientation, rotation
 
 __all__ = ["EXAMPLES"]
 
@@ -22,7 +24,11 @@ def _held(
     return made(
         {
             "ground": Ground(),
-            "mount": turned_weld((0.2, -0.3, 0.2), TURNED),
+            "mount": Weld(
+                displacement=(0.2, -0.3, 0.2),
+                turned_by="three angles",
+                angles=(radians(10.0), radians(55.0), radians(68.0)),
+            ),
             "far": Ground(position=(0.8, 0.0, 0.3)),
             "body": bar((0.4, 0.0, 0.0), 1.0, (0.2, 0.0, 0.0), 1.0, 1.0, 1.0),
             "arm": Weld(displacement=more),

@@ -347,6 +347,22 @@ def spring_mass_system() -> Scene:
     )
 
 
+def spring_with_mass() -> Scene:
+    """Return a body on a spring that has a mass in its middle."""
+    start = {"body.position.x": 0.0, "body.position.y": -0.3, "body.position.z": 0.0}
+    start |= {f"body.{what}.{axis}": 0.0 for what in ("velocity", "spin") for axis in "xyz"}
+    return made(
+        {
+            "ground": Ground(),
+            "spring": Spring(stiffness=40.0, natural_length=0.2, mass=0.5, mass_at=0.5),
+            "body": RigidBody(moments=(1e-3, 1e-3, 1e-3)),
+        },
+        "ground.frame - spring.a, body.frame - spring.b",
+        start | orientation("body", rotation("")),
+        **WORLD,
+    )
+
+
 def surfaces() -> Scene:
     """Return a guide whose displacement follows a filtered signal."""
     return made(
@@ -494,6 +510,14 @@ EXAMPLES = {
         },
     ),
     "SpringMassSystem": Example(spring_mass_system, _guides("p1", "p2")),
+    "SpringWithMass": Example(
+        spring_with_mass,
+        {
+            **_vector("body.frame_a.r_0", "body.position"),
+            **_vector("body.v_0", "body.velocity"),
+            **_vector("body.w_a", "body.spin"),
+        },
+    ),
     "Surfaces": Example(surfaces, {"prismatic.s": "place.position.x", "prismatic.v": "place.velocity.x"}),
     "UserDefinedGravityField": Example(user_defined_gravity_field, _hinges("rev")),
 }

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from math import asin, cos, pi, radians, sin, sqrt
+from collections.abc import Iterable
+from math import pi
 
 from atwood import Component, CoordinateLoad, Scalar, Scene, Slide, connector, force, parameter, select
 from atwood_library import (
-    FirstOrder,
     Ground,
     Inertia,
     Pivot,
-    PointOnLine,
     RigidBody,
     Rod,
     RotaryDrive,
     RotationalCoupling,
-    RotationalResistance,
     Slider,
     Weld,
 )
@@ -98,112 +95,6 @@ def engine1a(gas: bool = False) -> Scene:
 def engine1b() -> Scene:
     """Return the cylinder with a gas force."""
     return engine1a(gas=True)
-
-
-def engine_v6(
-    cylinder: Callable[[str], tuple[dict[str, Component], str]], length: float, throw: float, rod: float, torque: float
-) -> Scene:
-    """Return six cylinders in two rows, a load and a filter of the torque between them.
-
-    Parameters
-    ----------
-    cylinder
-        Returns the parts of a cylinder, and how they are joined, with `crank.a` at the crank and `row.a` at the row; all
-        names begin with that of the cylinder. Its loop is closed in its plane alone, as nothing else is left to hold.
-    length, throw, rod
-        Distance of one cylinder from the next, throw of the crank, length of the rod, m.
-    torque
-        Torque on the load at the start, at which the filter is at rest, N m.
-    """
-    rate = 2.0 * pi * 5.0 / sqrt(sqrt(2.0) - 1.0)
-    parts: dict[str, Component] = {
-        "ground": Ground(),
-        "bearing": Pivot(axis=X),
-        "crank": RigidBody(mass=0.0),
-        "load": Inertia(axis=X),
-        "fan": RotationalResistance(quadratic=100.0 / 200.0**2),
-        "sensor": RotationalCoupling(),
-        "filter1": FirstOrder(time_constant=1.0 / rate),
-        "filter2": FirstOrder(time_constant=1.0 / rate),
-    }
-    joined = """ground.frame - bearing.a, bearing.b - crank.frame
-    bearing.shaft - sensor.a, load.flange - sensor.b - fan.b
-    sensor.torque > filter1.u, filter1.y > filter2.u"""
-    guess = {}
-    for n, (turn, tilt) in enumerate(((-30, -30), (90, 30), (210, -30), (210, 30), (90, -30), (-30, 30))):
-        name = f"c{n + 1}"
-        more, text = cylinder(name)
-        parts |= more | {
-            f"{name}_turn": Weld(displacement=(n * length, 0.0, 0.0), axis=X, angle=radians(turn)),
-            f"{name}_tilt": Weld(displacement=(n * length, 0.0, 0.0), axis=X, angle=radians(tilt)),
-        }
-        joined += f"""
-        crank.frame - {name}_turn.a, {name}_turn.b - {name}_crank.a, ground.frame - {name}_tilt.a
-        {name}_tilt.b - {name}_row.a
-        {text}"""
-        apart = radians(turn - tilt)
-        lean = asin(throw * sin(apart) / rod)
-        guess[f"{name}_slider.displacement"] = 0.42 - 0.1 - throw * cos(apart) - rod * cos(lean)
-        guess[f"{name}_b1.angle"] = -lean - apart
-    start = {"load.angle": 0.0, "load.angular_velocity": 10.0, "filter1.y": torque, "filter2.y": torque}
-    scene = made(parts, joined, start, **WORLD)
-    scene.guess = guess
-    return scene
-
-
-def engine_v6_of_shapes() -> Scene:
-    """Return the engine with cranks, rods and pistons of steel."""
-
-    def cylinder_of(name: str) -> tuple[dict[str, Component], str]:
-        rod = box((0.0, 0.22, 0.0), 0.02, 0.06, X)
-        rod.solid.center = (0.0, 0.09, 0.0)
-        parts = {
-            "crank": cylinder((0.1, 0.0, 0.0), 0.05, 0.12),
-            "web": box((0.0, 0.1, 0.0), 0.02, 0.05, X),
-            "pin": cylinder((0.1, 0.0, 0.0), 0.03, 0.12),
-            "back": box((0.0, -0.1, 0.0), 0.02, 0.05, X),
-            "mid": Weld(displacement=(0.05, 0.0, 0.0)),
-            "row": Weld(displacement=(0.15, 0.42, 0.0)),
-            "slider": Slider(axis=(0.0, -1.0, 0.0)),
-            "piston": cylinder((0.0, 0.1, 0.0), 0.1),
-            "rod": rod,
-            "end": Weld(displacement=(0.0, 0.2, 0.0)),
-            "b1": Pivot(axis=X),
-            "b2": PointOnLine(axis=X),
-            "gas": GasForce(stroke=0.22),
-        }
-        joined = f"""{name}_crank.b - {name}_web.a, {name}_web.b - {name}_pin.a - {name}_mid.a, {name}_pin.b - {name}_back.a
-        {name}_row.b - {name}_slider.a, {name}_slider.b - {name}_piston.b, {name}_piston.a - {name}_b2.a
-        {name}_mid.b - {name}_b1.a, {name}_b1.b - {name}_rod.a - {name}_end.a, {name}_end.b - {name}_b2.b
-        {name}_slider.carriage - {name}_gas.piston"""
-        return {f"{name}_{part}": component for part, component in parts.items()}, joined
-
-    scene = engine_v6(cylinder_of, 0.2, 0.1, 0.2, 563.186235502)
-    return scene
-
-
-def engine_v6_of_numbers() -> Scene:
-    """Return the engine with bodies given by mass and inertia."""
-
-    def cylinder_of(name: str) -> tuple[dict[str, Component], str]:
-        parts = {
-            "crank": Weld(displacement=(0.09, 0.05, 0.0)),
-            "row": Weld(displacement=(0.09, 0.42, 0.0)),
-            "slider": Slider(axis=(0.0, -1.0, 0.0)),
-            "piston": bar((0.0, 0.1, 0.0), 6.0, (0.0, 0.05, 0.0), 0.0088, 0.0076, 0.0088),
-            "rod": bar((0.0, 0.175, 0.0), 1.0, (0.0, 0.0875, 0.0), 0.006, 0.0005, 0.006),
-            "b1": Pivot(axis=X),
-            "b2": PointOnLine(axis=X),
-            "gas": GasForce(stroke=0.195),
-        }
-        joined = f"""{name}_row.b - {name}_slider.a, {name}_slider.b - {name}_piston.b, {name}_piston.a - {name}_b2.a
-        {name}_crank.b - {name}_b1.a, {name}_b1.b - {name}_rod.a, {name}_rod.b - {name}_b2.b
-        {name}_slider.carriage - {name}_gas.piston"""
-        return {f"{name}_{part}": component for part, component in parts.items()}, joined
-
-    scene = engine_v6(cylinder_of, 0.14, 0.05, 0.175, 238.056148886)
-    scene.crank.mass, scene.crank.center, scene.crank.moments = 180.0, (0.3, 0.0, 0.0), (0.1, 0.1, 0.1)
-    return scene
 
 
 def _fourbar(parts: dict, joined: str) -> Scene:
@@ -290,19 +181,10 @@ def planar_loops() -> Scene:
     return made(parts, joined, None, **WORLD)
 
 
-_V6 = {
-    "filter.x[1]": "filter1.y",
-    "filter.x[2]": "filter2.y",
-    "load.phi": "load.angle",
-    "load.w": "load.angular_velocity",
-}
-
 EXAMPLES = {
     "Engine1a": Example(engine1a, {"inertia.phi": "inertia.angle", "inertia.w": "inertia.angular_velocity"}),
     "Engine1b": Example(engine1b, {"inertia.phi": "inertia.angle", "inertia.w": "inertia.angular_velocity"}),
     "Engine1b_analytic": Example(engine1b, {"inertia.phi": "inertia.angle", "inertia.w": "inertia.angular_velocity"}),
-    "EngineV6": Example(engine_v6_of_shapes, _V6),
-    "EngineV6_analytic": Example(engine_v6_of_numbers, _V6),
     "Fourbar1": Example(fourbar1, {"j1.phi": "j1.angle", "j1.w": "j1.angular_velocity"}),
     "Fourbar2": Example(fourbar2, {"j1.phi": "j1.angle", "j1.w": "j1.angular_velocity"}),
     "Fourbar_analytic": Example(fourbar2, {"j1.phi": "j1.angle", "j1.w": "j1.angular_velocity"}),

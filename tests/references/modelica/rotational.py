@@ -10,6 +10,7 @@ from atwood_library import (
     Inertia,
     Mass1D,
     RackAndPinion,
+    Ramp,
     RotationalCoupling,
     RotationalGap,
     RotationalResistance,
@@ -80,6 +81,33 @@ def compare_braking_torque() -> Scene:
     return made(parts, ", ".join(f"{name}.flange - {name}_brake.b" for name in laws), start, gravity=0.0)
 
 
+def elastic_bearing() -> Scene:
+    """Return a gear whose housing gives."""
+    return made(
+        {
+            "shaft": Inertia(moment=1.0),
+            "load": Inertia(moment=50.0),
+            "housing": Inertia(moment=5.0),
+            # The last of the three on the gear is eliminated, and the housing turns little where the others turn far.
+            "wheel": Inertia(moment=0.0),
+            "gear": Gear(ratio=3.0, support="flange"),
+            "spring": RotationalSpringDamper(stiffness=1e3),
+            "bearing": RotationalSpringDamper(stiffness=1e5, damping=5.0, against="ground"),
+            "torque": RotationalSource(),
+            "ramp": Ramp(slope=20.0, start_time=0.0, duration=5.0),
+        },
+        """
+        shaft.flange - torque.b - gear.a, wheel.flange - gear.b - spring.a, load.flange - spring.b
+        housing.flange - gear.housing - bearing.b, ramp.value > torque.value
+        """,
+        {
+            "shaft.angle": 0.0, "shaft.angular_velocity": 0.0, "load.angular_velocity": 0.0, "spring.extension": 0.0,
+            "housing.angle": 0.0, "housing.angular_velocity": 0.0,
+        },
+        gravity=0.0,
+    )  # fmt: skip
+
+
 def generation_of_fmus() -> Scene:
     """Return two rotors joined rigidly, by a spring and a damper, and by a spring, each pair driven alike."""
     moments = {"1a": 1.1, "1b": 2.2, "2a": 1.1, "2b": 2.2, "3a": 1.1, "3b": 2.2}
@@ -148,6 +176,15 @@ EXAMPLES = {
             "springDamper.phi_rel": "stiff_rotor.angle",
             "springDamper.w_rel": "stiff_rotor.angular_velocity",
         },
+    ),
+    "ElasticBearing": Example(
+        elastic_bearing,
+        {
+            **_turning("load", "shaft"),
+            "springDamper.phi_rel": "housing.angle",
+            "springDamper.w_rel": "housing.angular_velocity",
+        },
+        {"atol": 1e-13},  # the housing turns by a millionth of what the shaft does; Modelica says a nominal value
     ),
     "First": _FIRST,
     "FirstGrounded": _FIRST,

@@ -14,7 +14,6 @@ from atwood_library import (
     Inertia,
     Mass1D,
     RackAndPinion,
-    Ramp,
     RotationalSource,
     Sine,
     TranslationalCoupling,
@@ -35,10 +34,9 @@ def accelerate() -> Scene:
     return made(
         {
             "mass": Mass1D(mass=1.0),
-            "drive": TranslationalMotion(follows="speed"),
-            "speed": Ramp(slope=1.0),
+            "drive": TranslationalMotion(follows="acceleration", acceleration=1.0),
         },
-        "mass.slide - drive.b, speed.value > drive.speed",
+        "mass.slide - drive.b",
         {"mass.displacement": 0.0},
         gravity=0.0,
     )
