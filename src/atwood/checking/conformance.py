@@ -13,8 +13,8 @@ from atwood.checking.runs import wrong_runs
 from atwood.checking.samples import as_part, in_space, samples_of
 from atwood.checking.units import wrong_units
 from atwood.consistency.check import contradictions
+from atwood.consistency.draws import make_trial
 from atwood.consistency.names import wrong_names
-from atwood.consistency.trials import make_trial
 from atwood.errors import AtwoodError, UsageError
 from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component

@@ -15,7 +15,7 @@ from typing import Any
 from atwood.checking.report import Finding
 from atwood.consistency.trials import Body, Trial
 from atwood.late import dataclass
-from atwood.model.declare.component import Binding, bind
+from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.function_values import Function
@@ -122,8 +122,22 @@ def _values(trial: Trial, law: Law, units: Units) -> Values:
 
 def _bound(trial: Trial, units: Units) -> Any:
     """Return the component in the state of the trial, with everything in other units."""
+    binding = Binding(
+        values=_values_in(units, trial),
+        motions=_motions_in(units, trial),
+        time=0.8 * units.of(BASES[2]),
+        space=trial.space.name,
+        line=trial.space.line,
+        line_signs=trial.line_signs,
+        reactions=_reactions_in(units, trial.component),
+        energies=_totals_in(units),
+    )
+    return bind(trial.component, binding)
+
+
+def _values_in(units: Units, trial: Trial) -> dict[str, Any]:
+    """Return parameters, states and inputs in other units."""
     component = trial.component
-    length, time, mass = (units.of(base) for base in (LENGTH, BASES[2], BASES[0]))
     values: dict[str, Any] = {}
     for name, spec in component.parameter_specs().items():
         value, size = trial.values[name], units.of(spec.unit.exponents)
@@ -141,8 +155,14 @@ def _bound(trial: Trial, units: Units) -> Any:
         values[name] = tuple(one * size for one in value) if isinstance(value, tuple) else value * size
     for name, signal in component.signal_specs().items():
         values[name] = trial.inputs[name][0] * units.of(signal.unit.exponents)
+    return values
+
+
+def _motions_in(units: Units, trial: Trial) -> dict[str, Motion]:
+    """Return how each connector moves in other units, with accelerations and the body that it is on."""
+    length, time, mass = (units.of(base) for base in (LENGTH, BASES[2], BASES[0]))
     motions: dict[str, Motion] = {}
-    for name, one in component.connectors().items():
+    for name, one in trial.component.connectors().items():
         if isinstance(one, JointCoordinate):
             value, rate = trial.joint_references.get(name, (0.5, 0.3))
             size = length if isinstance(one, Slide) else 1.0
@@ -160,6 +180,11 @@ def _bound(trial: Trial, units: Units) -> Any:
             angular_acceleration=trial.angular_velocities[name] * (0.4 / time**2),
             body=scaled,
         )
+    return motions
+
+
+def _reactions_in(units: Units, component: Component) -> dict[str, float]:
+    """Return some reactions of each constraint and joint in other units."""
     reactions = {}
     for law in component.laws("constraint"):
         for number, reaction in enumerate(law.options.reactions):
@@ -170,28 +195,24 @@ def _bound(trial: Trial, units: Units) -> Any:
         for kind, unit in (("force", "N"), ("torque", "N*m")):
             size = units.of(parse_unit(unit).exponents)
             reactions.update({f"{kind}{tail}": 0.6 * size for tail in ("", ".x", ".y", ".z")})
+    return reactions
+
+
+def _totals_in(units: Units) -> dict[str, Any]:
+    """Return some energies, momenta and inertia of the parts around a component in other units."""
+    length, time, mass = (units.of(base) for base in (LENGTH, BASES[2], BASES[0]))
     joule = units.of(parse_unit("J").exponents)
-    binding = Binding(
-        values=values,
-        motions=motions,
-        time=0.8 * time,
-        space=trial.space.name,
-        line=trial.space.line,
-        line_signs=trial.line_signs,
-        reactions=reactions,
-        energies={
-            "kinetic": 0.7 * joule,
-            "potential": -0.2 * joule,
-            "power": 0.3 * joule / time,
-            "mass": 1.3 * mass,
-            "first_moment": Vector(0.4, -0.3, 0.8) * (mass * length),
-            "momentum": Vector(0.6, 0.9, -0.5) * (mass * length / time),
-            "angular_momentum": Vector(-0.2, 0.7, 0.3) * (joule * time),
-            "moments": Vector(1.1, 1.2, 1.4) * (mass * length**2),
-            "products": Vector(0.1, -0.2, 0.15) * (mass * length**2),
-        },
-    )
-    return bind(component, binding)
+    return {
+        "kinetic": 0.7 * joule,
+        "potential": -0.2 * joule,
+        "power": 0.3 * joule / time,
+        "mass": 1.3 * mass,
+        "first_moment": Vector(0.4, -0.3, 0.8) * (mass * length),
+        "momentum": Vector(0.6, 0.9, -0.5) * (mass * length / time),
+        "angular_momentum": Vector(-0.2, 0.7, 0.3) * (joule * time),
+        "moments": Vector(1.1, 1.2, 1.4) * (mass * length**2),
+        "products": Vector(0.1, -0.2, 0.15) * (mass * length**2),
+    }
 
 
 def _scaled(axes: Any, size: float) -> Any:

@@ -7,9 +7,10 @@ from functools import partial
 from itertools import islice
 from weakref import WeakKeyDictionary
 
+from atwood.consistency.draws import make_trial
 from atwood.consistency.joints import Unknown, wrong_joint, wrong_rates
 from atwood.consistency.names import wrong_names
-from atwood.consistency.trials import Trial, make_trial
+from atwood.consistency.trials import Trial
 from atwood.errors import DeclarationError
 from atwood.model.declare.component import Component
 from atwood.model.declare.law import Law

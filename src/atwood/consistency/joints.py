@@ -9,15 +9,7 @@ from typing import Any
 import numpy as np
 
 from atwood.consistency.sources import contradiction_at
-from atwood.consistency.trials import (
-    STEP,
-    Pose,
-    Trial,
-    in_components,
-    nudged,
-    rate_of,
-    rotation_between,
-)
+from atwood.consistency.trials import STEP, Pose, Trial, in_components, nudged, rate_of, rotation_between
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.model.declare.connectors import Motion

@@ -7,14 +7,13 @@ Parameters have the values that they were given, so that bounds and what `check_
 from __future__ import annotations
 
 import math
-import random
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from atwood.late import dataclass
 from atwood.model.declare.component import Binding, Component, bind
-from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
+from atwood.model.declare.connectors import Motion
 from atwood.model.declare.contributions import Placement
 from atwood.model.declare.law import Law
 from atwood.model.local.flatten import Part
@@ -22,7 +21,7 @@ from atwood.model.values.rotation import FREE, IDENTITY, Axes, Rotation, as_rota
 from atwood.model.values.space import FIXED_AXES, Space, planar_axes
 from atwood.model.values.vector import ZERO, Vector, dot, norm
 
-__all__ = ["STEP", "Pose", "Trial", "make_trial", "rate_of", "rotation_between"]
+__all__ = ["STEP", "Body", "Pose", "Trial", "axes_turned", "is_offered", "rate_of", "rotation_between"]
 
 STEP = 1e-3
 """Step of the differences in time, s: velocities are some lengths of the component, or radians, a second."""
@@ -110,7 +109,7 @@ class Trial:
             angle, axes = pose.angle - spin.y * t, pose.axes
             if self.space.name == "space":
                 speed = norm(spin)
-                axes = _compose(_turn(spin / speed, speed * t), axes) if speed else axes
+                axes = _compose(axes_turned(spin / speed, speed * t), axes) if speed else axes
             elif self.space.name == "plane":
                 axes = planar_axes(angle)
             found[name] = Pose(pose.position + self.velocities[name] * t, angle, axes)
@@ -242,7 +241,7 @@ def _from_axes(axes: Axes, vector: Vector) -> Vector:
     return found
 
 
-def _turn(axis: Vector, angle: float) -> Axes:
+def axes_turned(axis: Vector, angle: float) -> Axes:
     """Return the axes of a turned frame: Rodrigues' formula, as `Turn.axes`, on numbers alone."""
     c, s = math.cos(angle), math.sin(angle)
     x, y, z = axis
@@ -257,7 +256,7 @@ def _turn(axis: Vector, angle: float) -> Axes:
 def _rotation(rotation: Rotation) -> Axes:
     found = IDENTITY
     for one in rotation.turns:
-        found = _compose(found, _turn(one.axis, one.angle))
+        found = _compose(found, axes_turned(one.axis, one.angle))
     return found
 
 
@@ -289,96 +288,8 @@ def rotation_between(before: Pose, after: Pose, space: Space) -> list[float]:
     return list(_spin(before.axes, [new - old for old, new in pairs]))
 
 
-def make_trial(part: Part, space: Space, seed: int) -> Trial:
-    """Return a component in a random state, the same for the same seed.
-
-    Parameters
-    ----------
-    part
-        The component with its values.
-    space
-        What it lives in.
-    seed
-        Of the random numbers.
-    """
-    draw = random.Random(seed)
-
-    def number() -> float:
-        return draw.choice((-1.0, 1.0)) * draw.uniform(0.2, 1.0)
-
-    component, values = part.component, {}
-    sizes = []
-    for name, spec in component.parameter_specs().items():
-        value = part.values[name]
-        if isinstance(value, tuple) and not spec.array:
-            value = Vector(*value) if len(value) == 3 else value
-        values[name] = value
-        if isinstance(value, float) and value and spec.unit.exponents == (0, 1, 0, 0):
-            sizes.append(abs(value))
-    length = math.exp(sum(map(math.log, sizes)) / len(sizes)) if sizes else 1.0
-    connectors = component.connectors()
-    free = [name for name, one in connectors.items() if not isinstance(one, JointCoordinate)]
-    poses, velocities, angular_velocities = {}, {}, {}
-    for order, name in enumerate(free):
-        place = [(3.0 * order + number()) * length] + [number() * length for _ in space.basis[1:]]
-        axes, angle, spin = FIXED_AXES, 0.0, ZERO
-        if space.name == "plane":
-            angle, spin = number(), Vector(0.0, number(), 0.0)
-            axes = planar_axes(angle)
-        elif space.name == "space":
-            raw = Vector(number(), number(), number())
-            axes = _turn(raw / norm(raw), 2.0 * number())
-            spin = Vector(number(), number(), number())
-        poses[name] = Pose(space.vector(tuple(place)), angle, axes)
-        velocities[name] = space.vector(tuple(number() * length for _ in space.basis))
-        angular_velocities[name] = spin
-    coordinates: dict[str, tuple[float, float]] = {}
-    units = {law.name: law.options.unit for law in component.laws("observable")}
-    for law in component.laws("joint"):
-        for name in law.options.coordinates:
-            size = length if units.get(name) == "m" else 1.0
-            coordinates.setdefault(name, (number() * size, number() * size))
-    inputs = {}
-    for name, signal in component.signal_specs().items():
-        size = length if signal.unit.exponents == (0, 1, 0, 0) else 1.0
-        inputs[name] = (abs(number()) * size, number() * size)
-    joint_references = {
-        name: (number(), number()) for name in connectors if name not in free and not _is_offered(component, name)
-    }
-    frames = frozenset(name for name, one in connectors.items() if isinstance(one, Frame) and space.has_rotation)
-    line_signs = {(a, b): 1.0 if i < j else -1.0 for i, a in enumerate(free) for j, b in enumerate(free)}
-    bodies = {name: _some_body(draw, length) for name in free}
-    for name, state in component.state_specs().items():
-        numbers = tuple(number() for _ in state.names(part.values))
-        values[name] = numbers if state.count else numbers[0]
-    return Trial(
-        part,
-        space,
-        length,
-        values,
-        inputs,
-        joint_references,
-        poses,
-        velocities,
-        angular_velocities,
-        coordinates,
-        frames,
-        bodies,
-        line_signs,
-    )
-
-
-def _some_body(draw: random.Random, length: float) -> Body:
-    """Return the inertia of two points and a sphere, which some body can have."""
-    place = Vector(*(draw.uniform(-0.3, 0.3) * length for _ in range(3)))
-    rows = [
-        Vector(*((dot(place, place) + length**2 if i == j else 0.0) - place[i] * place[j] for j in range(3)))
-        for i in range(3)
-    ]
-    return Body(draw.uniform(1.0, 3.0), place, (rows[0], rows[1], rows[2]))
-
-
-def _is_offered(component: Component, name: str) -> bool:
+def is_offered(component: Component, name: str) -> bool:
+    """Return whether a connector is one of an array that the component offers itself."""
     specs = component.connector_specs().values()
     return any(spec.of and name in spec.names(component) for spec in specs)
 
@@ -390,7 +301,7 @@ def nudged(pose: Pose, column: int, by: float, space: Space) -> Pose:
         return replace(pose, position=pose.position + space.basis[column] * by)
     if space.name == "plane":
         return Pose(pose.position, pose.angle + by, planar_axes(pose.angle + by))
-    axes = _compose(_turn(IDENTITY[column - directions], by), pose.axes)
+    axes = _compose(axes_turned(IDENTITY[column - directions], by), pose.axes)
     return Pose(pose.position, pose.angle, axes)
 
 

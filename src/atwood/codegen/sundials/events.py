@@ -221,7 +221,21 @@ entry:
   br i1 %leave, label %return, label %measure
 return:
   ret i32 %code
-measure:
+{_measure_text(size)}{_compare_text(count)}end:
+  %dips = and i1 %found.next, %known
+  br i1 %dips, label %say, label %nothing
+say:
+  store double 1.0, ptr %said.at
+  ret i32 -2
+nothing:
+  ret i32 0
+}}
+"""
+
+
+def _measure_text(size: int) -> str:
+    """Write how events are evaluated a little before the point too, along its tangent."""
+    return f"""measure:
   %known = fcmp ogt double %width, 0.0
   %before = load double, ptr %length.at
   %half = fmul double %before, 0.5
@@ -249,7 +263,12 @@ slope:
   %lost = call i32 @events(double %earlier, ptr %shifted, ptr %yp, ptr %others, ptr %data)
   %has = icmp eq i32 %lost, 0
   br label %each
-each:
+"""
+
+
+def _compare_text(count: int) -> str:
+    """Write the loop that asks of each event whether the tangents at both points leave room for a dip between them."""
+    return f"""each:
   %k = phi i64 [ 0, %slope ], [ %k.next, %each ]
   %found = phi i1 [ false, %slope ], [ %found.next, %each ]
   %value.at = getelementptr double, ptr %values, i64 %k
@@ -294,15 +313,6 @@ each:
   %k.next = add i64 %k, 1
   %k.more = icmp slt i64 %k.next, {count}
   br i1 %k.more, label %each, label %end
-end:
-  %dips = and i1 %found.next, %known
-  br i1 %dips, label %say, label %nothing
-say:
-  store double 1.0, ptr %said.at
-  ret i32 -2
-nothing:
-  ret i32 0
-}}
 """
 
 

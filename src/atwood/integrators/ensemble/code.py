@@ -57,6 +57,64 @@ def _prologue() -> str:
     return "\n".join(lines)
 
 
+_START = """\
+start:
+  %y.index = mul i64 %k, %size
+  %y.at = getelementptr double, ptr %starts, i64 %y.index
+  %tol.at = getelementptr double, ptr %tolerances, i64 %y.index
+  call void @llvm.memcpy.p0.p0.i64(ptr %tolerance, ptr %tol.at, i64 %bytes, i1 false)
+  store i64 %taken, ptr %base.at
+  store i64 0, ptr %done.at
+  %begun = call i32 %begin(ptr %session, double %t, ptr %y.at)
+  %is.begun = icmp eq i32 %begun, 0
+  br i1 %is.begun, label %go, label %finish
+"""
+"""Begins a run from its own start values, with its own tolerances."""
+
+_GO = """\
+go:
+  %first = load i64, ptr %done.at
+  %base.now = load i64, ptr %base.at
+  %run.limit = add i64 %base.now, %most
+  %is.less = icmp slt i64 %run.limit, %call.limit
+  %up.to = select i1 %is.less, i64 %run.limit, i64 %call.limit
+  store i64 %up.to, ptr %limit
+  %times.left = getelementptr double, ptr %times, i64 %first
+  %left = sub i64 %wanted, %first
+  %run.index = mul i64 %k, %row
+  %first.index = mul i64 %first, %size
+  %values.index = add i64 %run.index, %first.index
+  %values.left = getelementptr double, ptr %values, i64 %values.index
+  %code = call i32 %sample(ptr %session, ptr %times.left, i64 %left, ptr %values.left, ptr %rates)
+  %filled.now = load i64, ptr %filled
+  %reached = add i64 %first, %filled.now
+  store i64 %reached, ptr %done.at
+  %is.stopped = icmp eq i32 %code, 1
+  br i1 %is.stopped, label %why, label %finish
+why:
+  %steps.now = load i64, ptr %steps
+  %has.all = icmp sge i64 %steps.now, %run.limit
+  br i1 %has.all, label %finish, label %pause
+"""
+"""Goes on with a run, as far as the steps of the run and of the call allow."""
+
+_FINISH = """\
+finish:
+  %ended = phi i32 [ %begun, %start ], [ %code, %go ], [ 1, %why ]
+  %ended.long = sext i32 %ended to i64
+  %code.at = getelementptr i64, ptr %codes, i64 %k
+  store i64 %ended.long, ptr %code.at
+  %c.index = mul i64 %k, %counts
+  %c.at = getelementptr i64, ptr %counted, i64 %c.index
+  call void @llvm.memcpy.p0.p0.i64(ptr %c.at, ptr %steps, i64 %count.bytes, i1 false)
+  %following = add i64 %k, 1
+  store i64 %following, ptr %run.at
+  store i64 -1, ptr %done.at
+  br label %next
+"""
+"""Notes how a run ended and what it cost."""
+
+
 def batch_code() -> str:
     """Return the function ``int batch(void *job)``: 0 when all runs are done, 1 when its budget of steps is used up.
 
@@ -92,52 +150,7 @@ bind:
   %p.at = getelementptr double, ptr %parameters, i64 %p.index
   call void %prologue(ptr %p.at, ptr %derived, ptr %scratch)
   br label %start
-start:
-  %y.index = mul i64 %k, %size
-  %y.at = getelementptr double, ptr %starts, i64 %y.index
-  %tol.at = getelementptr double, ptr %tolerances, i64 %y.index
-  call void @llvm.memcpy.p0.p0.i64(ptr %tolerance, ptr %tol.at, i64 %bytes, i1 false)
-  store i64 %taken, ptr %base.at
-  store i64 0, ptr %done.at
-  %begun = call i32 %begin(ptr %session, double %t, ptr %y.at)
-  %is.begun = icmp eq i32 %begun, 0
-  br i1 %is.begun, label %go, label %finish
-go:
-  %first = load i64, ptr %done.at
-  %base.now = load i64, ptr %base.at
-  %run.limit = add i64 %base.now, %most
-  %is.less = icmp slt i64 %run.limit, %call.limit
-  %up.to = select i1 %is.less, i64 %run.limit, i64 %call.limit
-  store i64 %up.to, ptr %limit
-  %times.left = getelementptr double, ptr %times, i64 %first
-  %left = sub i64 %wanted, %first
-  %run.index = mul i64 %k, %row
-  %first.index = mul i64 %first, %size
-  %values.index = add i64 %run.index, %first.index
-  %values.left = getelementptr double, ptr %values, i64 %values.index
-  %code = call i32 %sample(ptr %session, ptr %times.left, i64 %left, ptr %values.left, ptr %rates)
-  %filled.now = load i64, ptr %filled
-  %reached = add i64 %first, %filled.now
-  store i64 %reached, ptr %done.at
-  %is.stopped = icmp eq i32 %code, 1
-  br i1 %is.stopped, label %why, label %finish
-why:
-  %steps.now = load i64, ptr %steps
-  %has.all = icmp sge i64 %steps.now, %run.limit
-  br i1 %has.all, label %finish, label %pause
-finish:
-  %ended = phi i32 [ %begun, %start ], [ %code, %go ], [ 1, %why ]
-  %ended.long = sext i32 %ended to i64
-  %code.at = getelementptr i64, ptr %codes, i64 %k
-  store i64 %ended.long, ptr %code.at
-  %c.index = mul i64 %k, %counts
-  %c.at = getelementptr i64, ptr %counted, i64 %c.index
-  call void @llvm.memcpy.p0.p0.i64(ptr %c.at, ptr %steps, i64 %count.bytes, i1 false)
-  %following = add i64 %k, 1
-  store i64 %following, ptr %run.at
-  store i64 -1, ptr %done.at
-  br label %next
-all:
+{_START}{_GO}{_FINISH}all:
   ret i32 0
 pause:
   ret i32 1

@@ -10,34 +10,38 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from atwood.errors import AtwoodError, DeclarationError, UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, depends_on, live
 from atwood.late import dataclass
 from atwood.model.declare.carried_inertia import Asked, Carried
-from atwood.model.declare.component import Binding, bind
-from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
+from atwood.model.declare.component import bind
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.law import Law
 from atwood.model.declare.laws import scalars
+from atwood.model.local.bound import bind_part
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.gravity_field import energies_in
 from atwood.model.local.joint_coordinates import (
-    JointReference,
     counting_constraints,
-    find_joint_references,
     formulas_of,
     turns_read,
 )
 from atwood.model.local.joint_references import JointCoordinateUse, find_joint_coordinate_uses
 from atwood.model.local.moving_mass import check_lagrangians, find_varying
-from atwood.model.local.parameters import ParameterTable, read_parameter, read_signal, read_variation
-from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalJoint, LocalPart, multiplier_symbol
-from atwood.model.local.states import discrete_states, local_states, state_values
+from atwood.model.local.parameters import ParameterTable
+from atwood.model.local.parts import (
+    LocalConnector,
+    LocalConstraint,
+    LocalJoint,
+    LocalPart,
+    LocalState,
+    multiplier_symbol,
+)
+from atwood.model.local.states import discrete_states, local_states
 from atwood.model.returned import call_law, law_value, listed, one_scalar
-from atwood.model.values.space import FIXED_AXES, Space, planar_axes
-from atwood.model.values.vector import Vector
+from atwood.model.values.space import Space
 
 __all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "localize"]
 
@@ -107,16 +111,6 @@ _PLACES = {"line": "on a line", "plane": "in a plane", "space": "in space"}
 
 
 @dataclass(frozen=True)
-class _Bound:
-    """A part on its symbols, before its laws are evaluated."""
-
-    binding: Binding
-    connectors: dict[str, LocalConnector]
-    signal_symbols: dict[str, Expression]
-    joint_references: Sequence[JointReference]
-
-
-@dataclass(frozen=True)
 class _Laws:
     """The laws of a part that hold in the space and the mode."""
 
@@ -140,43 +134,6 @@ class _Laws:
         return [one for law in self.of(kind) for one in call_law(self.part.path, law, partial(_listed, bound, law))]
 
 
-def _bind_part(
-    part: Part,
-    flat: FlatScene,
-    space: Space,
-    time: Expression,
-    table: ParameterTable,
-    line_signs: Mapping[tuple[str, str, str], float] | None,
-    taken: Sequence[tuple[JointCoordinateUse, LocalPart]],
-) -> _Bound:
-    """Return the symbols of a part, and the numbers of its parameters."""
-    graph, component = table.graph, part.component
-    values = {name: read_parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
-    signal_symbols: dict[str, Expression] = {}
-    for name, given in part.signals.items():
-        value = read_signal(part, name, given, flat, time, table, signal_symbols)
-        is_varied = (part.path, name) in flat.varied
-        values[name] = value + read_variation(f"{part.path}.{name}", flat, time, table) if is_varied else value
-    values |= state_values(part, graph)
-    connectors = {
-        name: _local_connector(f"{part.path}.{name}", isinstance(one, Frame), space, graph)
-        for name, one in component.connectors().items()
-        if not isinstance(one, JointCoordinate)
-    }
-    joint_references = find_joint_references(taken, graph)
-    motions = {name: local_motion(symbols, space) for name, symbols in connectors.items()}
-    motions.update({one.connector: Motion(value=one.value, rate=one.rate) for one in joint_references})
-    own_line_signs = (
-        None if line_signs is None else {(a, b): s for (path, a, b), s in line_signs.items() if path == part.path}
-    )
-    binding = Binding(
-        values=values, motions=motions, time=time, space=space.name, line=space.line, line_signs=own_line_signs
-    )
-    for one in joint_references:
-        connectors.update(one.connectors)
-    return _Bound(binding, connectors, signal_symbols, joint_references)
-
-
 def _localize_part(
     part: Part,
     flat: FlatScene,
@@ -190,14 +147,10 @@ def _localize_part(
     carried: Mapping[tuple[str, str], Carried],
 ) -> LocalPart:
     graph, component = table.graph, part.component
-    symbols = _bind_part(part, flat, space, time, table, line_signs, taken)
+    symbols = bind_part(part, flat, space, time, table, line_signs, taken)
     binding, connectors = symbols.binding, symbols.connectors
     bound = bind(component, binding)  # inertia and joints say what bodies there are, and may not ask what these have
-    known = {
-        name: replace(one, body=carried.get((part.path, name)) or Asked(graph, f"{part.path}.{name}"))
-        for name, one in binding.motions.items()
-    }
-    binding = replace(binding, motions=known)
+    binding = _with_bodies(binding, part.path, carried, graph)
     acting = bind(component, binding)
     mode = modes.get(part.path, component.modes[0] if component.modes else "")
     laws, own, linked = _Laws(part, space, mode, graph), [*connectors.values()], symbols.signal_symbols.values()
@@ -212,18 +165,12 @@ def _localize_part(
     # Only forces may read reactions: they are solved for together with the accelerations.
     binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
     acting = bind(component, binding)
-    dissipations, given = laws.scalars(acting, "dissipation"), laws.listed(acting, "force")
-    loads = [one for one in given if isinstance(one, Load)]
-    stand_ins, along = _coordinate_loads(part, [one for one in given if isinstance(one, CoordinateLoad)], graph)
-    dissipations = (*dissipations, *along)
-    states = local_states(part, laws.of("derivative"), acting, graph)
-    forces: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components), *(x.rate for x in states)]
-    forces += stand_ins.values()
-    acted = [*potentials, *lagrangians, *(graph.convert(one) for one in forces)]
+    given = _forces_of(laws, acting)
+    acted = [*potentials, *lagrangians, *(graph.convert(one) for one in given.values)]
     acted += _linked_outputs(part, flat, acting, graph) if formulas else []
     turns = turns_read(part, formulas, acted)
     counted = {*counted, *(symbol.name.rpartition(".")[2] for symbol in turns)}
-    _check_reads(part, connectors, potentials, dissipations)
+    _check_reads(part, connectors, potentials, given.dissipations)
     return LocalPart(
         part=part,
         binding=binding,
@@ -232,8 +179,8 @@ def _localize_part(
         point_inertias=tuple(one for one in inertias if isinstance(one, PointInertia)),
         body_inertias=tuple(one for one in inertias if isinstance(one, BodyInertia)),
         potentials=potentials,
-        dissipations=dissipations,
-        loads=tuple(loads),
+        dissipations=given.dissipations,
+        loads=given.loads,
         constraints=(*constraints, *counting_constraints(part, counted, formulas, graph)),
         signal_symbols=symbols.signal_symbols,
         formulas={**formulas, **{one.symbol: (one.value, one.rate) for one in symbols.joint_references}},
@@ -242,11 +189,50 @@ def _localize_part(
         turns=turns,
         lagrangians=lagrangians,
         varying=find_varying(part.path, inertias, own, linked, graph),
-        reads=_multipliers_read(part, constraints, forces, graph),
-        stand_ins=stand_ins,
-        states=states,
+        reads=_multipliers_read(part, constraints, given.values, graph),
+        stand_ins=given.stand_ins,
+        states=given.states,
         discrete_states=discrete_states(part, graph),
     )
+
+
+def _with_bodies(binding: Binding, path: str, carried: Mapping[tuple[str, str], Carried], graph: Graph) -> Binding:
+    """Return a binding whose motions have the inertia of the bodies that connectors are on, or note who asks for it."""
+    motions = {
+        name: replace(one, body=carried.get((path, name)) or Asked(graph, f"{path}.{name}"))
+        for name, one in binding.motions.items()
+    }
+    return replace(binding, motions=motions)
+
+
+class _Forces(NamedTuple):
+    """What may read reactions: Rayleigh functions, loads, and the rates of states.
+
+    Attributes
+    ----------
+    dissipations, loads, stand_ins, states
+        See `LocalPart`.
+    values
+        All values that these consist of.
+    """
+
+    dissipations: tuple[Expression, ...]
+    loads: tuple[Load, ...]
+    stand_ins: Mapping[Expression, Expression]
+    states: tuple[LocalState, ...]
+    values: list[Scalar]
+
+
+def _forces_of(laws: _Laws, acting: Any) -> _Forces:
+    """Evaluate the laws of a part that may read its reactions."""
+    part, graph = laws.part, laws.graph
+    dissipations, given = laws.scalars(acting, "dissipation"), laws.listed(acting, "force")
+    loads = tuple(one for one in given if isinstance(one, Load))
+    stand_ins, along = _coordinate_loads(part, [one for one in given if isinstance(one, CoordinateLoad)], graph)
+    dissipations = (*dissipations, *along)
+    states = local_states(part, laws.of("derivative"), acting, graph)
+    values: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components), *(x.rate for x in states)]
+    return _Forces(dissipations, loads, stand_ins, states, [*values, *stand_ins.values()])
 
 
 def _coordinate_loads(
@@ -330,36 +316,6 @@ def _check_reads(
 def _listed(bound: Any, law: Law) -> list[Any]:
     return listed(
         getattr(bound, law.name)(), (Load, CoordinateLoad) if law.kind == "force" else (PointInertia, BodyInertia)
-    )
-
-
-def _local_connector(path: str, is_frame: bool, space: Space, graph: Graph) -> LocalConnector:
-    position = tuple(graph.symbol(f"{path}.position.{axis}") for axis in space.axis_names)
-    velocity = tuple(graph.symbol(f"{path}.velocity.{axis}") for axis in space.axis_names)
-    if not is_frame or not space.has_rotation:
-        return LocalConnector(position, velocity)
-    if space.name == "plane":
-        turns = graph.symbol(f"{path}.angle"), graph.symbol(f"{path}.angular_speed")
-        return LocalConnector(position, velocity, *turns)
-    x, y, z = (Vector(*(graph.symbol(f"{path}.{axis}_axis.{c}") for c in "xyz")) for axis in "xyz")
-    spin = Vector(*(graph.symbol(f"{path}.angular_velocity.{c}") for c in "xyz"))
-    return LocalConnector(position, velocity, axes=(x, y, z), angular_velocity=spin)
-
-
-def local_motion(symbols: LocalConnector, space: Space) -> Motion:
-    """Return the motion of a connector in terms of its symbols; the plane's rotation is about -y."""
-    position, velocity = space.vector(symbols.position), space.vector(symbols.velocity)
-    if symbols.axes is not None:
-        return Motion(position, velocity, axes=symbols.axes, angular_velocity=symbols.angular_velocity)
-    if symbols.angle is None or symbols.angular_speed is None:
-        still = Vector(0.0, 0.0, 0.0)
-        return Motion(position, velocity, axes=FIXED_AXES, angle=0.0, angular_velocity=still)
-    return Motion(
-        position,
-        velocity,
-        axes=planar_axes(symbols.angle),
-        angle=symbols.angle,
-        angular_velocity=Vector(0.0, -symbols.angular_speed, 0.0),
     )
 
 
