@@ -16,7 +16,7 @@ from atwood.errors import AtwoodError, DeclarationError, UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, depends_on, live
 from atwood.late import dataclass
 from atwood.model.declare.carried_inertia import Asked, Carried
-from atwood.model.declare.component import bind
+from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.law import Law
 from atwood.model.declare.laws import scalars
