@@ -248,7 +248,8 @@ def simulate(
         states before and after each event.
     max_steps, max_seconds
         Limits; a run that meets one returns what it has, and says so in its status. The time counts from this call
-        on; a result may have no samples where it does not last to find the start.
+        on; a result may have no samples where it does not last to find the start. What is left of it holds for
+        `Result.energy`, which makes some runs again.
     max_step
         The largest step, s.
     solver

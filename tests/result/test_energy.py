@@ -10,10 +10,13 @@ import pytest
 
 import atwood_library as lib
 from atwood import Component, Point, Result, Scalar, Scene, connector, external, potential, select, simulate, sin
+from atwood.clock import check_time
 from atwood.errors import ResultError
 from atwood.expr import ExternalFunction
 from atwood.result.work import integral_in_steps, integral_of_samples, nodes_between
+from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.retrace import run_again, times_of_steps
+from atwood.simulation.run.run import Run
 from atwood_library.scenes import SCENES
 
 from ..helpers.runs import FORMS
@@ -283,3 +286,22 @@ def test_power_that_has_no_value_at_a_sample_is_an_error_and_no_drift_of_zero() 
     result = simulate(scene, t_end=1.0, solver="ida")
     with pytest.raises(ResultError, match="has no value"):
         _ = result.energy
+
+
+def test_the_limit_of_a_run_holds_for_making_it_again() -> None:
+    """The ledger is then that of the samples, and says how uncertain it is; with time left it is that of the steps."""
+    result = simulate(SCENES["driven-pendulum"](), rtol=1e-9, samples=10, outputs=5, max_seconds=60.0)
+    run, made = result.run, []
+
+    def again(options: RunOptions, between: np.ndarray) -> Run:
+        made.append(options)
+        while True:  # a run that looks at the clock, and takes longer than it did
+            check_time()
+
+    assert run.again is not None
+    whole = Result(run).energy
+    for used, times in ((59.8, 1), (61.0, 0)):
+        made.clear()
+        energy = Result(replace(run, again=again, timings={"integration": used})).energy
+        assert len(made) == times
+        assert energy.uncertainty > whole.uncertainty

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
+from atwood.clock import Clock, TimeIsUp, check_time
 from atwood.result.accounts import power_into
 from atwood.result.energy import EnergyLedger, Piece, make_ledger
 from atwood.result.segment_quantities import SegmentQuantities
@@ -102,7 +103,8 @@ def find_ledger(
 
     Work is integrated through the samples where that is accurate enough to tell the drift, which is mostly so. Where it
     is not, the run is made again to see what it did within its steps, since integrals that follow the steps are as
-    accurate as the solver itself.
+    accurate as the solver itself. The run's limit of time holds for both together: where it is used up, the samples
+    must do, and the ledger's uncertainty says how far they do.
 
     Parameters
     ----------
@@ -126,7 +128,13 @@ def find_ledger(
     few = run.statistics.steps > min(_SEEN[one] for one in solvers) * sum(len(one.time) for one in pieces)
     if not (hidden or (few and ledger.max_drift > _SUSPECT * rtol)):
         return ledger
-    found = _work_in_steps(run, pieces, max(_NODES[one] for one in solvers))
+    limit = run.options.max_seconds
+    try:
+        with Clock(None if limit is None else limit - sum(run.timings.values())).kept():
+            check_time()
+            found = _work_in_steps(run, pieces, max(_NODES[one] for one in solvers))
+    except TimeIsUp:
+        return ledger
     return ledger if found is None else make_ledger(pieces, *found, shown)
 
 

@@ -59,7 +59,7 @@ def _repeat(run: Run, between: FloatArray, on_step: Callable[[float], object] | 
     if run.again is None:
         return None
     limit = run.options.max_steps if run.status in _WHOLE else run.statistics.steps
-    options = replace(run.options, progress=None, max_seconds=None, max_steps=limit, on_step=on_step)
+    options = replace(run.options, progress=None, max_steps=limit, on_step=on_step)
     try:
         with warnings.catch_warnings():  # they have been said before
             warnings.simplefilter("ignore")
