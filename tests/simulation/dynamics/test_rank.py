@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from atwood import StartError, simulate
 from atwood.codegen.rounding import ROUGHNESS, WAYS, RoughProgram, roughly
 from atwood.expr import Graph, InputGroup, OutputGroup, Program, cos, sin
 from atwood.linalg.sparse import csr_of
@@ -17,6 +18,7 @@ from atwood.simulation.dynamics.rank import (
     review_rows,
     row_scales,
 )
+from atwood_library.scenes import FourBar
 
 EPS = float(np.finfo(float).eps)
 EXACT = np.zeros(3)
@@ -276,3 +278,18 @@ def test_a_constraint_on_velocities_takes_no_place_of_one_on_positions() -> None
     assert review_rows(rows, exact, [0, 2]) == [1, 2]
     assert review_rows(rows, exact, [0, 2], positions) == [0, 2]
     assert independent_rows(rows, exact, first=positions) == [0, 2]
+
+
+@pytest.mark.parametrize(("angle", "is_singular"), [(1e-12, True), (1e-9, True), (1e-8, True), (1e-6, False)])
+def test_both_forms_call_the_same_starts_singular(angle: float, is_singular: bool) -> None:
+    """Of a parallelogram in line: a row of the reduced form vanishes there, one of the dae form follows from others."""
+    for form in ("reduced", "dae"):
+        scene = FourBar(crank_length=1.0, coupler_length=2.0, rocker_length=1.0, frame_length=2.0)
+        scene.start["crank.angle"] = angle
+        scene.guess["coupler.angle"] = 0.0
+        scene.guess["rocker.angle"] = angle
+        if is_singular:
+            with pytest.raises(StartError, match="the start is a singular position"):
+                simulate(scene, form=form)
+        else:
+            assert simulate(scene, form=form, t_end=0.3, outputs=2).status == "finished"

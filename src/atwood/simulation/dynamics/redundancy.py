@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
+from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import KernelEvaluationError
 from atwood.late import dataclass
 from atwood.linalg.matrices import scaled, to_array
@@ -94,9 +95,10 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     if count == 0:
         return RankFinding((), (), 0, 0)
     here = _look(balance, t, q, scales)
-    sizes = row_sizes(here.jacobian, np.ones(len(scales)))
+    # A row may be small because it vanishes at a singular position: it is measured by the terms that cancel in it.
+    units = np.maximum(row_sizes(here.jacobian, np.ones(len(scales))), here.errors / ROUGHNESS)
     everything = list(range(count))
-    if len(here.kept) == count and here.smallest(everything, sizes)[-1] > tolerances.CLEAR:
+    if len(here.kept) == count and here.smallest(everything, units)[-1] > tolerances.CLEAR:
         return RankFinding(tuple(everything), (), count, count)
     nearby, is_movable = _nearby(balance, t, q, scales, here)
     if is_movable and not nearby:
