@@ -258,10 +258,10 @@ def simulate(
         and ``"taylor"``: Taylor series, for the reduced form without closed loops. ``"auto"``: IDA for what is
         constrained or stiff, or turns out so; else an explicit method. `Result.solver` says which, and why.
         ``"gauss"``: a symplectic method with equal steps, whose energy error does not grow, for scenes that have a
-        Hamiltonian.
+        Hamiltonian. ``"composition"``: the same where that is T(p) + V(q, t), by explicit steps.
     order, step
-        Of ``"gauss"``: the order, 2, 4, 6, 8, 10 or 12 (8 if not given), and the step, s. A step that is not given is
-        chosen so that the first steps are within the tolerances.
+        Of ``"gauss"`` the order, 2, 4, 6, 8, 10 or 12, and of ``"composition"``, up to 8 (8 if not given), and the
+        step, s. A step that is not given is chosen so that the first steps are within the tolerances.
     samples
         The run is sampled at least so often, whatever is shown of it: for the work that is put in, and for angles to
         count their turns. More are taken where functions of time change faster, unless this is 1.

@@ -31,7 +31,9 @@ from atwood_library.scenes import (
     FreeBody,
     Kepler,
     LagrangeTop,
+    NBody,
     RollingDisc,
+    RotatingHoopDriven,
     SimplePendulum,
     SphericalPendulum,
 )
@@ -52,10 +54,48 @@ def test_the_order_is_that_of_the_method(order):
     assert observed == pytest.approx(order, abs=0.6)
 
 
+@pytest.mark.parametrize(("order", "count"), [(2, 80), (4, 80), (6, 80), (8, 60)])
+def test_compositions_have_their_order(order, count):
+    """One turn of a planet, which is at its start again."""
+    errors = []
+    for steps in (count, 2 * count):
+        run = simulate(
+            Kepler(eccentricity=0.3),
+            t_end=4.0 * np.pi,
+            solver="composition",
+            order=order,
+            step=2.0 * np.pi / steps,
+            outputs=[0.0, 4.0 * np.pi],
+            samples=1,
+        )
+        errors.append(np.hypot(run["body.position.x"][-1] - 0.7, run["body.position.z"][-1]))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.5)
+
+
+@pytest.mark.parametrize("scene", [SimplePendulum(), RotatingHoopDriven(), NBody()], ids=["pendulum", "hoop", "bodies"])
+def test_compositions_come_where_others_do(scene):
+    ours = simulate(scene, t_end=1.0, solver="composition", rtol=1e-11)
+    theirs = simulate(scene, t_end=1.0, rtol=1e-12)
+    for path in scene.start:
+        np.testing.assert_allclose(ours[path], theirs[path], atol=2e-8)
+
+
+@pytest.mark.parametrize("scene", [DoublePendulum(), ChargedParticle()], ids=["double pendulum", "charge"])
+def test_what_does_not_separate_has_no_composition(scene):
+    with pytest.raises(UnsupportedError, match="its H is no sum of a function of momenta and one of coordinates"):
+        simulate(scene, solver="composition")
+
+
+def test_there_is_no_composition_of_order_ten():
+    with pytest.raises(UsageError, match="there is no composition of order 10"):
+        simulate(SimplePendulum(), solver="composition", order=10)
+
+
 LONG = {
     "pendulum": (SimplePendulum(), 2.1397, 6, 24.3),
     "Kepler": (Kepler(eccentricity=0.5), 2.0 * np.pi, 8, 50.3),
     "spherical pendulum": (SphericalPendulum(coordinates="angles"), 2.0, 6, 40.3),
+    "Kepler by a composition": (Kepler(eccentricity=0.5), 2.0 * np.pi, 6, 80.3),
 }
 
 
@@ -63,9 +103,10 @@ LONG = {
 def test_the_energy_error_does_not_grow(case):
     """Over a thousand periods; `benchmarks/symplectic.py` shows a hundred thousand."""
     scene, period, order, count = LONG[case]
+    solver = "composition" if "composition" in case else "gauss"
     end = 1000.0 * period
     times = np.concatenate([np.linspace(0.0, 0.1 * end, 1500), np.linspace(0.9 * end, end, 1500)])
-    run = simulate(scene, t_end=end, solver="gauss", order=order, step=period / count, outputs=times, samples=1)
+    run = simulate(scene, t_end=end, solver=solver, order=order, step=period / count, outputs=times, samples=1)
     errors = np.abs(run.energy.total - run.energy.total[0])
     first, last = np.max(errors[:1500]), np.max(errors[1500:])
     assert last <= 2.0 * first
@@ -161,7 +202,7 @@ def test_what_has_no_hamiltonian_is_refused(make, error, said):
 def test_settings_that_mean_nothing_are_refused():
     with pytest.raises(UsageError, match="order cannot be 3"):
         simulate(SimplePendulum(), solver="gauss", order=3)
-    with pytest.raises(UsageError, match="is for the solver 'gauss'"):
+    with pytest.raises(UsageError, match="is for the solvers 'gauss'"):
         simulate(SimplePendulum(), step=0.1)
     with pytest.raises(SolveError, match="give a smaller step"):
         simulate(SimplePendulum(), solver="gauss", step=10.0)

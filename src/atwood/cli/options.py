@@ -25,7 +25,7 @@ ORIENTATION = click.option(
 
 FORM = click.Choice(["reduced", "dae"])
 LEVEL = click.Choice(["ggl", "index1", "index1-projected"])
-SOLVER = click.Choice(["auto", "ida", "ida-sundae", "explicit", "taylor", "gauss"])
+SOLVER = click.Choice(["auto", "ida", "ida-sundae", "explicit", "taylor", "gauss", "composition"])
 FILE = click.Path(dir_okay=False, path_type=Path)
 
 

@@ -18,14 +18,16 @@ from atwood.errors import UnsupportedError, UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute, vjp
 from atwood.forms.accelerations import solve_symmetric
 from atwood.forms.assembly import Assembly
+from atwood.forms.by_hand import as_by_hand
 from atwood.forms.kept import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_along_speeds
 from atwood.forms.program import rates_are_speeds
 from atwood.late import dataclass
 
-__all__ = ["CanonicalPrograms", "canonical_programs", "is_canonical"]
+__all__ = ["CanonicalPrograms", "SeparablePrograms", "canonical_programs", "is_canonical", "separable_programs"]
 
 _CANONICAL: Key[CanonicalPrograms] = Key("canonical equations")
+_SEPARABLE: Key[SeparablePrograms | None] = Key("separable equations")
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +80,52 @@ def is_canonical(assembly: Assembly) -> bool:
     return not any(node.operation == "external" for node in found.equations.nodes)
 
 
+@dataclass(frozen=True, eq=False)
+class SeparablePrograms:
+    """Hamilton's equations of a scene with ``H = T(p) + V(q, t)``.
+
+    Attributes
+    ----------
+    forces
+        Program of (t, q) with p'.
+    velocities
+        Program of p with q'.
+    """
+
+    forces: Program
+    velocities: Program
+
+
+def separable_programs(assembly: Assembly) -> SeparablePrograms | None:
+    """Return Hamilton's equations of a scene whose H is a sum of a function of p and one of q; None where it is none.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+
+    Raises
+    ------
+    UnsupportedError
+        If it has no Hamiltonian.
+    """
+    return assembly.shared.get(_SEPARABLE, lambda: _separate(assembly))
+
+
+def _separate(assembly: Assembly) -> SeparablePrograms | None:
+    found = canonical_programs(assembly)
+    (time,), q, p = (group.symbols for group in found.equations.inputs[:3])
+    if not found.plain or found.moving_mass:
+        return None
+    rates, pushes = (group.expressions for group in found.equations.outputs[:2])
+    if any(depends_on(one, [time, *q]) for one in rates) or any(depends_on(one, p) for one in pushes):
+        return None
+    name, parameters = assembly.flat.name, assembly.parameters
+    forces = Program(f"{name} (forces)", found.equations.inputs[:2], parameters, (OutputGroup("forces", pushes),))
+    along = Program(f"{name} (velocities)", (found.equations.inputs[2],), parameters, (OutputGroup("rates", rates),))
+    return SeparablePrograms(forces, along)
+
+
 def _refuse(assembly: Assembly, found: Lagrangian) -> None:
     """Refuse a scene that is no Hamiltonian system."""
     equations, name = assembly.reduced, assembly.flat.name
@@ -105,7 +153,7 @@ def _make(assembly: Assembly) -> CanonicalPrograms:
     graph, q, u = found.graph, list(found.coordinates), list(found.velocities)
     plain = rates_are_speeds(equations)
     p = [graph.symbol(f"P:{one.name}") for one in found.names]
-    rates, lagrangian = list(found.rates), found.lagrangian
+    rates, (lagrangian,) = list(found.rates), as_by_hand(equations, assembly.parameters, [found.lagrangian])
     momenta = vjp([lagrangian], [graph.one], u)
     mass = jacobian(momenta, u)
     entries = {(i, j): one for i, j, one in zip(mass.rows, mass.columns, mass.entries, strict=True)}

@@ -23,10 +23,10 @@ _CLEAR, _PART = 0.01, 0.1
 _SUSPECT = 100.0
 """So many tolerances of drift, where samples may be too few to see what the power does, are looked at more closely."""
 
-_NODES = {"ida": 3, "ida-sundae": 3, "explicit": 7, "taylor": 12, "gauss": 6}
+_NODES = {"ida": 3, "ida-sundae": 3, "explicit": 7, "taylor": 12, "gauss": 6, "composition": 6}
 """Points of Gauss and Legendre in a step, by the order of what makes the step."""
 
-_SEEN = {"ida": 2.0, "ida-sundae": 2.0, "explicit": 0.3, "taylor": 0.1, "gauss": 0.5}
+_SEEN = {"ida": 2.0, "ida-sundae": 2.0, "explicit": 0.3, "taylor": 0.1, "gauss": 0.5, "composition": 0.5}
 """So many steps from sample to sample leave nothing unseen between the two."""
 
 

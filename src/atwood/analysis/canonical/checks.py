@@ -8,6 +8,7 @@ from atwood.analysis.canonical.legendre import LegendreTransform
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, KernelEvaluationError, UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
+from atwood.showing import count_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.tolerances import tolerances
@@ -53,8 +54,8 @@ def refuse_without_hamiltonian(assembly: Assembly) -> None:
         )
     if equations.constraints:
         raise UnsupportedError(
-            f"closed loops tie its {len(equations.coordinates)} coordinates by {len(equations.constraints)} "
-            "constraints, so that their momenta are not free",
+            f"closed loops tie its {count_of(len(equations.coordinates), 'coordinate')} by "
+            f"{count_of(len(equations.constraints), 'constraint')}, so that their momenta are not free",
             where=equations.constraints[0].key[0],
             advice="Take coordinates that the constraints leave free, such as angles in place of positions; or "
             "`equations`, which keeps the constraints with multipliers.",

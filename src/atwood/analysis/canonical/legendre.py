@@ -15,7 +15,7 @@ import numpy as np
 from atwood.analysis.number_functions import Function, Numbers
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, SolveError
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, vjp
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.lagrangian import Lagrangian
@@ -87,8 +87,7 @@ class LegendreTransform:
             return self._hessian(t, (coordinates, np.broadcast_to(still, coordinates.shape)), None)
         shape = (*coordinates.shape[:-1], n, n)
         units = np.broadcast_to(np.eye(n), shape)
-        places = np.broadcast_to(coordinates[..., None, :], shape)
-        columns = self.momenta(places, units, t) - self.momenta(coordinates, np.zeros(n), t)[..., None, :]
+        columns = self._columns(t, (np.broadcast_to(coordinates[..., None, :], shape), units), None)
         return np.asarray(0.5 * (columns + np.swapaxes(columns, -1, -2)))
 
     def velocities(self, q: Numbers, p: Numbers, t: float | None = None) -> FloatArray:
@@ -191,6 +190,15 @@ class LegendreTransform:
         found = self.lagrangian
         losses = vjp([found.rayleigh], [found.graph.one], list(self.velocity_symbols))
         return tuple(found.forces[k] - loss for k, loss in zip(self.force_order, losses, strict=True))
+
+    @cached_property
+    def _columns(self) -> Function:
+        """The product of the mass matrix with a direction, which stands in the place of the velocities."""
+        graph = self.lagrangian.graph
+        back: dict[Expression, Expression | float] = {
+            graph.symbol(f"direction:{v.name}"): v for v in self.velocity_symbols
+        }
+        return self._function("columns", lambda: substitute(self._inertia, back), (self.size,))
 
     @cached_property
     def _hessian(self) -> Function:

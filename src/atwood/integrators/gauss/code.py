@@ -13,7 +13,7 @@ from atwood.integrators.gauss.tableau import Tableau
 from atwood.integrators.gauss.writer import Code
 from atwood.integrators.machine_text import exact, sample_code
 
-__all__ = ["FUNCTIONS", "gauss_code"]
+__all__ = ["FUNCTIONS", "gauss_code", "interpolate_code", "samples_code"]
 
 FUNCTIONS = ("run", "interpolate", "sample", "begin", "trial", "speeds")
 
@@ -288,7 +288,7 @@ def _trial(layout: Layout) -> str:
     return c.text()
 
 
-def _interpolate(layout: Layout) -> str:
+def interpolate_code(layout: Layout) -> str:
     """Return the function that writes values and rates at a time within the last step, by a step of its own."""
     c, places = Code("i32 @interpolate(ptr %mem, double %time, ptr %out, ptr %yps)"), layout.places
     t, t_old = (c.load("%mem", places["numbers"] + NUMBERS.index(name)) for name in ("t", "t_old"))
@@ -313,7 +313,7 @@ def _interpolate(layout: Layout) -> str:
     return c.text()
 
 
-def _sample(layout: Layout) -> str:
+def samples_code(layout: Layout) -> str:
     """Return the function that goes through output times and fills a table; it ends as `run` does."""
     places, width = layout.places, layout.coordinates + layout.speeds
     stop = places["numbers"] + NUMBERS.index("stop")
@@ -330,4 +330,4 @@ def gauss_code(layout: Layout, method: Tableau) -> str:
     """
     parts = [_evaluate(layout), *(_stage(layout, method, j) for j in range(layout.stages)), _solve(layout)]
     parts += [_flat(layout, method), _ahead(layout, method), _advance(layout), _speeds(layout), _begin(layout, method)]
-    return "\n".join([*parts, _run(layout), _trial(layout), _interpolate(layout), _sample(layout)])
+    return "\n".join([*parts, _run(layout), _trial(layout), interpolate_code(layout), samples_code(layout)])

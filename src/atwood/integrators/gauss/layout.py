@@ -8,7 +8,7 @@ from atwood.late import dataclass
 
 __all__ = ["COUNTS", "NUMBERS", "POINTERS", "Layout"]
 
-POINTERS = ("derived", "scratch", "rates", "rates_data")
+POINTERS = ("derived", "scratch", "rates", "rates_data", "derived_2")
 NUMBERS = ("t", "t_old", "stop", "step", "origin")
 COUNTS = ("limit", "steps", "failures", "evaluations", "undefined", "filled", "since")
 

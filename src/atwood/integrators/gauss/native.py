@@ -5,10 +5,11 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
+from typing import Protocol
 
 import numpy as np
 
-from atwood.codegen.llvm.build import build_code, default_options
+from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.errors import KernelEvaluationError, SolveError, UnsupportedError
 from atwood.expr import Program
@@ -19,7 +20,7 @@ from atwood.integrators.gauss.layout import COUNTS, NUMBERS, POINTERS, Layout
 from atwood.integrators.gauss.tableau import tableau
 from atwood.integrators.protocol import FloatArray
 
-__all__ = ["CompiledGauss", "GaussStepper"]
+__all__ = ["CompiledGauss", "CompiledMethod", "GaussStepper", "bind_functions"]
 
 _UNLIMITED = 2**62
 _NO_VALUE = 3
@@ -34,6 +35,24 @@ _SHAPES = {
     "trial": (c_void_p, c_double, c_double, c_void_p, c_void_p),
     "speeds": (c_void_p, c_double, c_void_p, c_void_p),
 }
+
+
+def bind_functions(built: Built) -> dict[str, Callable[..., int]]:
+    """Return the functions of a method by name, to be called from Python."""
+    addresses = built.code.addresses
+    return {name: ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in _SHAPES.items()}
+
+
+class CompiledMethod(Protocol):
+    """A method with fixed steps, for any parameter values and any step."""
+
+    order: int
+    layout: Layout
+    functions: dict[str, Callable[..., int]]
+
+    def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
+        """Return the array of a session, and what it leads to."""
+        ...
 
 
 class CompiledGauss:
@@ -68,9 +87,8 @@ class CompiledGauss:
         level = max(2, default_options([part]).level) if equations.size < _LARGE else default_options([part]).level
         options = CodeOptions(level=level, sincos=default_options([part]).sincos)
         self._built = build_code([part], options, more=gauss_code(self.layout, tableau(order)), exports=FUNCTIONS)
-        addresses = self._built.code.addresses
-        self.functions = {name: ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in _SHAPES.items()}
-        self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(addresses["kernel_prologue"])
+        self.functions = bind_functions(self._built)
+        self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
         self._derived = len(equations.prologue)
 
     def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
@@ -88,7 +106,7 @@ _LARGE = 3_000
 
 
 class GaussStepper:
-    """Takes the steps of a method of Gauss, all equally long; outputs in between are steps of their own.
+    """Takes the steps of a method of Gauss or a composition, all equally long; outputs are steps of their own.
 
     The state that it is given and gives is (q, u); what it integrates is (q, p).
 
@@ -110,7 +128,7 @@ class GaussStepper:
 
     def __init__(
         self,
-        compiled: CompiledGauss,
+        compiled: CompiledMethod,
         parameter_values: FloatArray,
         momenta: Callable[[float, FloatArray, FloatArray], FloatArray],
         rates: CompiledRates,

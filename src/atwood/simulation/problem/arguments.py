@@ -24,7 +24,7 @@ from atwood.arguments import (
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.dae import LEVELS
 from atwood.model.values.units import parse_quantity, parse_unit
-from atwood.simulation.problem.options import SOLVERS
+from atwood.simulation.problem.options import FIXED_STEPS, SOLVERS
 from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import ORIENTATIONS
 
@@ -150,9 +150,9 @@ def refuse_idle_settings(solver: str, order: int | None, step: float | None) -> 
         If it is so.
     """
     for name, value in (("order", order), ("step", step)):
-        if value is not None and solver != "gauss":
+        if value is not None and solver not in FIXED_STEPS:
             raise UsageError(
-                f"{name}={value!r} is for the solver 'gauss'; {solver!r} chooses its own",
+                f"{name}={value!r} is for the solvers 'gauss' and 'composition'; {solver!r} chooses its own",
                 advice="Give solver='gauss', or rtol for the accuracy.",
             )
 

@@ -6,13 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from atwood.errors import UsageError
+from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
-from atwood.forms.canonical import CanonicalPrograms, canonical_programs
+from atwood.forms.canonical import CanonicalPrograms, canonical_programs, separable_programs
 from atwood.forms.kept import Key
+from atwood.integrators.composition.coefficients import ORDERS as COMPOSITIONS
+from atwood.integrators.composition.native import CompiledComposition
 from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession
-from atwood.integrators.gauss.native import CompiledGauss, GaussStepper
+from atwood.integrators.gauss.native import CompiledGauss, CompiledMethod, GaussStepper
 from atwood.integrators.protocol import Budget, FloatArray, SolverOptions
 from atwood.late import dataclass
 
@@ -21,7 +23,7 @@ __all__ = ["ORDER", "GaussSettings", "open_gauss"]
 ORDER = 8
 """The order unless another one is asked for: it costs least at most tolerances."""
 
-_COMPILED: Key[CompiledGauss] = Key("compiled method of Gauss")
+_COMPILED: Key[CompiledMethod] = Key("compiled symplectic method")
 
 
 def momenta_of(assembly: Assembly, found: CanonicalPrograms) -> Callable[[float, FloatArray, FloatArray], FloatArray]:
@@ -54,14 +56,37 @@ def _canonical_sizes(
     return np.concatenate([sizes[:n], np.where(found > 0.0, found, np.max(found))])
 
 
+def _compile(assembly: Assembly, solver: str, order: int) -> CompiledMethod:
+    """Return a method as machine code."""
+    name = assembly.flat.name
+    if solver == "gauss":
+        return CompiledGauss(canonical_programs(assembly).equations, len(assembly.reduced.speeds), order)
+    if order not in COMPOSITIONS:
+        raise UsageError(
+            f"there is no composition of order {order}",
+            where=name,
+            advice=f"Give one of {', '.join(map(str, COMPOSITIONS))}, or the solver 'gauss'.",
+        )
+    found = separable_programs(assembly)
+    if found is None:
+        raise UnsupportedError(
+            "its H is no sum of a function of momenta and one of coordinates, so that its steps cannot be split",
+            where=name,
+            advice="Use the solver 'gauss', which is symplectic for any H.",
+        )
+    return CompiledComposition(found.forces, found.velocities, order)
+
+
 @dataclass(frozen=True, eq=False)
 class GaussSettings:
     """What a run with a method of Gauss is given beside its accuracy.
 
     Attributes
     ----------
+    solver
+        ``"gauss"`` or ``"composition"``.
     order
-        2, 4, 6, 8, 10 or 12; `ORDER` if None.
+        2, 4, 6, 8, and of the methods of Gauss 10 or 12; `ORDER` if None.
     step
         The step, s; chosen by the accuracy if None.
     end
@@ -70,6 +95,7 @@ class GaussSettings:
         How large (q, u) are in the scene.
     """
 
+    solver: str
     order: int | None
     step: float | None
     end: float
@@ -85,7 +111,7 @@ def open_gauss(
     y: FloatArray,
     budget: Budget | None = None,
 ) -> ExplicitSession:
-    """Start a run with a method of Gauss.
+    """Start a run with a method of Gauss, or a composition.
 
     Parameters
     ----------
@@ -105,14 +131,15 @@ def open_gauss(
     Raises
     ------
     UnsupportedError
-        If the scene is no Hamiltonian system.
+        If the scene is no Hamiltonian system, or for a composition one that is not separable.
     """
     programs = canonical_programs(assembly)
     if problem.compiled is None:
-        what = "its laws call functions in Python, which the methods of Gauss cannot"
+        what = "its laws call functions in Python, which symplectic methods cannot"
         raise UsageError(what, where=assembly.flat.name, advice="Use the solver 'ida'.")
     order, speeds = settings.order or ORDER, len(assembly.reduced.speeds)
-    compiled = assembly.shared.get(_COMPILED, lambda: CompiledGauss(programs.equations, speeds, order), order)
+    solver = settings.solver
+    compiled = assembly.shared.get(_COMPILED, lambda: _compile(assembly, solver, order), solver, order)
     values, momenta = np.asarray(assembly.parameter_values, dtype=float), momenta_of(assembly, programs)
     sizes = _canonical_sizes(momenta, t, y, len(y) - speeds, settings.sizes)
     stepper = GaussStepper(compiled, values, momenta, problem.compiled(), settings.step or 1.0, sizes)

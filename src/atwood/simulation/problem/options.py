@@ -13,7 +13,7 @@ from atwood.late import dataclass
 from atwood.simulation.problem.conditions import Condition
 from atwood.tolerances import tolerances
 
-__all__ = ["SOLVERS", "RunOptions", "Samples", "sample_times"]
+__all__ = ["FIXED_STEPS", "SOLVERS", "RunOptions", "Samples", "sample_times"]
 
 
 SOLVERS = {
@@ -22,8 +22,12 @@ SOLVERS = {
     "explicit": "Dormand-Prince 8(5,3)",
     "taylor": "Taylor series",
     "gauss": "Gauss, symplectic",
+    "composition": "composition, symplectic",
 }
 """What can solve a scene, and what it is called."""
+
+FIXED_STEPS = ("gauss", "composition")
+"""Those whose steps are equal, which take an order and a step."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from atwood.integrators.protocol import (
 from atwood.late import dataclass
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
-from atwood.simulation.problem.options import SOLVERS, RunOptions
+from atwood.simulation.problem.options import FIXED_STEPS, SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
 
 if TYPE_CHECKING:
@@ -207,8 +207,8 @@ def open_explicit_session(
     """
     if solver == "taylor":
         return _open_taylor(request, t, y)
-    if solver == "gauss":
-        return _open_gauss(request, t, y)
+    if solver in FIXED_STEPS:
+        return _open_fixed(request, solver, t, y)
     session = request.kept.begin_again(request, t, y, leave)
     if session is None:
         session = _open_steps(request, t, y, leave)
@@ -242,12 +242,12 @@ def _open_taylor(request: SolverRequest, t: float, y: FloatArray) -> ExplicitSes
     return open_taylor(problem, series, request.settings(t, LOOSEST), t, y, request.budget)
 
 
-def _open_gauss(request: SolverRequest, t: float, y: FloatArray) -> ExplicitSession:
+def _open_fixed(request: SolverRequest, solver: str, t: float, y: FloatArray) -> ExplicitSession:
     from atwood.simulation.problem.gauss_scene import GaussSettings, open_gauss
 
     options = request.options
-    settings = GaussSettings(options.order, options.step, request.end, request.plan.tolerances(1.0))
-    problem = _explicit_problem(request, "gauss")
+    settings = GaussSettings(solver, options.order, options.step, request.end, request.plan.tolerances(1.0))
+    problem = _explicit_problem(request, solver)
     return open_gauss(request.plan.assembly, problem, request.settings(t), settings, t, y, request.budget)
 
 

@@ -1,0 +1,59 @@
+"""Compositions as machine code, to be stepped as the methods of Gauss are."""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import c_void_p
+
+import numpy as np
+
+from atwood.codegen.llvm.build import build_code, default_options
+from atwood.codegen.llvm.module import CodeOptions, Part
+from atwood.expr import Program
+from atwood.integrators.composition.code import composition_code
+from atwood.integrators.composition.coefficients import steps_of
+from atwood.integrators.gauss.code import FUNCTIONS
+from atwood.integrators.gauss.layout import POINTERS, Layout
+from atwood.integrators.gauss.native import bind_functions
+from atwood.integrators.protocol import FloatArray
+
+__all__ = ["CompiledComposition"]
+
+
+class CompiledComposition:
+    """The equations of a separable H with the steps of a composition, for any parameter values and any step.
+
+    Parameters
+    ----------
+    forces
+        Program of (t, q) with p'.
+    velocities
+        Program of p with q'.
+    order
+        Of the method, one of `atwood.integrators.composition.coefficients.ORDERS`.
+    """
+
+    def __init__(self, forces: Program, velocities: Program, order: int) -> None:
+        n = len(forces.inputs[1].symbols)
+        self.order, self.layout = order, Layout(n, n, 1, False, False)
+        parts = [Part("kernel", forces), Part("flow", velocities)]
+        options = CodeOptions(level=2, sincos=default_options(parts).sincos)
+        code = composition_code(self.layout, steps_of(order))
+        self._built = build_code(parts, options, more=code, exports=FUNCTIONS)
+        self.functions = bind_functions(self._built)
+        prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
+        self._prologues = [prologue(self._built.code.addresses[f"{name}_prologue"]) for name in ("kernel", "flow")]
+        self._derived = [len(one.prologue) for one in (forces, velocities)]
+
+    def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
+        """Return the array of a session, and what it leads to."""
+        values, scratch = np.array(parameter_values, dtype=np.float64), np.empty(max(self._built.scratch, 1))
+        derived = [np.empty(max(size, 1)) for size in self._derived]
+        for prologue, one in zip(self._prologues, derived, strict=True):
+            prologue(values.ctypes.data, one.ctypes.data, scratch.ctypes.data)
+        memory = np.zeros(self.layout.places["end"])
+        pointers = memory[: len(POINTERS)].view(np.uint64)
+        pointers[POINTERS.index("derived")] = derived[0].ctypes.data
+        pointers[POINTERS.index("derived_2")] = derived[1].ctypes.data
+        pointers[POINTERS.index("scratch")] = scratch.ctypes.data
+        return memory, (self._built, derived, scratch)
