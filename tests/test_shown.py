@@ -112,6 +112,7 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "dynamics": atwood.dynamics(scene),
         "conserved": atwood.conserved(FourBar()),
         "transformations": _transformations(),
+        "reduced": atwood.reduced(SimplePendulum()),
         "symmetry": atwood.Symmetry(dict.fromkeys(angles, 1.0), 0.0),
         "modes": atwood.normal_modes(scene, at=hanging),
         "equilibria": list(atwood.equilibria(DoublePendulum())),

@@ -149,6 +149,7 @@ if TYPE_CHECKING:
         root_locus,
         trim,
     )
+    from atwood.theory.reduction import ReducedMotion, Routhian, reduced, routhian
     from atwood.theory.symmetries import Conserved, ConservedQuantity, Symmetry, conserved
 
     __version__: str
@@ -208,8 +209,10 @@ __all__ += [
     "PhasePortrait",
     "PoincareSection",
     "PointTransformation",
+    "ReducedMotion",
     "RestPoint",
     "RootLocus",
+    "Routhian",
     "SeparatedMotion",
     "Separation",
     "Symmetry",
@@ -236,7 +239,9 @@ __all__ += [
     "point_transformation",
     "poisson_bracket",
     "poisson_brackets",
+    "reduced",
     "root_locus",
+    "routhian",
     "separation",
     "tangent_flow",
     "total_derivative",
@@ -363,6 +368,7 @@ _ROOMS = {
         "LinearModel", "NormalModes",
         "RootLocus", "Trim", "equilibria", "equilibrium_branches", "linearize", "normal_modes", "root_locus", "trim",
     ),
+    "atwood.theory.reduction": ("ReducedMotion", "Routhian", "reduced", "routhian"),
     "atwood.theory.symmetries": ("Conserved", "ConservedQuantity", "Symmetry", "conserved"),
 }  # fmt: skip
 _LATER = {name: room for room, names in _ROOMS.items() for name in names}

@@ -41,7 +41,7 @@ def test_the_laplace_runge_lenz_vector() -> None:
     assert not vanishes([poisson_bracket(A[0], A[1], SPACE) + 2.01 * m * H * L[2]]).holds
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_jacobi_s_identity_of_random_functions(seed: int) -> None:
     chance = random.Random(seed)
     symbols = (x, y, z, px, py, pz)

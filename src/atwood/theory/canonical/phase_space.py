@@ -133,6 +133,10 @@ _LONG = 600
 """Signs beyond which fractions are left as they are."""
 
 
+_FACTORED = 150
+"""Signs beyond which coefficients are not factored."""
+
+
 def vanishes(values: Iterable[Sympy]) -> Verdict:
     """Return whether expressions are all zero: by their normal form, or else at random points in many digits."""
     rest = [one for one in values if one != 0 and not _is_proven(one)]
@@ -210,6 +214,8 @@ def collected(value: Sympy, variables: Sequence[Sympy]) -> Sympy:
     for powers, coefficient in terms:
         factor = sympy.Mul(*(one**power for one, power in zip(variables, powers, strict=True)))
         made = min(short(coefficient), short(_cancelled(coefficient)), key=_signs)
+        if _signs(made) <= _FACTORED and not made.atoms(sympy.Float):
+            made = min(made, sympy.factor(made), key=_signs)
         found.append(made.xreplace(back) * factor)
     return sympy.Add(*found)
 

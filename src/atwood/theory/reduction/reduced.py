@@ -1,0 +1,212 @@
+"""`reduced`: a scene whose coordinates are ignorable but for one, by quadrature."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from atwood.analysis.reduction.parts import parts_of
+from atwood.analysis.reduction.quadrature import Path, find_path
+from atwood.analysis.reduction.radial import Radial
+from atwood.arguments import TEXT, optional, takes
+from atwood.arrays import FloatArray
+from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import Lagrangian
+from atwood.late import dataclass
+from atwood.model.compose.composite import Model
+from atwood.pipeline import SCENE
+from atwood.simulation.initialization.start import find_start
+from atwood.theory.reduction.routhian import Routhian, ignorable_of, routhian_of
+
+__all__ = ["ReducedMotion", "reduced"]
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedMotion:
+    """The motion of a scene from its start, reduced to one coordinate.
+
+    Attributes
+    ----------
+    coordinate
+        Path of the coordinate that is left.
+    ignorable
+        Paths of the others.
+    momenta
+        Values of their momenta, by path.
+    energy
+        The energy function h, J.
+    radial
+        The effective potential in numbers.
+    path
+        Turning points and quadratures.
+    routhian
+        The same in symbols.
+    start
+        Values of all coordinates at the start, by path.
+    t_start
+        Time of the start, s.
+    """
+
+    coordinate: str
+    ignorable: tuple[str, ...]
+    momenta: Mapping[str, float]
+    energy: float
+    radial: Radial
+    path: Path
+    routhian: Routhian
+    start: Mapping[str, float]
+    t_start: float
+
+    @property
+    def kind(self) -> str:
+        """What motion it is.
+
+        ``"libration"`` between two turning points, ``"rotation"`` of an angle, ``"rest"`` of the coordinate (a steady
+        motion of the whole), or ``"unbounded"``.
+        """
+        return self.path.kind
+
+    @property
+    def turning_points(self) -> tuple[float, float]:
+        """Where the coordinate turns; infinite where it does not."""
+        return self.path.low, self.path.high
+
+    @property
+    def period(self) -> float:
+        """Time until the coordinate and its rate are what they were, s; of rest, that of small oscillations."""
+        return self.path.period
+
+    @property
+    def advance(self) -> dict[str, float]:
+        """How far the ignorable coordinates go in a period, by path."""
+        return dict(zip(self.ignorable, map(float, self.path.advance), strict=True))
+
+    @property
+    def error(self) -> float:
+        """Estimated relative error of the period."""
+        return self.path.error
+
+    @cached_property
+    def expression(self) -> Any:
+        """The effective potential as a sympy expression of the coordinate, the momenta and parameters."""
+        return self.routhian.effective_potential
+
+    def effective_potential(self, values: Any) -> FloatArray:
+        """Return the effective potential at values of the coordinate, J."""
+        found = self.radial.at(np.ravel(np.asarray(values, dtype=float))).potential
+        return np.asarray(found.reshape(np.shape(values)))
+
+    def at(self, times: Any) -> dict[str, FloatArray]:
+        """Return all coordinates at times, by path.
+
+        Parameters
+        ----------
+        times
+            s.
+
+        Raises
+        ------
+        UnsupportedError
+            If the motion does not come back.
+        """
+        t = np.ravel(np.asarray(times, dtype=float))
+        s, moved = self.path.at(t - self.t_start)
+        found = {self.coordinate: s.reshape(np.shape(times))}
+        for path, values in zip(self.ignorable, moved, strict=True):
+            found[path] = (self.start[path] + values).reshape(np.shape(times))
+        return found
+
+    def __repr__(self) -> str:
+        low, high = self.turning_points
+        told = f"{self.kind} between {low:.6g} and {high:.6g}" if self.kind == "libration" else self.kind
+        return f"<ReducedMotion of {self.coordinate}: {told}, period {self.period:.6g} s>"
+
+
+@takes(scene=SCENE, coordinate=optional(TEXT), orientation=optional(TEXT))
+def reduced(scene: Model | Assembly, coordinate: str | None = None, *, orientation: str | None = None) -> ReducedMotion:
+    """Return the motion of a scene from its start, reduced to one coordinate and done by quadrature.
+
+    All coordinates but one must be ignorable, and the energy function conserved: pendulums, orbits in polar
+    coordinates, tops, beads on turning hoops. Then ``mu s'^2/2 + U_eff(s) = h`` (Goldstein, sections 3.3 and 5.7;
+    Landau and Lifshitz, Mechanics, sections 11 and 14), and turning points, period, the advance of the ignorable
+    coordinates in a period, and the whole motion follow to rounding.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it.
+    coordinate
+        Path of the coordinate that is left; the one that is not ignorable if not given.
+    orientation
+        Euler angles in which orientations in space are; ``"euler-zxz"`` if not given.
+
+    Raises
+    ------
+    UnsupportedError
+        If more than one coordinate is left, the energy function is not conserved, or the motion passes a place where
+        coordinates are singular.
+    SolveError
+        If the motion is too near to a separatrix.
+    """
+    assembly, found, names = ignorable_of(scene, orientation)
+    paths = [one.name for one in found.names]
+    left = [path for path in paths if path not in names]
+    if coordinate is not None:
+        if coordinate not in paths:
+            raise UsageError("no coordinate has this path", where=coordinate, advice=suggestion(coordinate, paths))
+        left = [*dict.fromkeys([*left, coordinate])]
+    if not left and len(paths) == 1:
+        left = paths
+    if len(left) != 1:
+        told = "all coordinates are ignorable" if not left else f"{', '.join(left)} are not ignorable"
+        raise UnsupportedError(
+            f"its motion is not reduced to one coordinate: {told}",
+            where=assembly.flat.name,
+            advice="Name one with `coordinate`."
+            if not left
+            else "Other coordinates may have symmetries that these do not show: see `conserved`.",
+        )
+    number = paths.index(left[0])
+    others = tuple(k for k in range(len(paths)) if k != number)
+    start = find_start(assembly)
+    q, v = _start_of(assembly, found)
+    parts = parts_of(assembly, number, start.time)
+    now = parts(q[:, None])
+    momenta = now.mass[:, :, 0] @ v + now.linear[:, 0]
+    radial = Radial(parts, number, others, momenta[list(others)], q)
+    is_angle = found.names[number].unit == "rad"
+    scale = 1.0 if is_angle else start.length
+    here = radial.at([q[number]])
+    path = find_path(radial, float(q[number]), float(v[number]), is_angle, scale, f"{assembly.flat.name}: {left[0]}")
+    energy = float(here.potential[0] + 0.5 * here.inertia[0] * v[number] ** 2)
+    ignorable = tuple(paths[k] for k in others)
+    return ReducedMotion(
+        left[0],
+        ignorable,
+        dict(zip(ignorable, map(float, radial.momenta), strict=True)),
+        energy,
+        radial,
+        path,
+        routhian_of(assembly, found, ignorable),
+        dict(zip(paths, map(float, q), strict=True)),
+        start.time,
+    )
+
+
+def _start_of(assembly: Assembly, found: Lagrangian) -> tuple[FloatArray, FloatArray]:
+    """Return coordinates and their derivatives where a scene starts."""
+    from atwood.analysis.conservation.quantities import Quantities
+    from atwood.expr import OutputGroup, Program
+    from atwood.forms.program import state_groups
+    from atwood.simulation.dynamics.orientation_coordinates import from_regular
+
+    start, e = find_start(assembly), assembly.reduced
+    q = from_regular(assembly, start.coordinates)
+    rates = Quantities(assembly, found).on_speeds(list(found.velocities))
+    outputs = (OutputGroup("rates", tuple(rates)),)
+    program = Program(f"{assembly.flat.name} rates", state_groups(e), assembly.parameters, outputs)
+    return q, np.asarray(assembly.kernel(program)([start.time], q, start.speeds)[0], dtype=float)

@@ -1,0 +1,216 @@
+"""Motions of one coordinate by quadrature, against closed forms and runs."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy
+from scipy.special import ellipkm1
+
+from atwood import (
+    Scene,
+    UnsupportedError,
+    UsageError,
+    equations,
+    reduced,
+    routhian,
+    simulate,
+)
+from atwood_library import Ground, PairPotential, Pivot, PointMass, Slider
+from atwood_library.scenes import SCENES
+
+
+def against_a_run(scene: Scene, periods: float = 2.0) -> dict[str, float]:
+    """Return the largest deviations of a run from the quadrature, of coordinates that the run has."""
+    found = reduced(scene)
+    result = simulate(scene, t_end=periods * found.period, rtol=1e-13, solver="taylor", outputs=41)
+    expected = found.at(result.time)
+    return {path: float(np.max(np.abs(expected[path] - result[path]))) for path in expected if path in result}
+
+
+# -- the pendulum -----------------------------------------------------------------------------------------------------
+
+
+def pendulum(angle: float, rate: float = 0.0) -> Scene:
+    scene = SCENES["simple-pendulum"]()
+    scene.start.update({"rod.angle": angle, "rod.angular_velocity": rate})
+    return scene
+
+
+@pytest.mark.parametrize("amplitude", [1e-7, 1e-3, 1.0, 2.5, 3.1])
+def test_the_period_of_the_pendulum_is_its_elliptic_integral(amplitude: float) -> None:
+    scene = pendulum(amplitude)
+    found = reduced(scene)
+    values = equations(scene)
+    length, gravity = (values.values[values.symbol(path)] for path in ("rod.length", "gravity"))
+    expected = 4.0 * math.sqrt(length / gravity) * ellipkm1(math.cos(amplitude / 2.0) ** 2)
+    assert found.kind == "libration"
+    assert found.period == pytest.approx(expected, rel=1e-11)
+    assert found.turning_points == pytest.approx((-amplitude, amplitude), rel=1e-9)
+
+
+def test_a_pendulum_that_goes_over() -> None:
+    scene = pendulum(0.3, 9.0)
+    found = reduced(scene)
+    assert found.kind == "rotation"
+    deviation = against_a_run(scene)
+    assert deviation["rod.angle"] < 1e-10
+    backwards = reduced(pendulum(-0.3, -9.0))
+    assert backwards.period == pytest.approx(found.period, rel=1e-12)
+    assert backwards.at(found.period)["rod.angle"] == pytest.approx(-0.3 - 2.0 * math.pi, rel=1e-12)
+
+
+def test_a_pendulum_at_rest_and_on_its_separatrix() -> None:
+    still = reduced(pendulum(0.0))
+    assert still.kind == "rest"
+    values = equations(pendulum(0.0))
+    length, gravity = (values.values[values.symbol(path)] for path in ("rod.length", "gravity"))
+    assert still.period == pytest.approx(2.0 * math.pi * math.sqrt(length / gravity), rel=1e-9)
+    with pytest.raises(Exception, match="separatrix"):
+        reduced(pendulum(0.0, 2.0 * math.sqrt(gravity / length)))
+
+
+# -- tops and hoops ---------------------------------------------------------------------------------------------------
+
+
+def cubic(scene: Any, found: Any) -> np.ndarray:
+    """Return the coefficients of F(u), whose roots are the turning points (Goldstein, equation 5.62)."""
+    about, axial = scene.transverse + scene.mass * scene.height**2, scene.axial
+    weight = scene.mass * 9.80665 * scene.height
+    p_phi, p_psi = found.momenta["top.euler.phi"], found.momenta["top.euler.psi"]
+    level = 2.0 * found.energy - p_psi**2 / axial
+    square = np.polynomial.Polynomial([p_phi, -p_psi]) ** 2 / about
+    return (np.polynomial.Polynomial([level, -2.0 * weight]) * np.polynomial.Polynomial([1.0, 0.0, -1.0]) - square).coef
+
+
+@pytest.mark.parametrize("motion", ["loops", "cusps", "waves", "steady"])
+def test_lagrange_s_top_in_its_four_motions(motion: str) -> None:
+    scene = SCENES["lagrange-top"](motion=motion, inclination=0.7)
+    found = reduced(scene)
+    gravity = equations(scene).values[equations(scene).symbol("gravity")]
+    assert gravity == pytest.approx(9.80665, abs=5e-3)
+    f = np.polynomial.Polynomial(cubic(scene, found))
+    f = f + np.polynomial.Polynomial([0.0, 1.0, 0.0, -1.0]) * 2.0 * scene.mass * scene.height * (9.80665 - gravity)
+    for angle in found.turning_points:
+        u = math.cos(angle)
+        assert abs(f(u)) < 1e-12 * np.max(np.abs(f.coef))  # a root of F(u)
+    period = found.period
+    result = simulate(scene, t_end=3.0 * period, rtol=1e-13, solver="taylor", outputs=7)
+    theta, phi, psi = (result[f"top.{name}"] for name in ("theta", "phi", "psi"))
+    assert theta[::2] == pytest.approx(np.full(4, theta[0]), abs=1e-10)
+    assert np.diff(phi[::2]) == pytest.approx(np.full(3, found.advance["top.euler.phi"]), abs=1e-10)
+    assert np.diff(psi[::2]) == pytest.approx(np.full(3, found.advance["top.euler.psi"]), abs=1e-10)
+    assert (found.kind == "rest") == (motion == "steady")
+    along = found.at(result.time)
+    assert along["top.euler.theta"] == pytest.approx(theta, abs=1e-10)
+    assert along["top.euler.phi"] - along["top.euler.phi"][0] == pytest.approx(phi - phi[0], abs=1e-10)
+
+
+@pytest.mark.parametrize("name", ["rotating-hoop-driven", "rotating-hoop-free", "pendulum-on-cart"])
+def test_against_runs(name: str) -> None:
+    deviations = against_a_run(SCENES[name]())
+    assert deviations
+    assert max(deviations.values()) < 1e-10
+
+
+def test_the_spherical_pendulum_advances() -> None:
+    deviations = against_a_run(SCENES["spherical-pendulum"](coordinates="angles"))
+    assert set(deviations) == {"rod.parameter_1", "rod.parameter_2"}
+    assert max(deviations.values()) < 1e-10
+
+
+# -- orbits -----------------------------------------------------------------------------------------------------------
+
+
+def orbit(eccentricity: float, speed_up: float = 1.0) -> Scene:
+    """Return a body on a slider that turns about an attracting centre: coordinates r and phi."""
+    scene = Scene(gravity=0.0)
+    ground, pivot = scene.add("ground", Ground()), scene.add("pivot", Pivot())
+    slider, body = scene.add("slider", Slider()), scene.add("body", PointMass(mass=1.5))
+    pull = scene.add("pull", PairPotential(law="coulomb", coulomb_constant=1.0, charge_a=1.0, charge_b=-1.5))
+    scene.connect(ground.frame, pivot.a)
+    scene.connect(pivot.b, slider.a)
+    scene.connect(slider.b, body.point)
+    scene.connect(pull.a, ground.frame)
+    scene.connect(pull.b, body.point)
+    near = 1.0 - eccentricity
+    rate = speed_up * math.sqrt((1.0 + eccentricity) / near) / near
+    scene.start.update({"slider.displacement": near, "slider.speed": 0.0, "pivot.angle": 0.2})
+    scene.start["pivot.angular_velocity"] = rate
+    return scene
+
+
+@pytest.mark.parametrize("eccentricity", [0.1, 0.5, 0.9])
+def test_kepler_s_orbits_close(eccentricity: float) -> None:
+    found = reduced(orbit(eccentricity))
+    assert found.coordinate == "slider.displacement"
+    assert found.turning_points == pytest.approx((1.0 - eccentricity, 1.0 + eccentricity), rel=1e-11)
+    assert found.period == pytest.approx(2.0 * math.pi, rel=1e-11)
+    assert found.advance["pivot.b.angle"] == pytest.approx(2.0 * math.pi, rel=1e-11)
+    # Kepler's equation: r = 1 - e cos E, t = E - e sin E
+    anomaly = np.linspace(0.0, 12.0, 9)
+    along = found.at(anomaly - eccentricity * np.sin(anomaly))
+    assert along["slider.displacement"] == pytest.approx(1.0 - eccentricity * np.cos(anomaly), rel=1e-9)
+
+
+def test_a_circle_and_a_hyperbola() -> None:
+    circle = reduced(orbit(0.0))
+    assert circle.kind == "rest"
+    assert circle.period == pytest.approx(2.0 * math.pi, rel=1e-9)
+    away = reduced(orbit(0.5, speed_up=1.5))
+    assert away.kind == "unbounded"
+    assert away.period == math.inf
+    with pytest.raises(UnsupportedError, match="does not come back"):
+        away.at(1.0)
+
+
+# -- in symbols -------------------------------------------------------------------------------------------------------
+
+
+def test_routh_s_procedure_of_the_pendulum_on_a_cart() -> None:
+    scene = SCENES["pendulum-on-cart"]()
+    found, eq = routhian(scene), equations(scene)
+    theta, big, m, l, g = (eq.symbol(path) for path in ("rod.angle", "cart.mass", "bob.mass", "rod.length", "gravity"))
+    assert found.ignorable == ("rail.displacement",)
+    [p] = found.momenta
+    rate = theta.diff(sympy.Symbol("t"))
+    whole, across = big + m, m * l * sympy.cos(theta)
+    expected = p**2 / (2 * whole) - p * across * rate / whole
+    expected += across**2 * rate**2 / (2 * whole) - m * l**2 * rate**2 / 2 - m * g * l * sympy.cos(theta)
+    random = np.random.default_rng(2)
+    for _ in range(4):
+        difference = (found.expression - expected).xreplace({rate: sympy.Float(random.uniform(0.3, 1.5))})
+        numbers = {one: sympy.Float(random.uniform(0.3, 1.5)) for one in [theta, *difference.free_symbols]}
+        assert abs(float(difference.xreplace(numbers))) < 1e-12
+    [equation] = found.equations
+    assert equation.has(theta.diff(sympy.Symbol("t"), 2))
+
+
+def test_the_effective_potential_is_the_same_in_symbols_and_numbers() -> None:
+    for name, options in (("lagrange-top", {}), ("rotating-hoop-free", {}), ("rotating-hoop-driven", {})):
+        scene = SCENES[name](**options)
+        found = reduced(scene)
+        eq = equations(scene, orientation="euler-zxz" if name == "lagrange-top" else None)
+        known = dict(eq.values)
+        known |= dict(zip(found.routhian.momenta, found.momenta.values(), strict=True))
+        [s] = found.routhian.coordinates
+        values = np.array([0.5, 0.9, 1.7])
+        symbolic = [float(found.expression.xreplace({s: sympy.Float(v)}).xreplace(known)) for v in values]
+        assert found.effective_potential(values) == pytest.approx(symbolic, rel=1e-12)
+
+
+# -- questions without an answer --------------------------------------------------------------------------------------
+
+
+def test_what_cannot_be_reduced_is_refused() -> None:
+    with pytest.raises(UnsupportedError, match="not reduced to one coordinate"):
+        reduced(SCENES["double-pendulum"]())
+    with pytest.raises(UnsupportedError, match="energy function is not conserved"):
+        reduced(SCENES["driven-pendulum"]())
+    with pytest.raises(UnsupportedError, match="it rolls"):
+        reduced(SCENES["rolling-disc"]())
+    with pytest.raises(UsageError, match="not ignorable"):
+        routhian(SCENES["pendulum-on-cart"](), ["rod.angle"])
+    with pytest.raises(UsageError, match="no coordinate"):
+        reduced(SCENES["pendulum-on-cart"](), "cart.x")
