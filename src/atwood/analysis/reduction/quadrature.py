@@ -10,6 +10,7 @@ integral of the slope of U from the turning point on, so that no digits cancel.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 
@@ -38,6 +39,10 @@ _SMALL = 1e-4
 _GRID = 4000
 _SINGULAR = 1e-3
 """Of the determinant of the ignorable inertia: places where it has a minimum below this are looked at closely."""
+
+
+Place: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+"""Gives the coordinate and its derivative by phi."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,16 +308,10 @@ def _rotation(radial: Radial, energy: float, s: float, rate: float, name: str) -
     return _made("rotation", radial, (-np.inf, np.inf), place, pace, 0.0, name)
 
 
-def _made(
-    kind: str,
-    radial: Radial,
-    ends: tuple[float, float],
-    place: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
-    pace: Callable[[FloatArray, FloatArray], FloatArray],
-    phase: float,
-    name: str,
-) -> Path:
-    """Return the path whose time, and ignorable coordinates, are Fourier series in phi."""
+def _integrated(
+    radial: Radial, place: Place, pace: Callable[[FloatArray, FloatArray], FloatArray], name: str
+) -> tuple[FloatArray, Callable[[FloatArray], FloatArray], float]:
+    """Return the means over phi of dt/dphi and of the ignorable coordinates' rates, their integrals, and the error."""
     count = 32
     while True:
         phi = _FULL * np.arange(count) / count
@@ -349,6 +348,20 @@ def _made(
         waves = np.exp(1j * np.outer(orders, phi))
         return np.asarray(mean[:, None] * phi + (kept @ waves).real)
 
+    return mean, integrals, error
+
+
+def _made(
+    kind: str,
+    radial: Radial,
+    ends: tuple[float, float],
+    place: Place,
+    pace: Callable[[FloatArray, FloatArray], FloatArray],
+    phase: float,
+    name: str,
+) -> Path:
+    """Return the path whose time, and ignorable coordinates, are Fourier series in phi."""
+    mean, integrals, error = _integrated(radial, place, pace, name)
     begun = integrals(np.array([phase]))
     period = float(_FULL * mean[0])
 
