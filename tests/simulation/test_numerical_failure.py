@@ -81,7 +81,7 @@ def test_a_projection_in_the_middle_of_a_run(form: str, break_down: Break, monke
 
 
 def test_an_impact(break_down: Break) -> None:
-    calls = break_down("lstsq", "events.modes")
+    calls = break_down("lstsq", "events.mode_change")
     with pytest.raises(SolveError, match="its numbers could not be worked with") as caught:
         simulate(hung_from(Rope(length=1.0, starts="slack"), 0.5))
     assert calls[0] == 1

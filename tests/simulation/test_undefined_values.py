@@ -159,7 +159,7 @@ def test_what_came_before_a_failed_change_of_mode_is_kept(monkeypatch: pytest.Mo
     def refuse(*_: object) -> None:
         raise SolveError("it would move something", where="rope")
 
-    monkeypatch.setattr("atwood.simulation.run.run.enter_mode", refuse)
+    monkeypatch.setattr("atwood.simulation.events.mode_change.enter_mode", refuse)
     with pytest.raises(SolveError, match="it would move something") as caught:
         simulate(scene)
     result = Result(caught.value.run)  # type: ignore[attr-defined]
