@@ -48,17 +48,10 @@ NO_EVENT_VALUE = -10
 EVENT_REASONS = {NO_EVENT_VALUE: "an event function has no value"}
 
 
-def open_session(
-    problem: ImplicitProblem,
-    options: SolverOptions,
-    t: float,
-    y: FloatArray,
-    yp: FloatArray,
-    budget: Budget | None = None,
-    tuning: IdaTuning | None = None,
-    lookout: Lookout | None = None,
-) -> NativeSession:
-    """Start a run with SUNDIALS' own IDA.
+class NativeSession:
+    """A run in progress; see `~atwood.integrators.protocol.Session`.
+
+    Its memory is freed by `close`, at the end of a ``with`` block, or when nobody refers to it any more.
 
     Parameters
     ----------
@@ -75,28 +68,10 @@ def open_session(
     lookout
         What looks at the motion; see `NativeSession.looks_out`.
 
-    Returns
-    -------
-    NativeSession
-        The run, at its start.
-
     Raises
     ------
     ~atwood.integrators.ida.library.SundialsMissing
         If the libraries cannot be used; `available` tells beforehand.
-    """
-    return NativeSession(problem, options, t, y, yp, budget, tuning, lookout)
-
-
-class NativeSession:
-    """A run in progress; see `~atwood.integrators.protocol.Session`.
-
-    Its memory is freed by `close`, at the end of a ``with`` block, or when nobody refers to it any more.
-
-    Parameters
-    ----------
-    problem, options, t, y, yp, budget, tuning, lookout
-        As in `open_session`.
 
     Attributes
     ----------
@@ -189,7 +164,7 @@ class NativeSession:
 
         Returns
         -------
-        Advance
+        StepResult
             Where it ended and why, always with a good state.
         """
         self._check_open()
@@ -461,3 +436,7 @@ class NativeSession:
         if status is Status.FAILED and record.complaint and record.time >= min(t, since):
             message, equation = f"{message}; {record.complaint}", record.equation
         return StepResult(*copied(self._here), status, self._no_events, message, equation)
+
+
+open_session = NativeSession
+"""Starts a run with SUNDIALS' own IDA."""

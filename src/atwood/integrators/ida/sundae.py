@@ -65,35 +65,6 @@ REASONS = {
 }
 
 
-def open_session(
-    problem: ImplicitProblem,
-    options: SolverOptions,
-    t: float,
-    y: FloatArray,
-    yp: FloatArray,
-    budget: Budget | None = None,
-) -> SundaeSession:
-    """Start a run with scikit-sundae's IDA.
-
-    Parameters
-    ----------
-    problem
-        The equations.
-    options
-        Accuracy and means.
-    t, y, yp
-        Consistent start values.
-    budget
-        Limits of the session.
-
-    Returns
-    -------
-    SundaeSession
-        The run, at its start.
-    """
-    return SundaeSession(problem, options, t, y, yp, budget)
-
-
 @dataclass
 class _Record:
     """What the callbacks count, and the last evaluation without a value since the last good step."""
@@ -118,8 +89,14 @@ class SundaeSession:
 
     Parameters
     ----------
-    problem, options, t, y, yp, budget
-        As in `open_session`.
+    problem
+        The equations.
+    options
+        Accuracy and means.
+    t, y, yp
+        Consistent start values.
+    budget
+        Limits of the session.
     """
 
     def __init__(
@@ -172,7 +149,7 @@ class SundaeSession:
 
         Returns
         -------
-        Advance
+        StepResult
             Where it ended and why, always with a good state.
         """
         if not self._here[0] <= t_out < inf:
@@ -391,3 +368,7 @@ def _jacobian_callback(problem: ImplicitProblem, record: _Record, places: slice 
                 flat[places] = nan
 
     return jacobian
+
+
+open_session = SundaeSession
+"""Starts a run with scikit-sundae's IDA."""
