@@ -77,7 +77,7 @@ def find_symmetries(assembly: Assembly, start: Start) -> tuple[Symmetry, ...]:
     start
         Its start.
     """
-    if assembly.mechanism.space.name != "space" or not 0 < len(assembly.reduced.speeds) <= _LARGEST:
+    if not assembly.mechanism.space.is_spatial or not 0 < len(assembly.reduced.speeds) <= _LARGEST:
         return ()
     if assembly.balance("reduced").mass_product is not None:
         return ()

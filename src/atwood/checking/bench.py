@@ -238,9 +238,9 @@ def _joint_reference(scene: Scene, number: int, one: JointCoordinate) -> None:
 def _place(target: Any, body: str, pose: Pose, trial: Trial, with_turn: bool) -> None:
     for axis in _axes(trial):
         target[f"{body}.position.{'xyz'[axis]}"] = float(pose.position[axis])
-    if with_turn and trial.space.name == "plane":
+    if with_turn and trial.space.is_planar:
         target[f"{body}.angle"] = pose.angle
-    elif with_turn and trial.space.name == "space":
+    elif with_turn and trial.space.is_spatial:
         for name, axis_of in (("x_axis", pose.axes[0]), ("z_axis", pose.axes[2])):
             for i, component in enumerate(axis_of):
                 target[f"{body}.{name}.{'xyz'[i]}"] = float(component)
@@ -249,9 +249,9 @@ def _place(target: Any, body: str, pose: Pose, trial: Trial, with_turn: bool) ->
 def _move(scene: Scene, body: str, end: str, trial: Trial, turns: bool) -> None:
     for axis in _axes(trial):
         scene.start[f"{body}.velocity.{'xyz'[axis]}"] = float(trial.velocities[end][axis])
-    if turns and trial.space.name == "plane":
+    if turns and trial.space.is_planar:
         scene.start[f"{body}.angular_speed"] = -float(trial.angular_velocities[end].y)
-    elif turns and trial.space.name == "space":
+    elif turns and trial.space.is_spatial:
         for i, component in enumerate(trial.angular_velocities[end]):
             scene.start[f"{body}.angular_velocity.{'xyz'[i]}"] = float(component)
 

@@ -100,7 +100,7 @@ def load_forces(trial: Trial, law: Law) -> Wrench:
         force, torque = totals.get(name, (Vector(), Vector()))
         components = [*trial.space.components(force)]
         if ways(trial, name) > len(trial.space.basis):
-            components += [-torque.y] if trial.space.name == "plane" else [*torque]
+            components += trial.space.turn_components(torque)
         found += [float(one) for one in components]
     return np.array(found)
 
@@ -111,8 +111,7 @@ def _speeds(trial: Trial) -> Wrench:
     for name in trial.poses:
         found += [float(one) for one in trial.space.components(trial.velocities[name])]
         if ways(trial, name) > len(trial.space.basis):
-            spin = trial.angular_velocities[name]
-            found += [-spin.y] if trial.space.name == "plane" else [*spin]
+            found += trial.space.turn_components(trial.angular_velocities[name])
     return np.array(found)
 
 
@@ -208,7 +207,7 @@ def _anchored(trial: Trial, law: Law, of_velocities: bool = False) -> Iterator[F
     if of_velocities:
         drift, spin = Vector(0.3, -0.5, 0.4), Vector(0.2, 0.6, -0.3)
         drift = trial.space.vector(trial.space.components(drift)) * trial.length
-        spin = spin if trial.space.name == "space" else Vector(0.0, spin.y, 0.0) if trial.frames else Vector()
+        spin = spin if trial.space.is_spatial else Vector(0.0, spin.y, 0.0) if trial.frames else Vector()
         velocities = {name: drift + _in_space(trial, cross(spin, pose.position)) for name, pose in trial.poses.items()}
         joint_references = {name: (value, 0.0) for name, (value, _) in trial.joint_references.items()}
         whole = replace(

@@ -89,10 +89,10 @@ def _some_motion(
     for order, name in enumerate(names):
         place = [(3.0 * order + number()) * length] + [number() * length for _ in space.basis[1:]]
         axes, angle, spin = FIXED_AXES, 0.0, ZERO
-        if space.name == "plane":
+        if space.is_planar:
             angle, spin = number(), Vector(0.0, number(), 0.0)
             axes = planar_axes(angle)
-        elif space.name == "space":
+        elif space.is_spatial:
             raw = Vector(number(), number(), number())
             axes = axes_turned(raw / norm(raw), 2.0 * number())
             spin = Vector(number(), number(), number())

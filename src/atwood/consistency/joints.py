@@ -16,7 +16,6 @@ from atwood.model.declare.connectors import Motion
 from atwood.model.declare.law import Law
 from atwood.model.declare.laws import scalars
 from atwood.model.values.rotation import FREE
-from atwood.model.values.vector import Vector
 
 __all__ = ["Unknown", "attempt", "wrong_joint", "wrong_rates"]
 
@@ -101,7 +100,7 @@ def _mover(law: Law) -> str:
 
 def _freedoms(trial: Trial, name: str) -> int:
     """Return in how many ways a connector can move."""
-    turns = {"line": 0, "plane": 1, "space": 3}[trial.space.name] if trial.is_frame(name) else 0
+    turns = len(trial.space.turn_axes) if trial.is_frame(name) else 0
     return len(trial.space.basis) + turns
 
 
@@ -141,14 +140,12 @@ def _velocity_jacobian(
             if column < len(space.basis):
                 motion = trial.motion(mover, poses[mover], velocity + space.basis[column] * (by * trial.length), spin)
             else:
-                axes = (Vector(0.0, -1.0, 0.0),) if space.name == "plane" else _AXES
-                motion = trial.motion(mover, poses[mover], velocity, spin + axes[column - len(space.basis)] * by)
+                motion = trial.motion(
+                    mover, poses[mover], velocity, spin + space.turn_axes[column - len(space.basis)] * by
+                )
             ends.append(_value(trial, constraint, poses, {**moving, mover: motion}))
         columns.append(np.array(ends[0]) - np.array(ends[1]))
     return np.array(columns).T
-
-
-_AXES = (Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0))
 
 
 def _value(trial: Trial, law: Law, poses: Mapping[str, Pose], moving: Mapping[str, Motion]) -> list[float]:

@@ -107,10 +107,10 @@ class Trial:
         for name, pose in self.poses.items():
             spin = self.angular_velocities[name]
             angle, axes = pose.angle - spin.y * t, pose.axes
-            if self.space.name == "space":
+            if self.space.is_spatial:
                 speed = norm(spin)
                 axes = _compose(axes_turned(spin / speed, speed * t), axes) if speed else axes
-            elif self.space.name == "plane":
+            elif self.space.is_planar:
                 axes = planar_axes(angle)
             found[name] = Pose(pose.position + self.velocities[name] * t, angle, axes)
         return found
@@ -151,7 +151,7 @@ class Trial:
             pose.position,
             velocity,
             axes=pose.axes,
-            angle=pose.angle if self.space.name == "plane" else None,
+            angle=pose.angle if self.space.is_planar else None,
             angular_velocity=spin,
             body=self.bodies[name],
         )
@@ -204,7 +204,7 @@ class Trial:
         loose = found[moved]
         angle, axes = loose.angle, loose.axes
         if placement.rotation is not None and placement.rotation is not FREE and self.space.has_rotation:
-            if self.space.name == "plane":
+            if self.space.is_planar:
                 turn: Any = placement.rotation
                 angle = base.angle - turn if backwards else base.angle + turn
                 axes = planar_axes(angle)
@@ -226,7 +226,7 @@ class Trial:
         found = {}
         for name, pose in around[0].items():
             velocity = rate_of([around[k][name].position for k in (-2, -1, 1, 2)])
-            if self.space.name == "space":
+            if self.space.is_spatial:
                 rates = [rate_of([around[k][name].axes[i] for k in (-2, -1, 1, 2)]) for i in range(3)]
                 spin = _spin(pose.axes, rates)
             else:
@@ -282,7 +282,7 @@ def _spin(axes: Axes, rates: list[Vector]) -> Vector:
 
 def rotation_between(before: Pose, after: Pose, space: Space) -> list[float]:
     """Return the small rotation from one pose to another: about the plane's normal, or in world axes."""
-    if space.name == "plane":
+    if space.is_planar:
         return [after.angle - before.angle]
     pairs = zip(before.axes, after.axes, strict=True)
     return list(_spin(before.axes, [new - old for old, new in pairs]))
@@ -299,7 +299,7 @@ def nudged(pose: Pose, column: int, by: float, space: Space) -> Pose:
     directions = len(space.basis)
     if column < directions:
         return replace(pose, position=pose.position + space.basis[column] * by)
-    if space.name == "plane":
+    if space.is_planar:
         return Pose(pose.position, pose.angle + by, planar_axes(pose.angle + by))
     axes = _compose(axes_turned(IDENTITY[column - directions], by), pose.axes)
     return Pose(pose.position, pose.angle, axes)

@@ -75,7 +75,7 @@ def recipe(assembly: Assembly) -> tuple[Callable[..., Assembly], tuple[Shared, _
         raise UsageError("it was assembled from leaves and cannot be pickled", where=assembly.flat.name)
     mechanism = assembly.mechanism
     line_signs: dict[tuple[str, str, str], float] | None = None
-    if mechanism.space.name == "line" and mechanism.line_signs is None:  # they come from a start that has been found
+    if mechanism.space.is_line and mechanism.line_signs is None:  # they come from a start that has been found
         known = {path: local.binding.line_signs or {} for path, local in mechanism.locals_.items()}
         line_signs = {(path, *pair): sign for path, pairs in known.items() for pair, sign in pairs.items()}
     parts = (

@@ -62,7 +62,7 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
     shape_of = shapes(bodies, layouts, {index: one.center for index, one in masses.bodies.items()})
     turns = {node: turn for _, body_turns in layouts.values() for node, turn in body_turns.items()}
     site = Site(graph, derivation.graph, bodies, space, turns)
-    motion = (motion_in_space if space.name == "space" else motion_in_plane)(derivation, forest, shape_of)
+    motion = (motion_in_space if space.is_spatial else motion_in_plane)(derivation, forest, shape_of)
     values, taken = _use_up(derivation, site, masses, forest, motion)
     state = motion.finish(taken.solution, taken.speeds)
     values, prescribed = drop_closed(derivation, state.coordinates, values)
@@ -126,7 +126,7 @@ def _use_up(
     """
     found = find_constraints(derivation, forest, motion.placements)
     values = constraint_values(derivation, site, motion.placements, found.on_positions)
-    if derivation.space.name == "plane":
+    if derivation.space.is_planar:
         named = zip(motion.all_coordinates, forest.coordinates, strict=True)
         values = without_whole_turns(derivation, [symbol for symbol, one in named if one.unit == "rad"], values)
     check_held(derivation, masses, forest, motion.all_coordinates, values, found.on_velocities)

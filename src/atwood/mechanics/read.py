@@ -50,8 +50,8 @@ def read_mechanism(flat: FlatScene, modes: Mapping[str, str], known_line_signs: 
     check_names(flat.parts)
     found = _read_laws(flat, modes, ground, known_line_signs)
     check_laws(flat.parts, space)
-    line_signs = known_line_signs if space.name == "line" else None
-    if space.name == "line" and not known_line_signs:  # lengths are signed by where their ends are, which bodies say
+    line_signs = known_line_signs if space.is_line else None
+    if space.is_line and not known_line_signs:  # lengths are signed by where their ends are, which bodies say
         line_signs = _find_line_signs(flat, ground, found)
         found = _read_laws(flat, modes, ground, line_signs)
     if any(local.asks for local in found.locals_.values()):  # laws that read the inertia of the body they are on

@@ -234,7 +234,7 @@ def animate(
 
     def show(number: int) -> list[object]:
         axes.clear()
-        if result.assembly.mechanism.space.name == "space":
+        if result.assembly.mechanism.space.is_spatial:
             frame_space(axes, seen)
             draw_space(axes, seen, moments[number])
         else:

@@ -85,7 +85,7 @@ def compared_paths(assembly: Assembly) -> list[str]:
     paths = [f"{owner}.position.{axis}" for owner in owners for axis in "xyz"]
     paths += [one.name for one in assembly.reduced.names]
     found = [path for path in dict.fromkeys(paths) if path in known and known[path].unit in ("m", "rad")]
-    if assembly.mechanism.space.name == "space":
+    if assembly.mechanism.space.is_spatial:
         axes = [f"{owner}.{axis}_axis.{part}" for owner in owners for axis in "xyz" for part in "xyz"]
         found += [path for path in axes if path in known]
     return found

@@ -148,7 +148,7 @@ class _Grower:
 
     def _cost(self, joint: Joint, child: int) -> int:
         """Return how many speeds it takes to hang a body on a joint; in a plane, orientations are counted apart."""
-        if self.space.name != "space":
+        if not self.space.is_spatial:
             return len(set(joint.moves).difference(self.told))
         own = (
             len({*joint.moves, *joint.turns}.difference(self.told))
@@ -160,11 +160,11 @@ class _Grower:
     def _freedom(self, child: int) -> int:
         """Return how many speeds a free body has, orientations in a plane not counted."""
         dimension = len(self.space.basis)
-        return dimension + 3 if self.space.name == "space" and child in self.bodies.oriented else dimension
+        return dimension + 3 if self.space.is_spatial and child in self.bodies.oriented else dimension
 
     def _hang(self, joint: Joint, backwards: bool) -> None:
         parent, child = self._ends(joint, backwards)
-        in_space, oriented = self.space.name == "space", child in self.bodies.oriented
+        in_space, oriented = self.space.is_spatial, child in self.bodies.oriented
         follows = in_space and oriented and joint.says_rotation and (parent == 0 or parent in self.bodies.oriented)
         numbers = []
         for symbol in joint.local.coordinates if follows else joint.moves:
@@ -210,7 +210,7 @@ class _Grower:
         numbers = [self._coordinate(f"{body.name}.position.{axis}", "m") for axis in self._axis_labels()]
         orientation, spin = (
             self._orientation_coordinates(index)
-            if self.space.name == "space" and index in self.bodies.oriented
+            if self.space.is_spatial and index in self.bodies.oriented
             else ((), ())
         )
         coordinates, speeds = tuple(q for q, _ in numbers), tuple(u for _, u in numbers)
@@ -218,7 +218,7 @@ class _Grower:
         self.placed[index] = 1
 
     def _axis_labels(self) -> tuple[str, ...]:
-        if self.space.name == "line" and len(self.space.reported_axes) == 1:
+        if self.space.is_line and len(self.space.reported_axes) == 1:
             return ("xyz"[self.space.reported_axes[0]],)
         return self.space.axis_names
 
@@ -226,7 +226,7 @@ class _Grower:
         """Give orientations to the bodies that need one; return which joints' locks hold by construction."""
         if not self.space.has_rotation:
             return {id(joint) for joint in joints if joint.locks}
-        if self.space.name == "space":
+        if self.space.is_spatial:
             return {id(one.joint) for one in self.attachments if one.joint is not None and one.turns_with_joint}
         known = {0}
         locked: set[int] = set()

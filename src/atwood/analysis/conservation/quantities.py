@@ -88,7 +88,7 @@ class Quantities:
         p = whole.momenta
         count = len(space.basis)
         momentum = [graph.zero] * count
-        spins = [graph.zero] * (3 if space.name == "space" else int(space.name == "plane"))
+        spins = [graph.zero] * (3 if space.is_spatial else int(space.is_planar))
         kinematics = assembly.maximal.kinematics
         for one in forest.attachments:
             if len(one.speeds) == count:
@@ -100,7 +100,7 @@ class Quantities:
                 turned = spin_in_world([p[k] for k in one.spin], axes)
                 spins = [a + b for a, b in zip(spins, turned, strict=True)]
         for turn in forest.orientations:
-            if turn.coordinate is not None and space.name == "plane":
+            if turn.coordinate is not None and space.is_planar:
                 spins[0] = spins[0] + p[turn.coordinate]
         free = [one for one in forest.attachments if len(one.speeds) == count]
         moments = _first_moments(whole, momentum, free, assembly.parameters)

@@ -88,7 +88,7 @@ def hold_idle_spins(mechanism: Mechanism) -> Mechanism:
     mechanism
         The mechanism.
     """
-    if mechanism.space.name != "space":
+    if not mechanism.space.is_spatial:
         return mechanism
     free = _free_to_spin(mechanism)
     if not free:

@@ -101,7 +101,7 @@ def take_up(
         new = linear_integrals(derivation, places, moving, together=even)
         if not new:
             held = any(value is not SOLVED and _holds(value, found, state) for _, _, value in values)
-            in_turn = even and not held and derivation.space.name == "space"
+            in_turn = even and not held and derivation.space.is_spatial
             speeds = _solved_speeds(derivation, places, moving) if in_turn else {}
             return Taken(found, speeds, tuple(integrals), () if speeds else tuple(left))
         made = [

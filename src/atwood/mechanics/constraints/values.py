@@ -125,7 +125,7 @@ def levels(
         Their values in terms of coordinates.
     """
     found = []
-    by_parts = mechanism.space.name == "space"
+    by_parts = mechanism.space.is_spatial
     symbols = (state.coordinates, state.rates, state.speeds, state.accelerations)
     rates, seconds = constraint_levels([] if by_parts else placed, mechanism.time, *symbols)
     for number, ((path, one, multiplier), value) in enumerate(zip(chosen, placed, strict=True)):

@@ -258,7 +258,7 @@ def push_body(
     if spins[0] is None or spins[1] is None:
         forces.twist(index, about_node, node)
         return
-    moment = turned_tensor(tensor_of(path, body), turn) if space.name == "space" else body.moment
+    moment = turned_tensor(tensor_of(path, body), turn) if space.is_spatial else body.moment
     euler_torque = inertial_torque(moment, spins[0], spins[1])
     forces.twist(index, [t - i for t, i in zip(about_node, euler_torque, strict=True)], node)
 

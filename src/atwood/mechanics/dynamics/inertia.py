@@ -121,7 +121,7 @@ def add_masses(
             moment = turned_tensor(moment, turn)
         shares.setdefault(body, []).append(RigidMass(mass, offsets[node] + rotate(center, turn), moment, (part,)))
 
-    nothing: Scalar | Axes = (_ZERO, _ZERO, _ZERO) if space.name == "space" else 0.0
+    nothing: Scalar | Axes = (_ZERO, _ZERO, _ZERO) if space.is_spatial else 0.0
     for path, local in locals_.items():
         for point in local.point_inertias:
             nodes = tuple(mechanism.node_of[(path, p.name)] for p in point.points)
@@ -137,7 +137,7 @@ def add_masses(
             if body in local.varying:
                 varying.append((path, body)) if bodies.body_of[node] else fixed.append(path)
                 continue
-            moment = tensor_of(path, body) if space.name == "space" else body.moment
+            moment = tensor_of(path, body) if space.is_spatial else body.moment
             share(path, node, body.mass, body.center_of_mass, moment)
     merged = {index: _merge(found) for index, found in shares.items()}
     return Masses(merged, tuple(coupled), tuple(fixed), tuple(varying))
@@ -179,7 +179,7 @@ def check_tensors(locals_: Mapping[str, LocalPart], values: Mapping[Expression, 
             graph = next(iter(values)).graph if values else None
             numbers = evaluate([graph.convert(entry) for entry in entries], values) if graph else entries
             tensor = np.array(numbers, dtype=float).reshape(3, 3)
-            if space.name == "plane" and tensor[1, 1] > 0.0 and np.count_nonzero(tensor) == 1:
+            if space.is_planar and tensor[1, 1] > 0.0 and np.count_nonzero(tensor) == 1:
                 continue
             try:
                 verify_moments(symmetric_part(tensor))

@@ -49,12 +49,12 @@ def body_point_of(kinematics: Kinematics, body: int, turn: NodeTurn, vector: Vec
     placements = kinematics.placements
     spin = kinematics.angular_velocities.get(body, ())
     spin_rate = kinematics.angular_accelerations.get(body, ())
-    if space.name == "space":
+    if space.is_spatial:
         return _arm_in_space(kinematics, body, turn, vector, spin, spin_rate)
     axes = node_axes(placements.angles.get(body), None, turn)
     arm = space.components(vector if axes is None else from_axes(axes, vector))
     still = (0.0,) * len(arm)
-    if space.name == "line" or not spin:
+    if space.is_line or not spin:
         return BodyPoint(arm, still, still)
     w, alpha = spin[0], spin_rate[0]
     velocity = (-w * arm[1], w * arm[0])

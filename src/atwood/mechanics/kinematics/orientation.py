@@ -36,7 +36,7 @@ Quaternion: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar]
 def body_offsets(body: Body, space: Space) -> tuple[dict[int, Vector], dict[int, NodeTurn]]:
     """Return offset and turn of each node in the axes of a body."""
     offsets: dict[int, Vector] = {body.root: Vector(0.0, 0.0, 0.0)}
-    turns: dict[int, NodeTurn] = {body.root: IDENTITY if space.name == "space" else 0.0}
+    turns: dict[int, NodeTurn] = {body.root: IDENTITY if space.is_spatial else 0.0}
     for step in body.steps:
         offsets[step.child], turns[step.child] = _rigid_step(step, offsets[step.parent], turns[step.parent], space)
     return offsets, turns
@@ -45,7 +45,7 @@ def body_offsets(body: Body, space: Space) -> tuple[dict[int, Vector], dict[int,
 def _rigid_step(step: RigidStep, offset: Vector, turn: NodeTurn, space: Space) -> tuple[Vector, NodeTurn]:
     placement = step.joint.local.placement
     child_turn: NodeTurn
-    if space.name == "space":
+    if space.is_spatial:
         rotation = as_rotation(0.0 if placement.rotation is None else placement.rotation)
         assert isinstance(turn, tuple)
         child_turn = compose(turn, (rotation.inverse() if step.backwards else rotation).axes())
@@ -107,7 +107,7 @@ def spin_in_world(components: Sequence[Expression], axes: Axes | None) -> Vector
 
 def torque_components(torque_W: Vector, axes: Axes | None, space: Space) -> tuple[Scalar, ...]:
     """Return the components of a torque as those of angular velocities are: counter-clockwise, or in body axes."""
-    if space.name == "space":
+    if space.is_spatial:
         return tuple(torque_W if axes is None else to_axes(axes, torque_W))
     return (-torque_W.y,)
 

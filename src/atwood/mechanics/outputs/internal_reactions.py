@@ -75,7 +75,7 @@ def internal_reaction_program(
 
 def _counted(torque_W: Vector, axis: int, space: Space) -> Scalar:
     """Return a component of a torque as it is reported: counter-clockwise in a plane, in world axes in space."""
-    return torque_W[axis] if space.name == "space" else -torque_W.y
+    return torque_W[axis] if space.is_spatial else -torque_W.y
 
 
 def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:

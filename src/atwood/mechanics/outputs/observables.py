@@ -111,9 +111,8 @@ def list_reactions(mechanism: Mechanism) -> tuple[Reaction, ...]:
                 full, doc = f"{path}.force.{'xyz'[axis]}", f"Force {options.reaction_doc}, in world axes."
                 symbol = graph.symbol(f"reaction:{full}")
                 found.append(Reaction(full, "N", doc, symbol, (path, joint.law.name, -1), 1.0, axis))
-            turning = {"plane": ("",), "space": (".x", ".y", ".z")}.get(mechanism.space.name, ())
-            about = "counter-clockwise" if mechanism.space.name == "plane" else "in world axes"
-            for number, axis_name in enumerate(turning):
+            about = "counter-clockwise" if mechanism.space.is_planar else "in world axes"
+            for number, axis_name in enumerate(mechanism.space.turn_names):
                 full, doc = f"{path}.torque{axis_name}", f"Torque {options.reaction_doc}, {about}."
                 symbol = graph.symbol(f"reaction:{full}")
                 key = (path, joint.law.name, -1)

@@ -89,7 +89,7 @@ def _of_body(mechanism: Mechanism, equations: Equations, local: LocalPart, body:
     place = space.vector(kinematics.placements.positions[node]) + space.vector(arm.position)
     whole = _of_mass(body.mass, place, place, space.vector(kinematics.velocities[node]) + space.vector(arm.velocity))
     spin = kinematics.angular_velocities.get(index, ())
-    if space.name == "space":
+    if space.is_spatial:
         tensor = turned_tensor(tensor_of(local.part.path, body), turn)
         axes = kinematics.placements.axes.get(index)
         own = from_axes(tensor, Vector(*spin)) if spin else ZERO

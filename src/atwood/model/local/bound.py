@@ -78,7 +78,7 @@ def _local_connector(path: str, is_frame: bool, space: Space, graph: Graph) -> L
     velocity = tuple(graph.symbol(f"{path}.velocity.{axis}") for axis in space.axis_names)
     if not is_frame or not space.has_rotation:
         return LocalConnector(position, velocity)
-    if space.name == "plane":
+    if space.is_planar:
         turns = graph.symbol(f"{path}.angle"), graph.symbol(f"{path}.angular_speed")
         return LocalConnector(position, velocity, *turns)
     x, y, z = (Vector(*(graph.symbol(f"{path}.{axis}_axis.{c}") for c in "xyz")) for axis in "xyz")

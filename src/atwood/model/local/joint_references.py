@@ -12,6 +12,7 @@ from atwood.errors import ConnectError, DeclarationError, UnsupportedError, sugg
 from atwood.late import dataclass
 from atwood.model.declare.connectors import JointCoordinate
 from atwood.model.local.flatten import FlatScene
+from atwood.model.values.space import WHERE
 
 __all__ = ["JointCoordinateUse", "find_joint_coordinate_uses"]
 
@@ -76,8 +77,7 @@ def find_joint_coordinate_uses(flat: FlatScene) -> dict[str, tuple[JointCoordina
                 advice=suggestion(coordinate, laws) or f"Give it an @observable of the name {coordinate!r}.",
             )
         if not laws[coordinate].holds_in(flat.space):
-            where = "on a line" if flat.space == "line" else f"in a {flat.space}"
-            raise UnsupportedError(f"{where} the joint {joint} has no {coordinate}", where=full)
+            raise UnsupportedError(f"{WHERE[flat.space]} the joint {joint} has no {coordinate}", where=full)
         if joint in found:
             raise DeclarationError("a part that takes hold of joints cannot be one", where=joint)
         found[path].append(JointCoordinateUse(name, joint, coordinate))

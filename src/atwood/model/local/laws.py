@@ -41,7 +41,7 @@ from atwood.model.local.parts import (
 )
 from atwood.model.local.states import discrete_states, local_states
 from atwood.model.returned import call_law, law_value, listed, one_scalar
-from atwood.model.values.space import Space
+from atwood.model.values.space import WHERE, Space
 
 __all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "localize"]
 
@@ -99,15 +99,12 @@ def _check_space(path: str, part: Part, space: str) -> None:
     """Refuse a part that means nothing in a scene's space."""
     known = type(part.component).spaces
     if space not in known:
-        kind, places = type(part.component).__name__, " and ".join(_PLACES[one] for one in known)
+        kind, places = type(part.component).__name__, " and ".join(WHERE[one] for one in known)
         raise UnsupportedError(
-            f"{kind} exists {places} only, and the scene is {_PLACES[space]}",
+            f"{kind} exists {places} only, and the scene is {WHERE[space]}",
             where=path,
             advice=f"Give the scene space='{known[-1]}', or take the part out.",
         )
-
-
-_PLACES = {"line": "on a line", "plane": "in a plane", "space": "in space"}
 
 
 @dataclass(frozen=True)
@@ -161,7 +158,7 @@ def _localize_part(
     check_lagrangians(part.path, lagrangians, own, linked)
     joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws.of("joint"))
     coordinates = [symbol for joint in joints for symbol in joint.coordinates]
-    formulas = formulas_of(part, bound, coordinates, graph) if space.name == "space" else {}
+    formulas = formulas_of(part, bound, coordinates, graph) if space.is_spatial else {}
     # Only forces may read reactions: they are solved for together with the accelerations.
     binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
     acting = bind(component, binding)

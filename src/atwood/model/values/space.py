@@ -23,6 +23,10 @@ class Space:
         Names of these components in symbols.
     reported_axes
         Which of x, y, z (0, 1, 2) quantities are reported along.
+    turn_axes
+        Unit vectors of the axes that frames can turn about, in the directions in which turns are counted.
+    turn_names
+        What quantities about these axes have after their name.
     line
         Unit vector of the line, for a scene on a line.
     """
@@ -31,12 +35,33 @@ class Space:
     basis: tuple[Vector, ...]
     axis_names: tuple[str, ...]
     reported_axes: tuple[int, ...]
+    turn_axes: tuple[Vector, ...] = ()
+    turn_names: tuple[str, ...] = ()
     line: Vector | None = None
 
     @property
     def has_rotation(self) -> bool:
         """Whether frames can turn."""
-        return self.name != "line"
+        return bool(self.turn_axes)
+
+    @property
+    def is_line(self) -> bool:
+        """Whether everything is on a line, and nothing turns."""
+        return self.line is not None
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether an orientation is one angle."""
+        return len(self.turn_axes) == 1
+
+    @property
+    def is_spatial(self) -> bool:
+        """Whether orientations are rotations in space."""
+        return len(self.turn_axes) == 3
+
+    def turn_components(self, vector: Vector) -> tuple[Scalar, ...]:
+        """Return the components of a torque or an angular velocity about the axes that frames can turn about."""
+        return tuple(vector) if self.is_spatial else (-vector.y,) if self.is_planar else ()
 
     def vector(self, components: tuple[Scalar, ...]) -> Vector:
         """Return the vector with the given free components."""
@@ -50,7 +75,10 @@ class Space:
         return tuple(dot(vector, direction) for direction in self.basis)
 
 
-_X, _Y, _Z = Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0)
+_X, _Y, _Z = FIXED_AXES = Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0)
+
+WHERE = {"line": "on a line", "plane": "in a plane", "space": "in space"}
+"""Where a scene is, in words."""
 
 
 def make_space(name: str, line_axis: tuple[float, float, float]) -> Space:
@@ -58,16 +86,13 @@ def make_space(name: str, line_axis: tuple[float, float, float]) -> Space:
     if name == "line":
         line = Vector(*line_axis)
         reported = tuple(i for i in range(3) if line[i] != 0.0)
-        return Space("line", (line,), ("s",), reported, line)
+        return Space("line", (line,), ("s",), reported, line=line)
     if name == "plane":
-        return Space("plane", (_X, _Z), ("x", "z"), (0, 2))
-    return Space("space", (_X, _Y, _Z), ("x", "y", "z"), (0, 1, 2))
+        return Space("plane", (_X, _Z), ("x", "z"), (0, 2), (Vector(0.0, -1.0, 0.0),), ("",))
+    return Space("space", (_X, _Y, _Z), ("x", "y", "z"), (0, 1, 2), FIXED_AXES, (".x", ".y", ".z"))
 
 
 def planar_axes(angle: Scalar) -> tuple[Vector, Vector, Vector]:
     """Return the axes of a frame turned by an angle, counter-clockwise as seen on the page, that is about -y."""
     c, s = cos(angle), sin(angle)
     return Vector(c, 0.0, s), _Y, Vector(-s, 0.0, c)
-
-
-FIXED_AXES = (_X, _Y, _Z)

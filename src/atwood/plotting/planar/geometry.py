@@ -288,13 +288,13 @@ def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]
     nodes = {name: mechanism.graph.node_of[path, name] for name in kinds}
     ends = [nodes[name] for name, one in kinds.items() if not isinstance(one, Groove)]
     grooves = [nodes[name] for name, one in kinds.items() if isinstance(one, Groove)]
-    outline = outline_of(local) if mechanism.space.name == "plane" else None
+    outline = outline_of(local) if mechanism.space.is_planar else None
     if outline is not None:
         node = nodes[outline.frame] if outline.frame else ends[0]
         if outline.kind == "path":
             return [Shape(path, "path", (ends[0], node))]
         return [Shape(path, "solid", (node,), surface=outline_mesh(outline, around=120))]
-    for joint in local.joints if mechanism.space.name == "plane" else ():
+    for joint in local.joints if mechanism.space.is_planar else ():
         line = joint_curve(mechanism, path, joint) if joint.placement.axes == "a" else None
         if line is not None and joint.law.options.a != "world":
             return [Shape(path, "curve", (nodes[joint.law.options.a],), line=line[:, [0, 2]])]
@@ -307,12 +307,12 @@ def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]
         return [Shape(path, "pulley", (grooves[0], *ends[:1]), weight)]
     if len(ends) == 2:
         return _between(mechanism, path, local, (ends[0], ends[1]), grooves)
-    if local.body_inertias and len(ends) == 1 and mechanism.space.name == "plane":
+    if local.body_inertias and len(ends) == 1 and mechanism.space.is_planar:
         return _bodies(mechanism, path, local, ends[0])
     if len(ends) == 3 and not local.body_inertias and len(local.joints) > 1:
         return _between(mechanism, path, local, (ends[0], ends[1]), grooves)
     if masses and ends:
-        rail = [Shape(path, "rail", (0, ends[0]))] if joints and mechanism.space.name == "plane" else []
+        rail = [Shape(path, "rail", (0, ends[0]))] if joints and mechanism.space.is_planar else []
         return [*rail, Shape(path, "mass", (ends[0],), weight)]
     return []
 
@@ -345,7 +345,7 @@ def _between(
     if local.potentials or local.dissipations:
         places = [symbol for symbols in local.connectors.values() for symbol in (*symbols.position, *symbols.velocity)]
         if not any(depends_on(one, places) for one in (*local.potentials, *local.dissipations)):
-            return [Shape(path, "spiral", ends)] if mechanism.space.name == "plane" else []
+            return [Shape(path, "spiral", ends)] if mechanism.space.is_planar else []
         return [Shape(path, "spring" if local.potentials else "damper", ends)]
     if joints:
         shifts = [c for joint in joints for c in joint.placement.displacement]

@@ -27,7 +27,7 @@ def actual_line_signs(assembly: Assembly, t: float, q: FloatArray, u: FloatArray
     form
         The form that its coordinates are of.
     """
-    if assembly.mechanism.space.name != "line":
+    if not assembly.mechanism.space.is_line:
         return {}
     equations = assembly.reduced if form == "reduced" else assembly.maximal
     positions = equations.kinematics.placements.positions

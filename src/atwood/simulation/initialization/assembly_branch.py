@@ -34,7 +34,7 @@ def wrongly_turned(assembly: Assembly, equations: Equations, t: float, q: FloatA
     t, q
         Time and coordinates that fulfil the constraints.
     """
-    if assembly.mechanism.space.name != "space" or not equations.forest.loop_joints:
+    if not assembly.mechanism.space.is_spatial or not equations.forest.loop_joints:
         return []
     parts, program = assembly.shared.get(_BRANCH_TESTS, lambda: _branch_tests(assembly, equations))
     if not parts:

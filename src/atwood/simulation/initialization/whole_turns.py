@@ -56,7 +56,7 @@ def unwound(
     q
         Coordinates of the start.
     """
-    if assembly.mechanism.space.name != "space":  # in a plane angles are absolute, and not those of joints
+    if not assembly.mechanism.space.is_spatial:  # in a plane angles are absolute, and not those of joints
         return q
     of_charts = {number for orientation in equations.orientation_coordinates for number in orientation.coordinates}
     whole = np.round((q - near) / _TURN)

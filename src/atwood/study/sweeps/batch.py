@@ -60,7 +60,7 @@ def why_not_batched(request: SweepRequest) -> str:
         return "events are watched"
     if assembly.relations or equations.prescribed:
         return "something in it follows the clock"
-    if assembly.mechanism.space.name == "line":
+    if assembly.mechanism.space.is_line:
         return "on a line, each start says on which side of each other the parts are"
     if options.solver == "auto" and can_be_stiff(assembly):
         return "whether it is stiff depends on each run (with solver='explicit' it is not asked)"
