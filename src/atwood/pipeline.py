@@ -255,7 +255,8 @@ def simulate(
     solver
         ``"ida"``: SUNDIALS IDA with the equations as machine code. ``"ida-sundae"``: the same method through
         scikit-sundae with the equations as Python, the reference. ``"explicit"``: a Runge-Kutta method of order 8(5,3),
-        and ``"taylor"``: Taylor series, for the reduced form without closed loops. ``"auto"``: IDA for what is
+        and ``"taylor"``: Taylor series, for the reduced form without closed loops, or with loops that formulas solve
+        (four-bars, slider-cranks, and what is made of such groups, in any plane). ``"auto"``: IDA for what is
         constrained or stiff, or turns out so; else an explicit method. `Result.solver` says which, and why.
         ``"gauss"``: a symplectic method with equal steps, whose energy error does not grow, for scenes that have a
         Hamiltonian. ``"composition"``: the same where that is T(p) + V(q, t), by explicit steps.

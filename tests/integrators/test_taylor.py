@@ -382,7 +382,7 @@ def test_laws_that_switch_with_the_motion_are_refused() -> None:
     assert refused.value.where == "rail.displacement"
 
 
-@pytest.mark.parametrize(("name", "form"), [("four-bar", "reduced"), ("double-pendulum", "dae")])
+@pytest.mark.parametrize(("name", "form"), [("bricard", "reduced"), ("double-pendulum", "dae")])
 def test_constraints_are_refused(name: str, form: Any) -> None:
     with pytest.raises(UsageError, match="without closed loops"):
         simulate(SCENES[name](), form=form, solver="taylor")

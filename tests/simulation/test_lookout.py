@@ -80,11 +80,11 @@ def test_compiled_looks_are_those_of_python(
         note(self, step_result)
         noted.append(Look(step_result.t, step_result.y, step_result.yp))
 
-    compiled = simulate(fast_slider_crank(), form=form, t_end=0.1)
+    compiled = simulate(fast_slider_crank(), form=form, t_end=0.1, solver="ida")
     looks = guards[0]._compiled.take()
     monkeypatch.setattr(SingularityMonitor, "note", in_python)
     monkeypatch.setattr(SingularityMonitor, "lookout", property(lambda self: None))
-    plain = simulate(fast_slider_crank(), form=form, t_end=0.1)
+    plain = simulate(fast_slider_crank(), form=form, t_end=0.1, solver="ida")
     assert len(looks) > 5
     for (t, y, yp), one in zip(looks[:-1], noted, strict=False):
         assert t == pytest.approx(one.t, rel=1e-9)  # IDA sums up y' in another order
@@ -95,7 +95,7 @@ def test_compiled_looks_are_those_of_python(
 
 @pytest.mark.parametrize("form", FORMS)
 def test_pivots_are_what_is_left_of_each_constraint(form: str, guards: list[SingularityMonitor]) -> None:
-    simulate(fast_slider_crank(), form=form, t_end=0.1)
+    simulate(fast_slider_crank(), form=form, t_end=0.1, solver="ida")
     monitor = guards[0]
     plan, data = monitor.plan, monitor._compiled
     t, y, _ = data.take()[-1]
@@ -106,7 +106,7 @@ def test_pivots_are_what_is_left_of_each_constraint(form: str, guards: list[Sing
 
 def test_outputs_between_looks_change_no_look(guards: list[SingularityMonitor]) -> None:
     for outputs in (2, 1001, 3001):
-        simulate(fast_slider_crank(), t_end=0.1, outputs=outputs)
+        simulate(fast_slider_crank(), t_end=0.1, outputs=outputs, solver="ida")
     few, *others = ([one[0] for one in monitor._compiled.take()] for monitor in guards)
     assert all(many == few for many in others)
     assert len(few) > 3

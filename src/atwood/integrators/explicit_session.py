@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from functools import cache
 from math import inf
-from typing import Literal, cast
+from typing import Literal, Protocol, cast, runtime_checkable
 
 import numpy as np
 
@@ -29,13 +29,14 @@ from atwood.integrators.protocol import (
     Budget,
     FloatArray,
     ImplicitProblem,
+    Session,
     SolverOptions,
     Statistics,
     Status,
     StepResult,
 )
 
-__all__ = ["ExplicitSession", "open_explicit"]
+__all__ = ["ExplicitSession", "SamplingSession", "open_explicit"]
 
 FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
 """So many steps are taken before limits are looked at: at first, for one unknown, and at most."""
@@ -88,6 +89,21 @@ def open_explicit(
     from atwood.integrators.dop853.reference import ReferenceStepper
 
     return ExplicitSession(problem, options, ReferenceStepper(problem, options), t, y, budget, leave, end)
+
+
+@runtime_checkable
+class SamplingSession(Session, Protocol):
+    """A session that goes through many output times at once."""
+
+    def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, StepResult]:
+        """Go on as far as nothing stops it; return values and rates at the times that were reached, and how it ended.
+
+        Parameters
+        ----------
+        times
+            Rising, the first not before the time at which the last advance ended.
+        """
+        ...
 
 
 class ExplicitSession:

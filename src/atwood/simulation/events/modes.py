@@ -135,7 +135,7 @@ class EventProbe:
         scales = plan.scales
         sizes = {"m": scales.length, "N": scales.force, "m/s": scales.length / scales.time}
         small = [10.0 * tolerance * sizes.get(one.unit, 1.0) for one in self.event_functions]
-        self._shift = np.zeros(len(small))
+        self.shift = np.zeros(len(small))
         values = np.asarray(self.values(t, q, u)) if self.event_functions else np.zeros(0)
         self.broken = next(
             (
@@ -147,7 +147,7 @@ class EventProbe:
         )
         for i, (one, value) in enumerate(zip(self.event_functions, values, strict=True)):
             if abs(value) <= small[i] and not one.is_noted:
-                self._shift[i] = -one.direction * small[i]
+                self.shift[i] = -one.direction * small[i]
 
     @property
     def directions(self) -> tuple[int, ...]:
@@ -169,7 +169,7 @@ class EventProbe:
             reactions = found[:, 0]
         if self.needs.accelerations and len(u):
             accelerations, _ = self.plan.balance.accelerate(t, q, u, self.plan.kept)
-        values: FloatArray = np.asarray(self.kernel([t], q, u, accelerations, reactions)[0]) + self._shift
+        values: FloatArray = np.asarray(self.kernel([t], q, u, accelerations, reactions)[0]) + self.shift
         return values
 
     def compiled(self, for_ida: bool) -> EventData | None:
@@ -182,12 +182,9 @@ class EventProbe:
         """
         if not self.event_functions or not len(self.assembly.own_equations.coordinates):
             return None
-        kept, maximal = self.plan.finding.kept, () if self.reactions is None else self.reactions.finding.kept
 
         def make() -> EventCode | None:
-            from atwood.forms.event_program import event_program
-
-            program = event_program(self.assembly, [one.value for one in self.event_functions], kept, maximal)
+            program = self.program()
             if program is None or any(node.operation == "external" for node in program.nodes):
                 return None
             try:
@@ -196,8 +193,21 @@ class EventProbe:
                 return None
             return compile_events(program, for_ida)
 
-        code = self.assembly.shared.get(_EVENT_CODE, make, kept, maximal, for_ida, self._conditions)
-        return None if code is None else code.bind(self.assembly.parameter_values, self._shift)
+        code = self.assembly.shared.get(_EVENT_CODE, make, for_ida, *self.key)
+        return None if code is None else code.bind(self.assembly.parameter_values, self.shift)
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What the program of the events depends on, besides the scene in its mode."""
+        maximal = () if self.reactions is None else self.reactions.finding.kept
+        return self.plan.finding.kept, maximal, self._conditions
+
+    def program(self) -> Program | None:
+        """Return the events as a program of (t, q, u, shift); see `atwood.forms.event_program.event_program`."""
+        from atwood.forms.event_program import event_program
+
+        kept, maximal, _ = self.key
+        return event_program(self.assembly, [one.value for one in self.event_functions], kept, maximal)
 
     def function(self) -> Callable[[float, FloatArray, FloatArray], FloatArray] | None:
         """Return the events as a function of the solver's vector; None if nothing is watched."""

@@ -15,7 +15,7 @@ from atwood.integrators.protocol import FloatArray, Values
 if TYPE_CHECKING:
     from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
 
-__all__ = ["compiled_rates", "explicit_problem", "own_rates"]
+__all__ = ["compiled_rates", "explicit_problem", "explicit_problem_of", "own_rates"]
 
 _EXTERNAL: Key[bool] = Key("whether accelerations call functions in Python")
 _COMPILED: Key[CompiledAccelerations] = Key("machine code of accelerations")
@@ -44,10 +44,33 @@ def explicit_problem(
         None if the scene has no coordinates, or constraints are left among them.
     """
     program = found or accelerations_of(assembly)
-    n, m = len(assembly.reduced.coordinates), len(assembly.reduced.speeds)
-    if program is None or n == 0:
+    if program is None or len(assembly.reduced.coordinates) == 0:
         return None
-    kernel = assembly.kernel(program.program)
+    return explicit_problem_of(assembly, program, assembly.parameter_values, events, directions)
+
+
+def explicit_problem_of(
+    assembly: Assembly,
+    program: AccelerationProgram,
+    values: FloatArray,
+    events: Callable[[float, FloatArray, FloatArray], Values] | None = None,
+    directions: tuple[int, ...] = (),
+) -> ExplicitProblem:
+    """Return what an explicit method is given of accelerations.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    program
+        The accelerations.
+    values
+        Values of its parameters.
+    events, directions
+        See `explicit_problem`.
+    """
+    _, n, m = (len(group.symbols) for group in program.program.inputs)
+    kernel = assembly.compiled(program.program).bind(values)
 
     def rates(t: float, y: FloatArray) -> Sequence[float]:
         found = kernel([t], y[:n], y[n:])
@@ -59,7 +82,7 @@ def explicit_problem(
         events=events,
         event_count=len(directions),
         event_directions=directions,
-        compiled=_compiled(assembly, program),
+        compiled=_compiled(assembly, program, values),
     )
 
 
@@ -70,14 +93,14 @@ def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAc
     return assembly.shared.get(_COMPILED, lambda: CompiledAccelerations(found.program), found)
 
 
-def _compiled(assembly: Assembly, found: AccelerationProgram) -> Callable[[], CompiledRates] | None:
+def _compiled(assembly: Assembly, found: AccelerationProgram, values: FloatArray) -> Callable[[], CompiledRates] | None:
     """Return what gives each session compiled rates, made when they are first asked for; None if they cannot be."""
     if not _compiles(assembly, found):
         return None
 
     @cache
     def bound() -> Callable[[], CompiledRates]:
-        return compiled_rates(assembly, found).bind(assembly.parameter_values)
+        return compiled_rates(assembly, found).bind(values)
 
     return lambda: bound()()
 

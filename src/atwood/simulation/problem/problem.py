@@ -200,8 +200,8 @@ class Plan:
 
     def poll(self, solver: str) -> Callable[[float], None] | None:
         """Return what a driver calls between two steps; compiled functions tell by themselves when it is time to."""
-        native = solver == "ida" and not self.not_compilable
-        return self.between_steps if self.dependent_speeds and not native else None
+        in_python = solver == "ida-sundae" or (solver == "ida" and bool(self.not_compilable))
+        return self.between_steps if self.dependent_speeds and in_python else None
 
     def problem(
         self,

@@ -23,7 +23,7 @@ from atwood.integrators.taylor.problem import REACH, TaylorProblem
 if TYPE_CHECKING:
     from atwood.integrators.taylor.native import CompiledRecurrences
 
-__all__ = ["open_taylor", "recurrences", "taylor_problem"]
+__all__ = ["open_taylor", "recurrences", "recurrences_of", "taylor_problem"]
 
 _BRANCHES: Key[bool] = Key("whether a branch could be without a value")
 _RECURRENCES: Key[TaylorPrograms] = Key("recurrences")
@@ -49,6 +49,11 @@ def recurrences(assembly: Assembly) -> TaylorPrograms:
             where=assembly.flat.name,
             advice="Use the solver 'ida'.",
         )
+    return recurrences_of(assembly, found)
+
+
+def recurrences_of(assembly: Assembly, found: AccelerationProgram) -> TaylorPrograms:
+    """Return the recurrences of accelerations of a scene; errors as for `recurrences`."""
     is_partial = assembly.shared.get(_BRANCHES, lambda: _has_partial_branch(assembly, found), found)
     chosen = assembly.known_relations if is_partial else {}
     return assembly.shared.get(_RECURRENCES, lambda: _make(found, chosen), found, tuple(chosen.values()))
@@ -83,7 +88,13 @@ def _make(found: AccelerationProgram, chosen: Mapping[Expression, float]) -> Tay
     return taylor_programs(program.name, time, [*q, *u], [*rates, *results], program.parameters, _LANES)
 
 
-def taylor_problem(assembly: Assembly, stop_time: float = inf, has_events: bool = False) -> TaylorProblem:
+def taylor_problem(
+    assembly: Assembly,
+    stop_time: float = inf,
+    has_events: bool = False,
+    found: AccelerationProgram | None = None,
+    values: FloatArray | None = None,
+) -> TaylorProblem:
     """Return what the Taylor-series method is given of a scene; errors as for `recurrences`.
 
     Parameters
@@ -94,19 +105,22 @@ def taylor_problem(assembly: Assembly, stop_time: float = inf, has_events: bool 
         The end of the stretch in which the same laws act.
     has_events
         Whether events are looked for.
+    found, values
+        The accelerations and the values of their parameters, where they are not those of the scene itself.
     """
-    programs = recurrences(assembly)
+    programs = recurrences(assembly) if found is None else recurrences_of(assembly, found)
+    parameters = np.asarray(assembly.parameter_values if values is None else values, dtype=np.float64)
     return TaylorProblem(
         programs=programs,
-        parameters=np.asarray(assembly.parameter_values, dtype=np.float64),
+        parameters=parameters,
         stop_time=stop_time,
         reach=REACH if has_events else inf,
-        compiled=_compiled(assembly, programs),
+        compiled=_compiled(assembly, programs, parameters),
     )
 
 
 def _compiled(
-    assembly: Assembly, programs: TaylorPrograms
+    assembly: Assembly, programs: TaylorPrograms, values: FloatArray
 ) -> Callable[[], tuple[CompiledRecurrences, FloatArray]] | None:
     """Return what gives the machine code, made when it is first asked for; None if there is no compiler."""
     try:
@@ -117,7 +131,7 @@ def _compiled(
     @cache
     def bound() -> tuple[CompiledRecurrences, FloatArray]:
         code = assembly.shared.get(_COMPILED, lambda: CompiledRecurrences(programs), programs)
-        return code, code.bind(assembly.parameter_values)
+        return code, code.bind(values)
 
     return bound
 

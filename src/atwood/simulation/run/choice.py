@@ -17,7 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
-from atwood.simulation.problem.explicit_scene import explicit_problem
+from atwood.simulation.problem.explicit_scene import explicit_problem, explicit_problem_of
 from atwood.simulation.problem.options import SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.stiffness import Stiffness, can_be_stiff, find_stiffness
@@ -27,6 +27,7 @@ __all__ = [
     "Choice",
     "check_solver",
     "choose",
+    "dead_centre",
     "describe_choices",
     "implicit_solver",
     "stiffness_of",
@@ -116,7 +117,7 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
     if assembly.form == "dae":
         return Choice(t, implicit_solver(), "the dae form keeps constraints, with multipliers")
     if plan.balance.constraints:
-        return Choice(t, implicit_solver(), "closed loops leave constraints among the coordinates")
+        return _choose_for_loops(plan, options, t, q, u)
     if not len(q):
         return Choice(t, implicit_solver(), "nothing is free to move")
     found = stiffness_of(plan, options, t, q, u)
@@ -129,6 +130,26 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
         reason = "its orientations are in three coordinates, which are singular somewhere: series err least near there"
         return Choice(t, "taylor", reason)
     return Choice(t, "explicit", "its coordinates are independent, and the problem is not stiff")
+
+
+def _choose_for_loops(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
+    """Return what solves a mechanism with closed loops: an explicit method where formulas solve these."""
+    from atwood.simulation.problem.closed_loops import solve_at
+
+    solved = solve_at(plan, t, q, u)
+    if solved is None:
+        return Choice(t, implicit_solver(), "closed loops leave constraints among the coordinates")
+    found = stiffness_of(plan, options, t, q, u)
+    if found is not None and found.is_stiff:
+        return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
+    names = plan.assembly.reduced.names
+    free = ", ".join(names[i].name for i in solved.independent)
+    return Choice(t, "explicit", f"formulas solve its closed loops, in terms of {free}, and the problem is not stiff")
+
+
+def dead_centre(t: float) -> Choice:
+    """Return the choice of the numeric loop in the middle of a run, where formulas for it have no value near by."""
+    return Choice(t, implicit_solver(), "a dead centre of every choice of independent coordinates is near")
 
 
 _HAS_SERIES: Key[bool] = Key("whether accelerations have Taylor series")
@@ -170,12 +191,22 @@ def stiffness_of(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: Fl
     assembly = plan.assembly
     if not can_be_stiff(assembly):
         return None
-    problem = explicit_problem(assembly)
-    if problem is None:
-        return None
-    span = max(options.t_end - t, 0.0)
     y = np.concatenate([q, u])
     scale = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
+    if plan.balance.constraints:
+        from atwood.simulation.problem.closed_loops import solve_at
+
+        solved = solve_at(plan, t, q, u)
+        if solved is None:
+            return None
+        problem = explicit_problem_of(assembly, solved.form.accelerations, solved.values)
+        y, scale = solved.reduced(y), solved.reduced(scale)
+    else:
+        found = explicit_problem(assembly)
+        if found is None:
+            return None
+        problem = found
+    span = max(options.t_end - t, 0.0)
     return find_stiffness(problem.rates, t, y, scale, plan.scales.time, span, options.relative_tolerance)
 
 

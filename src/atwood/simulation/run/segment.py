@@ -12,7 +12,7 @@ import numpy as np
 
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
-from atwood.integrators.explicit_session import ExplicitSession
+from atwood.integrators.explicit_session import SamplingSession
 from atwood.integrators.protocol import Budget, FloatArray, ReadingSession, Session, Statistics, Status, StepResult
 from atwood.late import dataclass
 from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
@@ -26,7 +26,7 @@ from atwood.simulation.problem.options import RunOptions, Samples
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely
-from atwood.simulation.run.choice import Choice, stiffness_of, turned_stiff
+from atwood.simulation.run.choice import Choice, dead_centre, stiffness_of, turned_stiff
 from atwood.simulation.run.record import Recorder
 from atwood.simulation.run.session import KeptSession, SolverRequest, open_explicit_session, open_implicit_session
 from atwood.simulation.run.tolerances import too_tight
@@ -191,7 +191,7 @@ class _Runner:
         try:
             session = self._open(t, y, yp)
             while True:
-                if isinstance(session, ExplicitSession):
+                if isinstance(session, SamplingSession):
                     done, step_result = self._sample(session, done)
                 else:
                     done, step_result = self._advance(session, done)
@@ -331,7 +331,7 @@ class _Runner:
         else:
             leave = self._is_stiff if options.solver == "auto" else None
             try:
-                self.session = open_explicit_session(request, choice.solver, t, y, leave)
+                self.session = open_explicit_session(request, choice.solver, t, y, leave, self._give_up)
             except StartError:
                 pack_state(segment.plan, t, *segment.plan.program.split(y))  # says what has no value, if it can
                 raise
@@ -345,6 +345,10 @@ class _Runner:
         self.choices.append(turned_stiff(t, found))
         return True
 
+    def _give_up(self, t: float) -> None:
+        """Leave a dead centre to the numeric loop."""
+        self.choices.append(dead_centre(t))
+
     def _change_solver(self, step_result: StepResult) -> tuple[float, FloatArray, FloatArray]:
         """Return the state from which another solver goes on."""
         self.before, self.session = self._cost(), None
@@ -352,7 +356,7 @@ class _Runner:
         plan = self.segment.plan
         return step_result.t, *pack_state(plan, step_result.t, *plan.program.split(step_result.y))
 
-    def _sample(self, session: ExplicitSession, done: int) -> tuple[int, StepResult | None]:
+    def _sample(self, session: SamplingSession, done: int) -> tuple[int, StepResult | None]:
         """Let an explicit method fill tables; return how many samples are done, and why it stopped early."""
         segment, progress = self.segment, self.segment.options.progress
         kinematic_map = segment.plan.balance.kinematic_map

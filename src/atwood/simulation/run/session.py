@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,7 @@ from atwood.simulation.problem.problem import Plan
 
 if TYPE_CHECKING:
     from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
+    from atwood.simulation.run.closed_session import ClosedLoopSession
     from atwood.simulation.singular.monitor import SingularityMonitor
 
 __all__ = ["KeptSession", "SolverRequest", "open_explicit_session", "open_implicit_session"]
@@ -185,8 +187,13 @@ def _opened_with(request: SolverRequest, leave: Leave | None) -> tuple[object, .
 
 
 def open_explicit_session(
-    request: SolverRequest, solver: str, t: float, y: FloatArray, leave: Leave | None = None
-) -> ExplicitSession:
+    request: SolverRequest,
+    solver: str,
+    t: float,
+    y: FloatArray,
+    leave: Leave | None = None,
+    give_up: Callable[[float], None] | None = None,
+) -> ExplicitSession | ClosedLoopSession:
     """Start an explicit method.
 
     Parameters
@@ -199,12 +206,21 @@ def open_explicit_session(
         Start values.
     leave
         See `atwood.integrators.explicit_session.open_explicit`.
+    give_up
+        See `atwood.simulation.run.closed_session.ClosedLoopSession`.
 
     Raises
     ------
     UsageError
         If the scene is not one for explicit methods.
     """
+    if solver != "gauss" and request.plan.balance.constraints:
+        from atwood.simulation.problem.closed_loops import solve_at
+        from atwood.simulation.run.closed_session import ClosedLoopSession
+
+        solved = solve_at(request.plan, t, *request.plan.program.split(y))
+        if solved is not None:
+            return ClosedLoopSession(request, solver, t, y, solved, leave, give_up)
     if solver == "taylor":
         return _open_taylor(request, t, y)
     if solver in FIXED_STEPS:
@@ -259,7 +275,8 @@ def _explicit_problem(request: SolverRequest, solver: str) -> ExplicitProblem:
     problem = explicit_problem(assembly, probe.function(), probe.directions) if assembly.form == "reduced" else None
     if problem is None:
         raise UsageError(
-            f"an explicit method ({SOLVERS[solver]}) needs the reduced form of a scene without closed loops",
+            f"an explicit method ({SOLVERS[solver]}) needs the reduced form of a scene without closed loops, or "
+            "with such as formulas solve",
             where=assembly.flat.name,
             advice="Use the solver 'ida'.",
         )

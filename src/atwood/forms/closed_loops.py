@@ -1,0 +1,257 @@
+"""The reduced form of a mechanism whose loops are solved by formulas: accelerations of the independent coordinates.
+
+Positions follow from the formulas of `atwood.forms.assur_groups`, with sines and cosines of dependent angles as they
+come out there, so that no angle is made of them and taken apart again. Speeds and accelerations follow from the rates
+of the constraints, group by group: ``u_d = W u_i + w`` and ``a_d = W a_i + c``. The balance of forces is projected with
+the same W (A. A. Shabana, Dynamics of Multibody Systems, 4th edition, section 5.6, embedding technique).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, cos, jacobian, live, sin, solve, substitute
+from atwood.forms.accelerations import AccelerationProgram
+from atwood.forms.assur_groups import ClosedLoops, Group
+from atwood.late import dataclass
+from atwood.mechanics.dynamics.equations import Equations
+
+__all__ = ["ClosedForm", "closed_form"]
+
+Matrix = dict[tuple[int, int], Expression]
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedForm:
+    """A mechanism with loops in terms of independent coordinates alone; branches are parameters after all others.
+
+    Attributes
+    ----------
+    loops
+        What the dependent coordinates are.
+    accelerations
+        Program of (t, q_i, u_i) with the accelerations of the independent coordinates.
+    states
+        Program of (t, q_i, u_i) with all coordinates and all speeds.
+    known
+        All coordinates and speeds, in terms of the independent ones.
+    watched
+        Program of (t, q_i, u_i) with the distances from dead centres and then the components of counted directions
+        ahead, which must not pass zero; and with the components of the latter across.
+    """
+
+    loops: ClosedLoops
+    accelerations: AccelerationProgram
+    states: Program
+    known: Mapping[Expression, Expression]
+    watched: Program
+
+
+def closed_form(
+    name: str,
+    equations: Equations,
+    parameters: Sequence[Expression],
+    loops: ClosedLoops,
+    rows: Sequence[Expression] | None = None,
+) -> ClosedForm:
+    """Return the programs of a mechanism whose loops are solved by formulas.
+
+    Parameters
+    ----------
+    name
+        Named in messages.
+    equations
+        In generalized coordinates, whose rates are speeds.
+    parameters
+        The symbols of parameters.
+    loops
+        The dependent coordinates as functions of the independent ones.
+    rows
+        The equations' rows, perhaps rewritten.
+    """
+    free = loops.independent
+    moved = _Moved(equations, loops)
+    q, u = equations.coordinates, equations.speeds
+    places = loops.places
+    speeds = {u[d]: moved.speed(d) for d in moved.order}
+    found = _accelerations(equations, _with_single_angles(list(equations.rows if rows is None else rows)), moved)
+    found, speeds = _in_terms_of_independent(found, speeds, places)
+    inputs = (
+        InputGroup("t", (equations.time,)),
+        InputGroup("q", tuple(q[i] for i in free)),
+        InputGroup("u", tuple(u[i] for i in free)),
+    )
+    known = tuple(parameters) + loops.branches
+    states = (
+        OutputGroup("coordinates", tuple(places.get(one, one) for one in q)),
+        OutputGroup("speeds", tuple(speeds.get(one, one) for one in u)),
+    )
+    counted = loops.counted
+    beside = [one.beside for one in counted if one.beside is not None]
+    looked_at = [*loops.margins, *(one.ahead for one in counted if one.ahead is not None), *beside]
+    looked_at = substitute(looked_at, places) if places and looked_at else looked_at
+    cut = len(looked_at) - len(beside)
+    watched = OutputGroup("ahead", tuple(looked_at[:cut])), OutputGroup("beside", tuple(looked_at[cut:]))
+    title = f"{name} (closed form)"
+    accelerations = Program(f"{title} accelerations", inputs, known, (OutputGroup("accelerations", tuple(found)),))
+    return ClosedForm(
+        loops,
+        AccelerationProgram(accelerations, "mass matrix"),
+        Program(f"{title} states", inputs, known, states),
+        {**places, **speeds},
+        Program(f"{title} dead centres", inputs, known, watched),
+    )
+
+
+def _in_terms_of_independent(
+    found: Sequence[Expression], speeds: Mapping[Expression, Expression], places: Mapping[Expression, Expression]
+) -> tuple[list[Expression], dict[Expression, Expression]]:
+    """Replace dependent speeds, and then dependent coordinates with their sines and cosines."""
+    if not speeds:
+        return list(found), {}
+    made = substitute([*substitute(list(found), speeds), *speeds.values()], places)
+    return made[: len(found)], dict(zip(speeds, made[len(found) :], strict=True))
+
+
+def _with_single_angles(rows: list[Expression]) -> list[Expression]:
+    """Return rows with sines and cosines of sums of coordinates as products of those of one coordinate."""
+    waves = [node for node in live(rows) if node.operation in ("sin", "cos") and not node.is_parametric]
+    parts = {node: _parts(node.arguments[0]) for node in waves}
+    split = {node: found for node, found in parts.items() if found is not None}
+    return substitute(rows, {n: found[n.operation == "sin"] for n, found in split.items()}) if split else rows
+
+
+def _parts(angle: Expression) -> tuple[Expression, Expression] | None:
+    """Return cosine and sine of a sum of coordinates by those of one; None for one coordinate, and other angles."""
+    if angle.operation == "neg":
+        found = _wave(angle.arguments[0])
+        return None if found is None else (found[0], -found[1])
+    if angle.operation not in ("add", "sub"):
+        return None
+    one, other = (_wave(argument) for argument in angle.arguments)
+    if one is None or other is None:
+        return None
+    (c, s), (d, e) = one, other
+    e = e if angle.operation == "add" else -e
+    return c * d - s * e, s * d + c * e
+
+
+def _wave(angle: Expression) -> tuple[Expression, Expression] | None:
+    return (cos(angle), sin(angle)) if angle.is_symbol else _parts(angle)
+
+
+class _Moved:
+    """How dependent coordinates move with independent ones: ``u_d = W u_i + w``, ``a_d = W a_i + c``."""
+
+    def __init__(self, equations: Equations, loops: ClosedLoops) -> None:
+        self.graph, self.free = equations.graph, loops.independent
+        self.speeds = equations.speeds
+        one = self.graph.one
+        self.weights: Matrix = {(i, k): one for k, i in enumerate(self.free)}
+        self.bias: dict[int, Expression] = {}
+        self.shift: dict[int, Expression] = {}
+        self.order: list[int] = []
+        used = sorted({k for group in loops.groups for k in group.constraints})
+        chosen = [equations.constraints[k] for k in used]
+        found = jacobian([one.rate for one in chosen], list(equations.speeds))
+        self.slopes = {
+            (used[r], c): entry for r, c, entry in zip(found.rows, found.columns, found.entries, strict=True)
+        }
+        rates = substitute([one.rate for one in chosen], dict.fromkeys(equations.speeds, 0.0))
+        seconds = substitute([one.second for one in chosen], dict.fromkeys(equations.accelerations, 0.0))
+        self.explicit = dict(zip(used, rates, strict=True))
+        self.gamma = dict(zip(used, seconds, strict=True))
+        for group in loops.groups:
+            self._add(group)
+
+    def _add(self, group: Group) -> None:
+        """Solve the rates of a group for the speeds of its unknowns."""
+        unknowns = group.unknowns
+        matrix = [[self._slope(group, row, c) for c in unknowns] for row in group.along]
+        for k in range(len(self.free)):
+            right = [-self._along(group, row, k) for row in group.along]
+            for unknown, weight in zip(unknowns, _cramer(matrix, right), strict=True):
+                if not weight.is_zero:
+                    self.weights[unknown, k] = weight
+        for target, start in ((self.shift, self.explicit), (self.bias, self.gamma)):
+            right = [-self._rest(group, row, start, target) for row in group.along]
+            found = _cramer(matrix, right)
+            target.update((c, one) for c, one in zip(unknowns, found, strict=True) if not one.is_zero)
+        self.order += unknowns
+
+    def _slope(self, group: Group, row: Sequence[Expression], column: int) -> Expression:
+        total = self.graph.zero
+        for factor, k in zip(row, group.constraints, strict=True):
+            if (k, column) in self.slopes:
+                total = total + factor * self.slopes[k, column]
+        return total
+
+    def _along(self, group: Group, row: Sequence[Expression], k: int) -> Expression:
+        """Return the rate of an equation for a unit of an independent speed, with what is known to follow it."""
+        total = self.graph.zero
+        for c in (*self.free, *self.order):
+            if (c, k) in self.weights:
+                total = total + self._slope(group, row, c) * self.weights[c, k]
+        return total
+
+    def _rest(
+        self,
+        group: Group,
+        row: Sequence[Expression],
+        start: Mapping[int, Expression],
+        known: Mapping[int, Expression],
+    ) -> Expression:
+        """Return what an equation has besides: of its own, and by what was found before."""
+        total = self.graph.zero
+        for factor, k in zip(row, group.constraints, strict=True):
+            total = total + factor * start[k]
+        for c in self.order:
+            if c in known:
+                total = total + self._slope(group, row, c) * known[c]
+        return total
+
+    def speed(self, d: int) -> Expression:
+        """Return a dependent speed, in terms of all coordinates and the independent speeds."""
+        total = self.shift.get(d, self.graph.zero)
+        for k, i in enumerate(self.free):
+            if (d, k) in self.weights:
+                total = total + self.weights[d, k] * self.speeds[i]
+        return total
+
+
+def _cramer(matrix: Sequence[Sequence[Expression]], right: Sequence[Expression]) -> list[Expression]:
+    """Solve one or two equations."""
+    if all(one.is_zero for one in right):
+        return list(right)
+    if len(right) == 1:
+        return [right[0] / matrix[0][0]]
+    (a, b), (c, d) = matrix
+    over = 1.0 / (a * d - b * c)
+    return [(d * right[0] - b * right[1]) * over, (a * right[1] - c * right[0]) * over]
+
+
+def _accelerations(equations: Equations, rows: list[Expression], moved: _Moved) -> list[Expression]:
+    """Return the accelerations of the independent coordinates from ``W^T (M (W a + c) + bias) = 0``."""
+    graph, n = equations.graph, len(moved.free)
+    if not n:
+        return []
+    found = jacobian(rows, list(equations.accelerations))
+    right = substitute(rows, dict.fromkeys(equations.accelerations, 0.0))
+    pushed: Matrix = {}
+    for r, c, entry in zip(found.rows, found.columns, found.entries, strict=True):
+        for k in range(n):
+            if (c, k) in moved.weights:
+                pushed[r, k] = pushed.get((r, k), graph.zero) + entry * moved.weights[c, k]
+        if c in moved.bias:
+            right[r] = right[r] + entry * moved.bias[c]
+    mass = [[graph.zero] * n for _ in range(n)]
+    force = [graph.zero] * n
+    for (r, j), weight in moved.weights.items():
+        force[j] = force[j] - weight * right[r]
+        for k in range(j, n):
+            if (r, k) in pushed:
+                mass[j][k] = mass[j][k] + weight * pushed[r, k]
+    for j in range(n):
+        for k in range(j):
+            mass[j][k] = mass[k][j]
+    return [graph.convert(one) for one in solve(mass, force)]

@@ -1,0 +1,310 @@
+"""Runs of mechanisms whose loops are solved by formulas: only the independent coordinates are integrated.
+
+Which coordinates these are is a choice, as in the numeric loop (`atwood.simulation.dynamics.partitioning`). Of all that
+formulas can do with, one is preferred that meets no dead centre in a whole turn; else the one that is farthest from
+any. Where a dead centre comes near, others take over; where none are better, the position is singular or nearly so, and
+the rest is left to the numeric loop.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
+from functools import cached_property
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.clock import check_time
+from atwood.codegen import BoundKernel
+from atwood.errors import KernelEvaluationError
+from atwood.expr import Expression, Program
+from atwood.forms.assembly import Assembly
+from atwood.forms.assur_groups import Loops, Place
+from atwood.forms.closed_loops import ClosedForm, closed_form
+from atwood.forms.kept import Key
+from atwood.forms.program import rates_are_speeds
+from atwood.late import dataclass
+from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.projection import misses_of
+
+__all__ = ["Solved", "can_be_solved", "levels", "on_branch", "solve_at"]
+
+_NEAR = 0.1
+"""Nearer to a dead centre of every choice, as the square of a sine, the numeric loop takes over.
+
+That is 18 degrees before links are in line: whoever looks out for singular positions has to see the motion from well
+before one on.
+"""
+
+_START = 0.15
+"""Formulas begin only where so much is left, so that they do not end at once."""
+
+_LEAVE = 0.25
+"""Where this is left of the distance from a dead centre, another choice is looked for."""
+
+_CLEAR = 0.003
+"""A choice of which so much is left in a whole turn meets no dead centre."""
+
+_MOST = 60
+"""More choices of independent coordinates are not tried."""
+
+_TURN = 72
+"""In so many positions of a whole turn it is seen whether there is a dead centre."""
+
+_AGREES = 1e-7
+"""Formulas that miss a position by more, in units of the scene's sizes, are not those of its branch."""
+
+_ASIDE = 0.05
+"""By so many of their sizes independent coordinates are moved to see whether formulas are right near by, too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A mechanism with loops in terms of independent coordinates, on the branch of a position.
+
+    Attributes
+    ----------
+    form
+        Its programs.
+    assembly
+        The scene in its mode.
+    branches
+        Values of the branches.
+    margin
+        How far the position is from a dead centre, as the square of a sine.
+    least
+        What is left of that in a whole turn of the independent coordinate; 0 where it meets a dead centre, or does not
+        turn.
+    """
+
+    form: ClosedForm
+    assembly: Assembly
+    branches: Mapping[Expression, float]
+    margin: float = 0.0
+    least: float = 0.0
+    _kernels: dict[tuple[Program, bool], BoundKernel] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def independent(self) -> list[int]:
+        """Numbers of the independent coordinates."""
+        return list(self.form.loops.independent)
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Values of all parameters of its programs."""
+        return np.array([*self.assembly.parameter_values, *(self.branches[one] for one in self.form.loops.branches)])
+
+    def kernel(self, program: Program, vectorized: bool = False) -> BoundKernel:
+        """Return one of its programs with these values."""
+        key = (program, vectorized)
+        if key not in self._kernels:
+            self._kernels[key] = self.assembly.compiled(program, vectorized).bind(self.values)
+        return self._kernels[key]
+
+    def reduced(self, y: FloatArray) -> FloatArray:
+        """Return the state of the independent coordinates from that of all."""
+        free, n = self.independent, len(self.assembly.reduced.coordinates)
+        return np.concatenate([y[free], y[[n + i for i in free]]])
+
+    def states(self, t: FloatArray, y: FloatArray) -> FloatArray:
+        """Return all coordinates and speeds from the independent ones, shape (samples, unknowns)."""
+        n = len(self.form.loops.independent)
+        if not len(t):
+            return np.zeros((0, 2 * len(self.assembly.reduced.coordinates)))
+        q, u = self.kernel(self.form.states, vectorized=True)(t[None, :], y[:, :n].T, y[:, n:].T)
+        return np.concatenate([q, u]).T
+
+    def state(self, t: float, y: FloatArray) -> FloatArray:
+        """Return the same of one state."""
+        n = len(self.form.loops.independent)
+        return np.concatenate(self.kernel(self.form.states)([t], y[:n], y[n:]))
+
+    def flipped(self, number: int, t: float, y: FloatArray) -> Solved:
+        """Return the same after one of the counted directions has turned away by a quarter, or come back."""
+        n, one = len(self.form.loops.independent), self.form.loops.counted[number]
+        assert one.flip is not None
+        assert one.offset is not None
+        beside = self.kernel(self.form.watched)([t], y[:n], y[n:])[1][number]
+        flip = self.branches[one.flip]
+        half = math.copysign(math.pi, flip * beside)
+        return replace(self, branches={**self.branches, one.flip: -flip, one.offset: self.branches[one.offset] + half})
+
+
+class _Choices:
+    """What formulas can do for a mechanism with one choice of independent coordinates or another."""
+
+    def __init__(self, plan: Plan, t: float, q: FloatArray) -> None:
+        assembly = plan.assembly
+        self.equations = assembly.reduced
+        self.loops = Loops(self.equations, _place(plan, t, q))
+        count = len(self.equations.speeds) - plan.finding.rank
+        every = itertools.combinations(range(len(self.equations.coordinates)), count)
+        fitting = (one for one in itertools.islice(every, 20 * _MOST) if self.loops.can_be_solved(one))
+        self.every = tuple(itertools.islice(fitting, _MOST))
+        self._forms: dict[tuple[int, ...], ClosedForm | None] = {}
+
+    def form(self, assembly: Assembly, independent: tuple[int, ...]) -> ClosedForm | None:
+        """Return the programs for one choice; None where the loops are not of such a form."""
+        if independent not in self._forms:
+            with assembly.shared.lock:
+                found = self.loops.solve(independent)
+                name = assembly.flat.name
+                self._forms[independent] = (
+                    None
+                    if found is None
+                    else closed_form(name, self.equations, assembly.parameters, found, assembly.rows)
+                )
+        return self._forms[independent]
+
+
+_CHOICES: Key[_Choices] = Key("choices of independent coordinates")
+
+
+def _place(plan: Plan, t: float, q: FloatArray) -> Place:
+    equations, assembly = plan.assembly.reduced, plan.assembly
+    here = {equations.time: t, **dict(zip(equations.coordinates, map(float, q), strict=True))}
+    values = dict(zip(assembly.parameters, map(float, assembly.parameter_values), strict=True))
+    return Place(values, here, plan.scales.length)
+
+
+def can_be_solved(plan: Plan) -> bool:
+    """Return whether a scene is one of which loops are solved by formulas, if their form is right.
+
+    Its constraints hold positions, its rates are speeds, and no law reads a multiplier.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    """
+    equations = plan.assembly.reduced
+    return bool(
+        plan.assembly.form == "reduced"
+        and equations.constraints
+        and plan.finding.kept
+        and len(equations.speeds) > plan.finding.rank
+        and not equations.read
+        and not equations.states
+        and not equations.orientation_coordinates
+        and rates_are_speeds(equations)
+        and all(one.value is not None for one in equations.constraints)
+    )
+
+
+def solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
+    """Return the loops of a mechanism solved by formulas on the branch of a position, with the best choice there.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    t, q, u
+        An admissible state.
+
+    Returns
+    -------
+    Solved or None
+        None where there are no formulas, or every choice is near a dead centre.
+    """
+    if not can_be_solved(plan):
+        return None
+    about = t, q.tobytes(), u.tobytes(), plan.finding.kept, plan.scales.length
+    found = plan.assembly.kept.get(_SOLVED, lambda: _Found(_solve_at(plan, t, q, u)), *about)
+    return found.solved
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    solved: Solved | None
+
+
+_SOLVED: Key[_Found] = Key("solved loops")
+
+
+def _solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
+    assembly = plan.assembly
+    choices = assembly.shared.get(_CHOICES, lambda: _Choices(plan, t, q), plan.finding.rank)
+    best: Solved | None = None
+    for independent in choices.every:
+        check_time()
+        form = choices.form(assembly, independent)
+        found = None if form is None else on_branch(plan, form, t, q, u)
+        if found is None:
+            continue
+        if best is None or found.margin > best.margin:
+            best = found
+        if found.least:
+            return found
+    return best
+
+
+def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
+    """Return a form on the branch of a position; None where it does not lead there, or a dead centre is near.
+
+    Parameters
+    ----------
+    plan, form
+        The scene in its mode, and its loops solved with one choice of independent coordinates.
+    t, q, u
+        An admissible state.
+    """
+    branches = form.loops.branch_values(_place(plan, t, q))
+    if branches is None:
+        return None
+    solved = Solved(form, plan.assembly, branches)
+    y = solved.reduced(np.concatenate([q, u]))
+    try:
+        margin = min(_margins(solved, t, y), default=1.0)
+        made = solved.state(t, y)
+    except KernelEvaluationError:
+        return None
+    misses = np.abs(made[: len(q)] - q) / plan.coordinate_sizes
+    if not (np.all(misses <= _AGREES) and _holds(plan, solved, t, y)):
+        return None
+    least = _least(solved, t, y)
+    return replace(solved, margin=margin, least=least) if margin > _START or least else None
+
+
+def _margins(solved: Solved, t: float, y: FloatArray) -> Sequence[float]:
+    n, form = len(solved.form.loops.independent), solved.form
+    found: Sequence[float] = solved.kernel(form.watched)([t], y[:n], y[n:])[0][: len(form.loops.margins)]
+    return found
+
+
+def _holds(plan: Plan, solved: Solved, t: float, y: FloatArray) -> bool:
+    """Return whether all constraints hold wherever formulas lead to near by, with these parameters."""
+    n = len(y) // 2
+    moved = np.tile(y, (2 * n, 1))
+    sizes = plan.coordinate_sizes[solved.independent]
+    for i in range(n):
+        moved[2 * i, i] += _ASIDE * sizes[i]
+        moved[2 * i + 1, i] -= _ASIDE * sizes[i]
+    times = np.full(2 * n, t)
+    with np.errstate(all="ignore"):
+        states = solved.states(times, moved)
+    states = states[np.isfinite(states).all(axis=1)].T
+    misses = misses_of(plan, times[: states.shape[1]], *np.split(states, 2)) if states.size else np.zeros((2, 1))
+    return bool(np.all(misses[0] <= _AGREES) and np.all(misses[1] * plan.scales.time <= _AGREES))
+
+
+def _least(solved: Solved, t: float, y: FloatArray) -> float:
+    """Return what is left of the distance from a dead centre in a whole turn of the only independent coordinate."""
+    loops = solved.form.loops
+    names = solved.assembly.reduced.names
+    if not loops.margins or len(loops.independent) > 1 or names[loops.independent[0]].unit != "rad":
+        return 0.0
+    angles = y[0] + np.linspace(0.0, math.tau, _TURN, endpoint=False)
+    with np.errstate(all="ignore"):
+        found = solved.kernel(solved.form.watched, vectorized=True)([[t]], angles[None, :], np.array([[y[1]]]))[0]
+    least = float(np.min(found[: len(loops.margins)]))  # not a number where the loop does not close
+    return least if least > _CLEAR else 0.0
+
+
+def levels(solved: Solved) -> tuple[float, float]:
+    """Return at which distances from dead centres another choice is looked for, and at which none will do."""
+    if solved.least:
+        return 0.5 * solved.least, 0.25 * solved.least
+    return max(_NEAR, min(_LEAVE, 0.5 * solved.margin)), _NEAR

@@ -1,0 +1,266 @@
+"""Explicit methods for mechanisms whose loops are solved by formulas: what is integrated and what is handed out.
+
+A session has the independent coordinates for its unknowns; whoever uses it gives and gets all coordinates and speeds of
+the reduced form. Dead centres and quarter turns of counted directions are event functions beside those of the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import UsageError
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, substitute
+from atwood.forms.kept import Key
+from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
+from atwood.integrators.explicit_session import ExplicitSession, Leave
+from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status, StepResult
+from atwood.simulation.problem.closed_loops import Solved, levels, on_branch, solve_at
+from atwood.simulation.problem.explicit_scene import explicit_problem_of
+
+if TYPE_CHECKING:
+    from atwood.codegen.sundials.events import EventCode
+    from atwood.simulation.run.session import SolverRequest
+
+__all__ = ["ClosedLoopSession"]
+
+_BETTER = 2.0
+"""Another choice takes over where it is so many times as far from a dead centre."""
+
+
+class ClosedLoopSession:
+    """A run in progress; see `~atwood.integrators.explicit_session.ExplicitSession`.
+
+    Parameters
+    ----------
+    request
+        What is to be solved.
+    solver
+        ``"explicit"`` or ``"taylor"``.
+    t, y
+        Start values of all coordinates and speeds.
+    solved
+        The loops on the branch of the start.
+    leave
+        See `atwood.integrators.explicit_session.open_explicit`.
+    give_up
+        Called with the time where a dead centre of every choice comes near; the session then ends with `Status.STIFF`.
+    """
+
+    def __init__(
+        self,
+        request: SolverRequest,
+        solver: str,
+        t: float,
+        y: FloatArray,
+        solved: Solved,
+        leave: Leave | None,
+        give_up: Callable[[float], None] | None,
+    ) -> None:
+        self._request, self._solver, self._leave, self._give_up = request, solver, leave, give_up
+        self._before = Statistics(error_test_failures=0, convergence_failures=0)
+        self._solved = solved
+        self._count = len(request.probe.directions)
+        self._events: Program | None = None
+        self._session = self._open(t, solved.reduced(y))
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the session has cost so far, over all its choices."""
+        return self._before + self._session.statistics
+
+    @property
+    def states(self) -> int:
+        """How many unknowns are integrated at present."""
+        return 2 * len(self._solved.independent)
+
+    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
+        """Go on from another state."""
+        solved = self._at(t, y)
+        if solved is None:
+            raise UsageError("formulas do not lead to this state")
+        self._change(t, y, solved)
+
+    def advance(self, t_out: float) -> StepResult:
+        """Go on to exactly a time, or stop earlier at an event, a limit or a failure."""
+        while True:
+            found = self._taken(self._session.advance(t_out))
+            if found is not None:
+                return found
+
+    def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, StepResult]:
+        """Go on through many times at once, as far as nothing stops it."""
+        parts: list[FloatArray] = []
+        done = 0
+        while True:
+            y, _, result = self._session.sample(times[done:])
+            parts.append(self._solved.states(times[done : done + len(y)], y))
+            done += len(y)
+            found = self._taken(result)
+            if found is not None:
+                values = np.concatenate(parts)
+                return values, np.zeros_like(values), found
+
+    # -- choices --------------------------------------------------------------------------------------------------
+
+    def _taken(self, result: StepResult) -> StepResult | None:
+        """Return what is handed out; None where only a choice or a count has changed and the run goes on."""
+        y = self._solved.state(result.t, result.y)
+        full = replace(result, y=y, yp=self._rates(result, y), events=tuple(result.events[: self._count]))
+        if result.status is not Status.EVENT:
+            return full
+        own = [i for i, fired in enumerate(result.events[self._count :]) if fired]
+        margins = 2 * len(self._solved.form.loops.margins)
+        dead = any(i < margins for i in own)
+        for i in own:
+            if i >= margins:
+                self._solved = self._solved.flipped(i - margins, result.t, result.y)
+        if any(full.events):
+            return full
+        if dead:
+            solved = self._better(result, y)
+            if solved is None:
+                if self._give_up is not None:
+                    self._give_up(result.t)
+                return replace(full, status=Status.STIFF, message="a dead centre is near")
+            self._change(result.t, y, solved)
+        elif own and self._reads_counts():
+            self._change(result.t, y, self._solved)
+        return None
+
+    def _better(self, result: StepResult, y: FloatArray) -> Solved | None:
+        """Return the best choice from here on: the present one unless another is clearly farther from a dead centre."""
+        found, n = self._at(result.t, y), len(y) // 2
+        if found is None or found.form is self._solved.form:
+            return found
+        here = on_branch(self._request.plan, self._solved.form, result.t, y[:n], y[n:])
+        return found if here is None or found.margin > _BETTER * here.margin else here
+
+    def _at(self, t: float, y: FloatArray) -> Solved | None:
+        n = len(y) // 2
+        return solve_at(self._request.plan, t, y[:n], y[n:])
+
+    def _change(self, t: float, y: FloatArray, solved: Solved) -> None:
+        """Go on from a state with another choice, or on another branch."""
+        self._before, self._solved = self.statistics, solved
+        self._before = replace(self._before, reinitializations=self._before.reinitializations + 1)
+        self._session = self._open(t, solved.reduced(y))
+
+    def _rates(self, result: StepResult, y: FloatArray) -> FloatArray:
+        n, yp = len(y) // 2, np.zeros_like(y)
+        yp[:n] = y[n:]
+        return yp
+
+    def _reads_counts(self) -> bool:
+        """Return whether what is integrated or looked for reads an angle whose half turns are counted."""
+        found = self._solved.form
+        symbols = [symbol for one in found.loops.counted for symbol in one.symbols]
+        read = [*found.accelerations.program.results, *(() if self._events is None else self._events.results)]
+        return any(depends_on(one, symbols) for one in read)
+
+    # -- sessions -------------------------------------------------------------------------------------------------
+
+    def _open(self, t: float, y: FloatArray) -> ExplicitSession:
+        request, solved, probe = self._request, self._solved, self._request.probe
+        found, assembly = solved.form.accelerations, solved.assembly
+        margins, counted = len(solved.form.loops.margins), len(solved.form.loops.counted)
+        low, near = levels(solved)
+        shifts = np.repeat([-low, -near, 0.0], [margins, margins, counted])
+        directions = (*probe.directions, *(-1 for _ in range(2 * margins)), *(0 for _ in range(counted)))
+        problem = explicit_problem_of(
+            assembly, found, solved.values, self._function(solved, shifts) if directions else None, directions
+        )
+        # Choices change at the end of a step, and not within it, where a state is known less well.
+        first = len(probe.directions)
+        ends = (*range(first, first + margins), *range(first + 2 * margins, len(directions)))
+        problem = replace(problem, event_rough=(*probe.rough, *ends))
+        self._events = None
+        if directions and problem.compiled is not None:
+            problem = self._with_compiled(problem, solved, shifts)
+        settings, budget = self._settings(t, solved), self._budget()
+        if self._solver == "taylor":
+            from atwood.simulation.problem.taylor_scene import open_taylor, taylor_problem
+
+            series = taylor_problem(assembly, request.end, bool(directions), found, solved.values)
+            return open_taylor(problem, series, settings, t, y, budget)
+        from atwood.integrators.explicit_session import open_explicit
+
+        given = self._leave
+
+        def leave(t: float, y: FloatArray) -> bool:
+            return given is not None and given(t, self._solved.state(t, y))
+
+        return open_explicit(problem, settings, t, y, budget, leave=None if given is None else leave, end=request.end)
+
+    def _settings(self, t: float, solved: Solved) -> SolverOptions:
+        settings = self._request.settings(t, LOOSEST)
+        absolute = np.asarray(settings.absolute_tolerances)
+        return replace(settings, absolute_tolerances=solved.reduced(absolute))
+
+    def _budget(self) -> Budget:
+        budget = self._request.budget
+        if budget.max_steps is None:
+            return budget
+        return replace(budget, max_steps=max(0, budget.max_steps - self._before.steps))
+
+    def _function(self, solved: Solved, shifts: FloatArray) -> Callable[[float, FloatArray, FloatArray], FloatArray]:
+        """Return all event functions, in Python."""
+        own = self._request.probe.function()
+        n, kernel = len(solved.independent), solved.kernel(solved.form.watched)
+        margins = len(solved.form.loops.margins)
+
+        def values(t: float, y: FloatArray, yp: FloatArray) -> FloatArray:
+            found = kernel([t], y[:n], y[n:])[0]
+            watched = np.array([*found[:margins], *found]) + shifts
+            if own is None:
+                return watched
+            full = solved.state(t, y)
+            return np.concatenate([own(t, full, np.zeros_like(full)), watched])
+
+        return values
+
+    def _with_compiled(self, problem: ExplicitProblem, solved: Solved, shifts: FloatArray) -> ExplicitProblem:
+        """Return a problem whose event functions are machine code too, if they can be."""
+        probe, kept, key = self._request.probe, self._request.plan.finding.kept, self._request.probe.key
+        shared = solved.assembly.shared
+        made = shared.get(_CODE, lambda: _event_code(self._request, solved), solved.form, kept, key)
+        if made is None:
+            return problem
+        self._events, code = made
+        data = code.bind(solved.values, np.concatenate([probe.shift, shifts]))
+        compiled = CompiledEvents(data.explicit, data.address, data.count, data.restart, data)
+        return replace(problem, events=data.function(), compiled_events=lambda: compiled)
+
+
+_CODE: Key[tuple[Program, EventCode] | None] = Key("event functions with dead centres")
+
+
+def _event_code(request: SolverRequest, solved: Solved) -> tuple[Program, EventCode] | None:
+    """Return the event functions of a scene, then dead centres and counted directions, as machine code."""
+    form, assembly = solved.form, solved.assembly
+    watched = form.watched
+    graph = assembly.reduced.graph
+    own: list[Expression] = []
+    shift: tuple[Expression, ...] = ()
+    if request.probe.directions:
+        found = request.probe.program()
+        if found is None:
+            return None
+        own, shift = substitute(list(found.results), form.known), found.inputs[3].symbols
+    ahead = watched.outputs[0].expressions
+    ahead = (*ahead[: len(form.loops.margins)], *ahead)  # margins have two levels
+    more = tuple(graph.symbol(f"event shift of loops {i}") for i in range(len(ahead)))
+    values = (*own, *(v + s for v, s in zip(ahead, more, strict=True)))
+    groups = (*watched.inputs, InputGroup("shift", (*shift, *more)))
+    program = Program(f"{watched.name} and events", groups, watched.parameters, (OutputGroup("events", values),))
+    if any(node.operation == "external" for node in program.nodes):
+        return None
+    try:
+        from atwood.codegen.sundials.events import compile_events
+    except ImportError:  # no compiler
+        return None
+    return program, compile_events(program, for_ida=False)
