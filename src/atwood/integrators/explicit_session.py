@@ -93,7 +93,11 @@ def open_explicit(
 
 @runtime_checkable
 class SamplingSession(Session, Protocol):
-    """A session that goes through many output times at once."""
+    """A session that goes through many output times at once, and finds rates by itself."""
+
+    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
+        """Go on from another state; its rates follow from it."""
+        ...
 
     def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, StepResult]:
         """Go on as far as nothing stops it; return values and rates at the times that were reached, and how it ended.
