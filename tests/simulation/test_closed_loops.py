@@ -15,7 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.closed_loops import Solved, solve_at
-from atwood.simulation.problem.problem import make_plan
+from atwood.simulation.problem.preparation import make_plan
 from atwood_library import Ground, Link, Pivot
 from atwood_library.scenes import AndrewsSqueezer, Bricard, FourBar, SliderCrank, Strandbeest
 
