@@ -22,9 +22,10 @@ from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError
 from atwood.expr import Expression, Program
 from atwood.forms.assembly import Assembly
-from atwood.forms.assur_groups import Loops, Place
-from atwood.forms.closed_loops import ClosedForm, closed_form
 from atwood.forms.kept import Key
+from atwood.forms.loops.assur_groups import Loops
+from atwood.forms.loops.branches import Place
+from atwood.forms.loops.closed_form import ClosedForm, closed_form
 from atwood.forms.program import rates_are_speeds
 from atwood.late import dataclass
 from atwood.simulation.problem.problem import Plan

@@ -1,7 +1,7 @@
 """The reduced form of a mechanism whose loops are solved by formulas: accelerations of the independent coordinates.
 
-Positions follow from the formulas of `atwood.forms.assur_groups`, with sines and cosines of dependent angles as they
-come out there, so that no angle is made of them and taken apart again. Speeds and accelerations follow from the rates
+Positions follow from the formulas of `atwood.forms.loops.assur_groups`, with sines and cosines of dependent angles as
+they come out there, so that no angle is made of them and taken apart again. Speeds and accelerations follow from the rates
 of the constraints, group by group: ``u_d = W u_i + w`` and ``a_d = W a_i + c``. The balance of forces is projected with
 the same W (A. A. Shabana, Dynamics of Multibody Systems, 4th edition, section 5.6, embedding technique).
 """
@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, cos, jacobian, live, sin, solve, substitute
 from atwood.forms.accelerations import AccelerationProgram
-from atwood.forms.assur_groups import ClosedLoops, Group
+from atwood.forms.loops.branches import ClosedLoops, Group
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 

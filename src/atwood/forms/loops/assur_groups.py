@@ -20,7 +20,6 @@ constraint at other places: what is left must be rounding (`atwood.mechanics.con
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -28,11 +27,11 @@ import numpy as np
 
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, atan2, cos, depends_on, evaluate, jacobian, jvp, sin, sqrt, substitute
-from atwood.late import dataclass
+from atwood.forms.loops.branches import ClosedLoops, Group, Heading, Place, is_ahead, spectrum
 from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["ClosedLoops", "Group", "Heading", "Place", "solve_loops"]
+__all__ = ["Loops"]
 
 Vector = Sequence[Expression]
 
@@ -42,196 +41,8 @@ _LEAST = 1e-9
 _MOST_ANGLES = 4
 """Directions that depend on more angles are not looked into."""
 
-_AHEAD = 1.0 + 1e-6
-"""One term of a direction must be so many times as large as all others together."""
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """Where formulas are compared with constraints, and where a run begins.
-
-    Attributes
-    ----------
-    parameters
-        Their values.
-    here
-        Time and coordinates of an admissible position.
-    length
-        The extent of the scene, m.
-    """
-
-    parameters: Mapping[Expression, float]
-    here: Mapping[Expression, float]
-    length: float
-
-
-@dataclass(frozen=True, eq=False)
-class Heading:
-    """A direction ``(p, q)``, from which an angle is counted so that it has no jumps.
-
-    Where one can tell that it never turns away by a quarter from a sum of known angles and a phase, that is what it is
-    counted from. Else it is counted from a phase alone, ahead of it or behind it, and whenever it turns away by a
-    quarter, which is an event, from the other side.
-
-    Attributes
-    ----------
-    phase
-        The symbol of the phase.
-    components
-        Both components.
-    angles, orders
-        The angles that they depend on, and how often each is counted.
-    flip, offset
-        Symbols of the side, 1 or -1, and of the half turns since the start; None where none are counted.
-    ahead, beside
-        Then the components along the phase and across it.
-    """
-
-    phase: Expression
-    components: tuple[Expression, Expression]
-    angles: tuple[Expression, ...] = ()
-    orders: tuple[int, ...] = ()
-    flip: Expression | None = None
-    offset: Expression | None = None
-    ahead: Expression | None = None
-    beside: Expression | None = None
-
-    @property
-    def symbols(self) -> tuple[Expression, ...]:
-        """Its symbols."""
-        return tuple(one for one in (self.phase, self.flip, self.offset) if one is not None)
-
-    def values(self, place: Place) -> dict[Expression, float] | None:
-        """Return the values of its symbols at a position; None where the direction can turn away unseen."""
-        if self.flip is None or self.offset is None:
-            phase = self._phase(place)
-            return None if phase is None else {self.phase: phase}
-        p, q = evaluate(self.components, {**place.parameters, **place.here})
-        return {self.phase: math.atan2(q, p), self.flip: 1.0, self.offset: 0.0}
-
-    def _phase(self, place: Place) -> float | None:
-        found = _spectrum(self.components, self.angles, place)
-        best = None if found is None else found[self.orders]
-        if found is None or best is None or not _is_ahead(found, self.orders):
-            return None
-        return math.atan2(best.imag, best.real)
-
-
-@dataclass(frozen=True, eq=False)
-class Group:
-    """One constraint with one unknown coordinate, or the constraints of a joint with two.
-
-    Attributes
-    ----------
-    unknowns
-        Numbers of the coordinates that it gives.
-    constraints
-        Numbers of its constraints.
-    along
-        For each equation for the speeds of the unknowns, by what to multiply the constraints.
-    places
-        Each unknown, and its sine and cosine if it is an angle, in terms of what was known before.
-    margins
-        The square of the sine of the angle between two links or a link and a slide; 0 at a dead centre.
-    signs
-        Symbols of the signs of roots, and what has the sign in terms of all coordinates.
-    turns
-        Symbols of whole turns, and what they are.
-    headings
-        Directions that unknown angles are counted from.
-    """
-
-    unknowns: tuple[int, ...]
-    constraints: tuple[int, ...]
-    along: tuple[tuple[Expression, ...], ...]
-    places: Mapping[Expression, Expression]
-    margins: tuple[Expression, ...] = ()
-    signs: Mapping[Expression, Expression] | None = None
-    turns: Mapping[Expression, Expression] | None = None
-    headings: tuple[Heading, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class ClosedLoops:
-    """The dependent coordinates of a mechanism as functions of the independent ones.
-
-    Attributes
-    ----------
-    independent
-        Numbers of the independent coordinates.
-    groups
-        What is solved, one after the other.
-    """
-
-    independent: tuple[int, ...]
-    groups: tuple[Group, ...]
-
-    @property
-    def places(self) -> dict[Expression, Expression]:
-        """All dependent coordinates, and their sines and cosines, in terms of independent coordinates and branches."""
-        found: dict[Expression, Expression] = {}
-        for group in self.groups:
-            found.update(zip(group.places, self._known(list(group.places.values()), found), strict=True))
-        return found
-
-    @staticmethod
-    def _known(values: list[Expression], found: Mapping[Expression, Expression]) -> list[Expression]:
-        return substitute(values, found) if found else values
-
-    @property
-    def branches(self) -> tuple[Expression, ...]:
-        """Symbols of the signs, phases and turns that tell positions apart: parameters of every program."""
-        every = ((*(g.signs or ()), *(s for h in g.headings for s in h.symbols), *(g.turns or ())) for g in self.groups)
-        return tuple(itertools.chain.from_iterable(every))
-
-    @property
-    def margins(self) -> list[Expression]:
-        """How far each group is from its dead centres."""
-        return [one for group in self.groups for one in group.margins]
-
-    @property
-    def counted(self) -> list[Heading]:
-        """The directions whose half turns are counted."""
-        return [one for group in self.groups for one in group.headings if one.flip is not None]
-
-    def branch_values(self, place: Place) -> dict[Expression, float] | None:
-        """Return the values of the branches at an admissible position; None where formulas do not lead to it."""
-        known = {**place.parameters, **place.here}
-        found: dict[Expression, float] = {}
-        for group in self.groups:
-            for symbol, value in (group.signs or {}).items():
-                found[symbol] = math.copysign(1.0, evaluate([value], known)[0])
-            for heading in group.headings:
-                values = heading.values(place)
-                if values is None:
-                    return None
-                found.update(values)
-            for symbol, value in (group.turns or {}).items():
-                turns = evaluate([value], {**known, **found})[0] / math.tau
-                if not abs(turns - round(turns)) <= 1e-3:
-                    return None
-                found[symbol] = math.tau * round(turns)
-        return found
-
-
-def solve_loops(equations: Equations, place: Place, independent: Sequence[int]) -> ClosedLoops | None:
-    """Return the dependent coordinates as functions of given independent ones.
-
-    Parameters
-    ----------
-    equations
-        In generalized coordinates, with all constraints on positions.
-    place
-        An admissible position.
-    independent
-        Numbers of the independent coordinates: as many as there are degrees of freedom.
-
-    Returns
-    -------
-    ClosedLoops or None
-        None where groups do not give all others, or the position is too near to a dead centre of theirs.
-    """
-    return Loops(equations, place).solve(independent)
+_PLACES = 2
+"""At so many other places forms are compared with constraints."""
 
 
 class Loops:
@@ -239,8 +50,10 @@ class Loops:
 
     Parameters
     ----------
-    equations, place
-        See `solve_loops`.
+    equations
+        In generalized coordinates, with all constraints on positions.
+    place
+        An admissible position.
     """
 
     def __init__(self, equations: Equations, place: Place) -> None:
@@ -257,7 +70,7 @@ class Loops:
         self._known: dict[tuple[tuple[int, ...], tuple[int, ...]], Group | None] = {}
 
     def solve(self, independent: Sequence[int]) -> ClosedLoops | None:
-        """Return the others as functions of these; see `solve_loops`."""
+        """Return the others as functions of these, as many as there are freedoms; None where groups do not give all."""
         known, groups = set(independent), []
         while len(known) < len(self.q):
             found = next((one for one in self._candidates(known) if one is not None), None)
@@ -441,9 +254,9 @@ class Loops:
         self._number += 1
         phase = self.graph.parameter(f"phase:{name}")
         angles = self._angles_read(p, q)
-        found = None if angles is None or len(angles) > _MOST_ANGLES else _spectrum((p, q), angles, self.place)
+        found = None if angles is None or len(angles) > _MOST_ANGLES else spectrum((p, q), angles, self.place)
         orders = None if found is None else max(found, key=lambda n: abs(found[n]))
-        if found is None or orders is None or angles is None or not _is_ahead(found, orders):
+        if found is None or orders is None or angles is None or not is_ahead(found, orders):
             c, s = cos(phase), sin(phase)
             ahead, beside = p * c + q * s, q * c - p * s
             flip, offset = self.graph.parameter(f"flip:{name}"), self.graph.parameter(f"offset:{name}")
@@ -525,36 +338,3 @@ def _elsewhere(equations: Equations, place: Place) -> list[dict[Expression, floa
             other[one] = math.pi * step if name.unit == "rad" else place.here[one] + place.length * step
         made.append(other)
     return made
-
-
-_PLACES = 2
-
-
-def _spectrum(
-    components: tuple[Expression, Expression], angles: Sequence[Expression], place: Place
-) -> dict[tuple[int, ...], complex] | None:
-    """Return the terms ``z exp(i (n . angles))`` of ``p + i q``; None if it has others than with n of -1, 0 and 1."""
-    size = 4
-    quarter = [0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi]
-    table = np.zeros((size,) * len(angles), dtype=complex)
-    known = {**place.parameters, **place.here}
-    for index in itertools.product(range(size), repeat=len(angles)):
-        p, q = evaluate(components, {**known, **{a: quarter[k] for a, k in zip(angles, index, strict=True)}})
-        table[index] = complex(p, q)
-    table = np.fft.fftn(table) / table.size
-    found = {}
-    largest = float(np.max(np.abs(table)))
-    for index in itertools.product(range(size), repeat=len(angles)):
-        value = complex(table[index])
-        if 2 in index:
-            if abs(value) > 1e-9 * largest:
-                return None
-            continue
-        found[tuple(n - size if n > 2 else n for n in index)] = value
-    return found if largest > 0.0 else None
-
-
-def _is_ahead(found: Mapping[tuple[int, ...], complex], orders: tuple[int, ...]) -> bool:
-    """Return whether one term is larger than all others together."""
-    sizes = {n: abs(z) for n, z in found.items()}
-    return sizes[orders] > _AHEAD * (sum(sizes.values()) - sizes[orders])

@@ -1,0 +1,1 @@
+"""Closed loops that are solved by formulas."""
