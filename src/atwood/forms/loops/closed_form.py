@@ -2,7 +2,7 @@
 
 Positions follow from the formulas of `atwood.forms.loops.assur_groups`, with sines and cosines of dependent angles as
 they come out there, so that no angle is made of them and taken apart again. Speeds and accelerations follow from the
-rates of the constraints, group by group: ``u_d = W u_i + w`` and ``a_d = W a_i + c``. The balance of forces is projected
+rates of the constraints, group by group: ``u_d = W u_i + w``, ``a_d = W a_i + c``. The balance of forces is projected
 with the same W (A. A. Shabana, Dynamics of Multibody Systems, 4th edition, section 5.6, embedding technique).
 """
 
