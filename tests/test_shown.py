@@ -118,6 +118,9 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "equilibria": list(atwood.equilibria(DoublePendulum())),
         "equilibria of a loop": atwood.equilibria(FourBar()),
         "trim": atwood.trim(scene, at=hanging),
+        "start": atwood.solve_start(
+            SimplePendulum(), unknowns=["rod.angular_velocity"], conditions={"bob.velocity.x": 1.0}
+        ),
         "locus": atwood.root_locus(scene, "gravity", [9.0, 10.0, 11.0], at=hanging),
         "branches": atwood.equilibrium_branches(FourBar(), "gravity", (9.0, 10.0)),
         "branch point": atwood.BranchPoint(1.0, dict.fromkeys(angles, 0.0)),

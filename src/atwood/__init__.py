@@ -150,6 +150,7 @@ if TYPE_CHECKING:
         trim,
     )
     from atwood.theory.reduction import ReducedMotion, Routhian, reduced, routhian
+    from atwood.theory.start_solution import StartSolution, solve_start
     from atwood.theory.symmetries import Conserved, ConservedQuantity, Symmetry, conserved
 
     __version__: str
@@ -215,6 +216,7 @@ __all__ += [
     "Routhian",
     "SeparatedMotion",
     "Separation",
+    "StartSolution",
     "Symmetry",
     "TangentFlow",
     "Trim",
@@ -243,6 +245,7 @@ __all__ += [
     "root_locus",
     "routhian",
     "separation",
+    "solve_start",
     "tangent_flow",
     "total_derivative",
     "trim",
@@ -369,6 +372,7 @@ _ROOMS = {
         "RootLocus", "Trim", "equilibria", "equilibrium_branches", "linearize", "normal_modes", "root_locus", "trim",
     ),
     "atwood.theory.reduction": ("ReducedMotion", "Routhian", "reduced", "routhian"),
+    "atwood.theory.start_solution": ("StartSolution", "solve_start"),
     "atwood.theory.symmetries": ("Conserved", "ConservedQuantity", "Symmetry", "conserved"),
 }  # fmt: skip
 _LATER = {name: room for room, names in _ROOMS.items() for name in names}

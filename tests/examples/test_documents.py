@@ -10,11 +10,14 @@ import pytest
 import atwood.solids
 import atwood_library
 
+from ..pages import OVERVIEWS
+
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [
     ROOT / "README.md",
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "docs" / "course").glob("*.md")),
+    *(ROOT / "docs" / "scenes" / f"{name}.md" for name in OVERVIEWS),  # pages of scenes have a test of their own
 ]
 BLOCK = re.compile(r"^```(?:python|\{code-cell\})\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SHOWN = {path.name: BLOCK.findall(path.read_text(encoding="utf-8")) for path in DOCUMENTS}

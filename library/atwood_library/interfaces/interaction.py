@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from atwood import Component, Point, Scalar, Vector, norm, observable, parameter, potential
+from atwood import Component, Outline, Point, Scalar, Vector, norm, observable, parameter, potential
 
 __all__ = ["Interaction"]
 
@@ -32,6 +32,10 @@ class Interaction(Component):
     coulomb_constant: float = parameter(
         COULOMB_CONSTANT, unit="N*m^2/C^2", minimum=0.0, doc="For charges: the constant k, ``1/(4 pi epsilon)``."
     )
+
+    def outline(self) -> Outline:
+        """Return what it looks like: nothing, since it acts through empty space."""
+        return Outline.nothing()
 
     def pairs(self) -> Iterator[tuple[Point, Point, Scalar]]:
         """Yield the pairs, with the product of their charges."""

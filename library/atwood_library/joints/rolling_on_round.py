@@ -5,6 +5,7 @@ from __future__ import annotations
 from atwood import (
     Component,
     Frame,
+    Outline,
     Scalar,
     Vector,
     as_vector,
@@ -42,6 +43,10 @@ class RollingOnRound(Component):
     )
     a: Frame = connector(Frame, "The frame in the middle of what it rolls on.")
     b: Frame = connector(Frame, "The frame of the ball, at its centre.")
+
+    def outline(self) -> Outline:
+        """Return what it looks like: the way of the ball's centre."""
+        return Outline.path("b")
 
     def arm(self) -> Vector:
         """Return the way from the middle, or from the axis, to the centre of the ball, in world axes."""

@@ -18,12 +18,12 @@ __all__ = ["Outline"]
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """The surface of a part, in the axes of its first frame; made by `box`, `revolved`, `mesh` or `path`.
+    """The surface of a part, in the axes of its first frame; made by `box`, `revolved`, `mesh`, `path` or `nothing`.
 
     Attributes
     ----------
     kind
-        ``"box"``, ``"revolved"``, ``"mesh"`` or ``"path"``.
+        ``"box"``, ``"revolved"``, ``"mesh"``, ``"path"`` or ``"nothing"``.
     sides
         Of a box, its sides along x, y and z, m; its centre is the origin.
     profile
@@ -41,7 +41,7 @@ class Outline:
         Arrays of a mesh: m, shape (vertices, 3), and its triangles, counter-clockwise from outside.
     """
 
-    kind: Literal["box", "revolved", "mesh", "path"]
+    kind: Literal["box", "revolved", "mesh", "path", "nothing"]
     sides: tuple[float, float, float] = (0.0, 0.0, 0.0)
     profile: tuple[tuple[float, float], ...] = ()
     axis: int = 2
@@ -94,6 +94,11 @@ class Outline:
     def path(cls, frame: str) -> Outline:
         """Return the way of a connector, by its name, along a run as seen from the first one: what a guide shows."""
         return cls("path", frame=check(NAME, frame, "frame", "Outline.path"))
+
+    @classmethod
+    def nothing(cls) -> Outline:
+        """Return what is not to be seen, such as an attraction through empty space."""
+        return cls("nothing")
 
     @takes_names
     def on(self, frame: str) -> Outline:

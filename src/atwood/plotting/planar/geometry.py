@@ -291,6 +291,8 @@ def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]
     outline = outline_of(local) if mechanism.space.is_planar else None
     if outline is not None:
         node = nodes[outline.frame] if outline.frame else ends[0]
+        if outline.kind == "nothing":
+            return []
         if outline.kind == "path":
             return [Shape(path, "path", (ends[0], node))]
         return [Shape(path, "solid", (node,), surface=outline_mesh(outline, around=120))]

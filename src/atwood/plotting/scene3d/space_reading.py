@@ -45,7 +45,7 @@ def read_scene(result: Result) -> Reading:
         lumps += _lumps(bare, mechanism, path, local, nodes)
         followed = _followed(bare, path, local, nodes)
         joinings += followed
-        ties += [] if followed else _ties(path, local, nodes)
+        ties += [] if followed or _is_unseen(local) else _ties(path, local, nodes)
         options = [joint.law.options for joint in local.joints]
         if any(one.rigid and one.a == "world" for one in options):
             grounds += nodes.values()
@@ -57,6 +57,11 @@ def read_scene(result: Result) -> Reading:
         grounds=tuple(dict.fromkeys(grounds)),
         is_heavy=not is_zero(mechanism.gravity.z),
     )
+
+
+def _is_unseen(local: LocalPart) -> bool:
+    outline = outline_of(local)
+    return outline is not None and outline.kind == "nothing"
 
 
 def _followed(reading: Reading, path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Joining]:
@@ -115,7 +120,7 @@ def _poses(result: Result) -> dict[int, Pose]:
 
 def _lumps(reading: Reading, mechanism: Mechanism, path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Lump]:
     found, outline = [], outline_of(local)
-    if outline is not None and outline.kind == "path":
+    if outline is not None and outline.kind in ("path", "nothing"):
         return []
     for one in local.point_inertias:
         if len(one.points) == 1:

@@ -1,0 +1,163 @@
+"""Pages of scenes in `docs/scenes/`, each with a picture, its parts, and both forms compared, from the scene itself.
+
+``python -m tests.pages write`` writes them anew, ``python -m tests.pages write kepler`` one of them. What stands in the
+overviews (`docs/scenes/fields-and-curves.md` and its neighbours) of a scene is repeated on its page.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import atwood
+from atwood import Model, Scene
+from atwood_library.scenes import SCENES
+
+HERE = Path(__file__).resolve().parents[1] / "docs" / "scenes"
+OVERVIEWS = ("drives-and-control", "fields-and-curves", "mechanisms")
+ROW = re.compile(r"^\| \[`([a-z0-9-]+)`\]\(\1\.md\) \| .* \| .* \| (.*) \|$", re.MULTILINE)
+SETTINGS: dict[str, dict[str, Any]] = {
+    "stewart-platform": {"legs": "controlled"},
+    "bead-on-wire": {"shape": "parabola", "rate": 2.5},
+}
+"""Scenes that are shown with other values than their own."""
+RTOL = 1e-9
+COLOURS = 24
+
+
+def known() -> dict[str, str]:
+    """Return what the overviews say of each scene that has a page, by its name."""
+    text = "\n".join((HERE / f"{name}.md").read_text(encoding="utf-8") for name in OVERVIEWS)
+    return dict(ROW.findall(text))
+
+
+def make(name: str) -> Scene:
+    """Return a scene with the values that are shown."""
+    return SCENES[name](**SETTINGS.get(name, {}))
+
+
+def head(name: str) -> str:
+    """Return what a page begins with: title, meaning, what is known, picture, and parts."""
+    kind = SCENES[name]
+    lines = [f"# {name}", inspect.cleandoc(kind.__doc__ or "")]
+    says = known()[name]
+    lines.append(f"What is known of it, and tested: {says}.")
+    given = SETTINGS.get(name, {})
+    shown = "".join(f" --set {path}={value}" for path, value in given.items())
+    lines.append(f"![{name}](images/{name}.png)")
+    lines.append(f"```console\n$ atwood run {name}{shown}\n```")
+    lines.append(code(name))
+    lines.append("| part | is | what it does |\n|---|---|---|\n" + "\n".join(part_rows(make(name))))
+    return "\n\n".join(lines)
+
+
+def code(name: str) -> str:
+    """Return the scene in Python."""
+    given = ", ".join(f"{path}={value!r}" for path, value in SETTINGS.get(name, {}).items())
+    short = min(1.0, make(name).t_end)
+    return (
+        "```python\nfrom atwood import simulate\n"
+        f"from atwood_library.scenes import {SCENES[name].__name__}\n\n"
+        f"result = simulate({SCENES[name].__name__}({given}), t_end={short:g})\n"
+        'assert result.status == "finished"\n```'
+    )
+
+
+def part_rows(scene: Model) -> list[str]:
+    """Return a row for each kind of part of a scene, with the names of those that are of it."""
+    names: dict[type, list[str]] = {}
+    for name, part in leaves(scene):
+        names.setdefault(type(part), []).append(name)
+    rows = []
+    for kind, several in names.items():
+        more = f" and {len(several) - 6} more" if len(several) > 6 else ""
+        shown = ", ".join(f"`{one}`" for one in several[:6])
+        rows.append(f"| {shown}{more} | `{kind.__name__}` | {summary(kind)} |")
+    return rows
+
+
+def leaves(model: Any, before: str = "") -> list[tuple[str, Any]]:
+    """Return the parts of a model and of the models in it, with their paths."""
+    found = []
+    for name, part in model.parts.items():
+        found += leaves(part, f"{before}{name}.") if hasattr(part, "parts") else [(before + name, part)]
+    return found
+
+
+def summary(kind: type) -> str:
+    """Return the first sentence of what a class says of itself."""
+    return " ".join(inspect.cleandoc(kind.__doc__ or "").split("\n\n")[0].split()).replace("|", "\\|")
+
+
+def compared(name: str) -> tuple[str, Any]:
+    """Return both forms beside each other, and the run of the reduced form."""
+    runs = {form: atwood.simulate(make(name), form=form, rtol=RTOL, outputs=101) for form in ("reduced", "dae")}
+    rows = []
+    equations = {form: run.assembly.own_equations for form, run in runs.items()}
+    for what, of in (
+        ("coordinates", lambda e: len(e.coordinates)),
+        ("speeds", lambda e: len(e.speeds)),
+        ("constraints left", lambda e: len(e.constraints)),
+    ):
+        rows.append(f"| {what} | {of(equations['reduced'])} | {of(equations['dae'])} |")
+    for form, run in runs.items():
+        assert run.status == "finished", (name, form, run.message)
+    text = "| | reduced | dae |\n|---|---|---|\n" + "\n".join(rows)
+    end = runs["reduced"].time[-1]
+    text += f"\n\nRun to {end:g} s at a relative tolerance of 1e-9, both forms give the same places and angles to "
+    return f"{text}{_power(_gap(runs))} of their sizes.\n", runs["reduced"]
+
+
+def _gap(runs: dict[str, Any]) -> float:
+    """Return by how much the coordinates of the dae form differ in both runs, relative to their largest values."""
+    dae = runs["dae"]
+    paths = [one.name for one in dae.assembly.own_equations.names if one.name in dae and one.name in runs["reduced"]]
+    worst = 0.0
+    for path in paths:
+        mine, other = (runs[form].array(path) for form in ("reduced", "dae"))
+        worst = max(worst, float(abs(mine - other).max()) / max(1.0, float(abs(mine).max())))
+    assert paths
+    return worst
+
+
+def _power(value: float) -> str:
+    """Return the next power of ten above a number, as text."""
+    return f"1e{max(-9, math.ceil(math.log10(value or 1e-16))):d}"
+
+
+def write(name: str) -> None:
+    """Write the page of a scene and its picture."""
+    from matplotlib.figure import Figure
+
+    from atwood.plotting import plot_mechanism
+
+    text, run = compared(name)
+    (HERE / f"{name}.md").write_text(f"{head(name)}\n\n{text}", encoding="utf-8")
+    figure: Figure = plot_mechanism(run)
+    _save_small(figure, HERE / "images" / f"{name}.png")
+
+
+def _save_small(figure: Any, file: Path) -> None:
+    """Save a figure with few colours, 640 points wide."""
+    from io import BytesIO
+
+    from PIL import Image
+
+    file.parent.mkdir(exist_ok=True)
+    memory = BytesIO()
+    width = figure.get_size_inches()[0]
+    figure.savefig(memory, format="png", dpi=640.0 / width, facecolor="white")
+    picture = Image.open(memory).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    picture.save(file, optimize=True)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] != ["write"]:
+        sys.exit(__doc__)
+    for scene in sys.argv[2:] or known():
+        print(scene, flush=True)
+        write(scene)
