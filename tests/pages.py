@@ -7,6 +7,7 @@ overviews (`docs/scenes/fields-and-curves.md` and its neighbours) of a scene is 
 from __future__ import annotations
 
 import inspect
+import json
 import math
 import re
 import sys
@@ -57,7 +58,7 @@ def head(name: str) -> str:
 
 def code(name: str) -> str:
     """Return the scene in Python."""
-    given = ", ".join(f"{path}={value!r}" for path, value in SETTINGS.get(name, {}).items())
+    given = ", ".join(f"{path}={json.dumps(value)}" for path, value in SETTINGS.get(name, {}).items())
     short = min(1.0, make(name).t_end)
     return (
         "```python\nfrom atwood import simulate\n"
