@@ -19,7 +19,6 @@ from atwood.forms.quantities import find_observables
 from atwood.integrators.protocol import Statistics
 from atwood.model.declare.quantities import PATHS, Quantity
 from atwood.result.accounts import account
-from atwood.result.angles import unwrap
 from atwood.result.energy import EnergyLedger
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.result.trajectories import Trajectories
@@ -42,6 +41,7 @@ if TYPE_CHECKING:
 if TYPE_CHECKING:
     from atwood.result.accuracy import Accuracy
     from atwood.result.conserved import ConservedLedger
+    from atwood.result.turns import TurnCounter
 
 __all__ = ["Result"]
 
@@ -193,10 +193,9 @@ class Result(Trajectories):
         return Result(self._second_run)
 
     def error(self, path: str) -> FloatArray:
-        """Return an estimate of the error of a quantity at the output times, shape (times,), in its unit.
+        """Return the estimated error of a quantity at the output times, shape (times,): its distance from `second`.
 
-        It is the distance from the `second` solution. Where neighbouring motions have parted, it is of the size of the
-        quantity itself; `accuracy` says until when it is not.
+        Where neighbouring motions have parted, it is of the size of the quantity itself; `accuracy` says when.
 
         Raises
         ------
@@ -212,13 +211,7 @@ class Result(Trajectories):
 
     @cached_property
     def accuracy(self) -> Accuracy:
-        """How right the motion is as a whole: what was asked for and what is reached, by the `second` solution.
-
-        Raises
-        ------
-        UsageError
-            If there is no second solution.
-        """
+        """How right the motion is as a whole, by the `second` solution; an error where there is none."""
         from atwood.result.accuracy import estimate_accuracy
 
         return estimate_accuracy(self.run, self.second.run, self.time, self.error)
@@ -301,8 +294,15 @@ class Result(Trajectories):
         for path in missing:
             if observables[path].periodic:
                 rate = observables[path].rate
-                turning = (self._all_time, self.samples(rate)) if rate else (None, None)
-                self._cache[path] = unwrap(self._cache[path], guesses.get(path), *turning)
+                turning = (rate, self.samples(rate)) if rate else None
+                values, start = self._cache[path], guesses.get(path)
+                self._cache[path] = self._turns.counted(path, values, start, self._all_time, turning)
+
+    @cached_property
+    def _turns(self) -> TurnCounter:
+        from atwood.result.turns import TurnCounter
+
+        return TurnCounter(self.run)
 
     @cached_property
     def _readings(self) -> tuple[SegmentQuantities, ...]:

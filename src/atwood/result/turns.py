@@ -1,0 +1,129 @@
+"""Angles that count their turns, where samples are too far apart to see them.
+
+A quantity that is known within one turn, such as the angle of a rod whose ends are the coordinates, or an Euler angle
+of a quaternion, is continued by its rate from sample to sample. Where the rate changes by much in between, the run is
+made again with more samples.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.result.angles import unwrap
+from atwood.result.segment_quantities import SegmentQuantities
+from atwood.simulation.run.made import Run
+from atwood.simulation.run.record import SegmentRecord
+
+__all__ = ["TurnCounter"]
+
+_CHANGE = 1.0
+"""rad: rates may change so much times the distance of samples, or an angle is not continued by them."""
+
+_UNSEEN = {"ida": 100.0, "ida-sundae": 100.0, "explicit": 5.0, "taylor": 1.5, "gauss": 10.0}
+"""With more steps from sample to sample, rates at samples say little of those in between."""
+
+_FIRST = 4
+"""Then there are so many times the samples, to begin with."""
+
+_MOST = 2_000_000
+"""More samples than these are not taken."""
+
+_ENDS = (0.02, 0.98)
+"""Shares of the samples between which rates are compared: beside a pole of Euler angles some are as large as may be."""
+
+
+class TurnCounter:
+    """Continues the angles of one run; what it was made again for is kept.
+
+    Parameters
+    ----------
+    run
+        The run.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._finer: dict[int, Run | None] = {}
+
+    def counted(
+        self, path: str, values: FloatArray, start: float | None, time: FloatArray, rate: tuple[str, FloatArray] | None
+    ) -> FloatArray:
+        """Return a quantity at all samples without jumps by whole turns.
+
+        Parameters
+        ----------
+        path
+            The quantity.
+        values
+            At the samples, each within one turn, rad.
+        start
+            What it was said to be at the start; none if not given.
+        time
+            The samples, s.
+        rate
+            Path of its rate, and that at the samples, rad/s; None if it has none.
+        """
+        if rate is None:
+            return unwrap(values, start)
+        spans = np.diff(time)
+        longest = float(np.max(spans, initial=0.0))
+        often = max(_UNSEEN[one.solver] for one in self._run.choices)
+        factor = max(_needed(rate[1], longest), _FIRST if self._run.statistics.steps > often * len(time) else 1)
+        while factor > 1:
+            finer = self._finely(factor, time)
+            if finer is None:
+                warnings.warn(
+                    f"{self._run.assembly.flat.name}: {path} may be counted wrong by whole turns, since its samples "
+                    "are too far apart; give simulate() more samples",
+                    stacklevel=4,
+                )
+                break
+            fine_time, fine, fine_rate = _read(finer.segments, path, rate[0])
+            more = factor * _needed(fine_rate, longest / factor)
+            if more > factor and more * len(time) <= _MOST:
+                factor = more
+                continue
+            whole = unwrap(fine, start, fine_time, fine_rate)
+            return whole[_places(self._run.segments, finer.segments)]
+        return unwrap(values, start, time, rate[1])
+
+    def _finely(self, factor: int, time: FloatArray) -> Run | None:
+        """Return the same run with so many times the samples; None if there is none."""
+        from atwood.simulation.run.retrace import run_again
+
+        if factor not in self._finer:
+            inside = np.arange(1, factor) / factor
+            steps = np.diff(time)
+            between = (time[:-1, None] + steps[:, None] * inside)[steps > 0.0].ravel()
+            small = factor * len(time) <= _MOST
+            self._finer[factor] = run_again(self._run, np.unique(between)) if small else None
+        return self._finer[factor]
+
+
+def _needed(rates: FloatArray, span: float) -> int:
+    """Return into how many parts samples that lie a span apart are to be cut: a power of two."""
+    known = rates[np.isfinite(rates)]
+    if not len(known):
+        return 1
+    low, high = np.quantile(known, _ENDS)
+    change = float(high - low) * span / _CHANGE
+    return 1 if change <= np.pi else 1 << int(np.ceil(np.log2(change)))
+
+
+def _read(segments: Sequence[SegmentRecord], path: str, rate: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    pieces = [SegmentQuantities(segment).values((path, rate)) for segment in segments]
+    values, rates = np.concatenate(pieces, axis=1)
+    return np.concatenate([segment.time for segment in segments]), values, rates
+
+
+def _places(own: Sequence[SegmentRecord], finer: Sequence[SegmentRecord]) -> list[int]:
+    """Return where the samples of a run stand among those of the finer one."""
+    found, before = list[int](), 0
+    for one, other in zip(own, finer, strict=True):
+        found += (before + np.searchsorted(other.time, one.time)).tolist()
+        before += len(other.time)
+    return found
