@@ -204,6 +204,8 @@ def test_settings_that_mean_nothing_are_refused():
         simulate(SimplePendulum(), solver="gauss", order=3)
     with pytest.raises(UsageError, match="is for the solvers 'gauss'"):
         simulate(SimplePendulum(), step=0.1)
+    with pytest.raises(UsageError, match="step cannot be 1e-12, which asks for"):
+        simulate(SimplePendulum(), solver="gauss", step=1e-12)
     with pytest.raises(SolveError, match="give a smaller step"):
         simulate(SimplePendulum(), solver="gauss", step=10.0)
 

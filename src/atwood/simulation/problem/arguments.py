@@ -179,7 +179,7 @@ def refuse_two_accuracies(accuracy: float | None, rtol: float, atol: float | Non
             )
 
 
-def check_span(begin: float, end: float, max_step: float | None = None) -> None:
+def check_span(begin: float, end: float, max_step: float | None = None, step: float | None = None) -> None:
     """Refuse a run that does not go forwards, that takes no time, or that would take too many steps.
 
     Parameters
@@ -188,6 +188,8 @@ def check_span(begin: float, end: float, max_step: float | None = None) -> None:
         Times of its start and of its end, s.
     max_step
         The largest step, s.
+    step
+        The step, where all are equal, s.
 
     Raises
     ------
@@ -202,8 +204,10 @@ def check_span(begin: float, end: float, max_step: float | None = None) -> None:
             f"from the start, t = {begin:g}, to the end, t = {end!r}, is too short a time for floating-point numbers",
             advice="Give a later t_end.",
         )
-    if max_step is not None and span / max_step > _TOO_MANY_STEPS:
+    for name, longest in (("max_step", max_step), ("step", step)):
+        if longest is None or span / longest <= _TOO_MANY_STEPS:
+            continue
         raise UsageError(
-            f"max_step cannot be {show(max_step)}, which asks for {span / max_step:.0e} steps to t = {end:g}",
+            f"{name} cannot be {show(longest)}, which asks for {span / longest:.0e} steps to t = {end:g}",
             advice=f"Give at least {span / _TOO_MANY_STEPS:.0e} s.",
         )

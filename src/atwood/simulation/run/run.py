@@ -73,7 +73,7 @@ def run(
     SolveError
         If the solver fails; what came before is in its `run` attribute.
     """
-    check_span(start.time, options.t_end, options.step or options.max_step)
+    check_span(start.time, options.t_end, options.max_step, options.step)
     check_solver(options.solver)
     options = allowed(options)
     clock = Clock(options.max_seconds) if clock is None else clock

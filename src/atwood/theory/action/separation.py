@@ -243,7 +243,7 @@ def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, 
     by = {q: places[path] for path, (q, _) in old.items()}
     by |= {p: along[k] for k, (_, p) in enumerate(old.values())}
     made = h.expression.xreplace(by)
-    made = sympy.trigsimp(made) if made.count_ops() < 150 else made
+    made = sympy.trigsimp(made) if coordinates is not None and made.count_ops() < 150 else made
     worst = _worst(made, new, momenta, h.values, h.name)
     return Separation(h.name, new, momenta, made, h.values, worst[2] <= _ZERO, worst)
 
