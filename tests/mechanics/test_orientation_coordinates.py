@@ -112,10 +112,10 @@ def test_what_there_is_not_is_refused_with_what_is_near() -> None:
     from atwood import UsageError
 
     with pytest.raises(UsageError, match="euler-zzy") as caught:
-        check_orientation("euler-zzy", "reduced")
+        check_orientation("euler-zzy", "reduced", "space")
     assert "euler-zyz" in str(caught.value)
     with pytest.raises(UsageError, match="quaternions"):
-        check_orientation("euler-zyz", "dae")
+        check_orientation("euler-zyz", "dae", "space")
     for kind in ("rodrigues", "rotation-vector"):
         with pytest.raises(UsageError, match="euler-zyz"):
             check_orientation(kind, "reduced")

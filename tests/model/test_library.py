@@ -161,6 +161,7 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
         axes = space.axis_names
         place = [numbers.draw(f"{name}.p{axis}", 2.0 * index, 2.0 * index + 1.0) for axis in axes]
         angle = numbers.draw(f"{name}.angle") if turns else 0.0
+        second = numbers.draw(f"{name}.second")
         motions[name] = Motion(
             position=space.vector(tuple(place)),
             velocity=space.vector(tuple(numbers.draw(f"{name}.v{axis}") for axis in axes)),
@@ -171,6 +172,7 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
             angular_acceleration=aw.Vector(0.0, -numbers.draw(f"{name}.e") if turns else 0.0, 0.0),
             value=numbers.draw(f"{name}.value"),
             rate=numbers.draw(f"{name}.rate"),
+            second_rate=lambda second=second: second,
             body=Body(
                 numbers.draw(f"{name}.mass"),
                 aw.Vector(*(numbers.draw(f"{name}.c{axis}") for axis in "xyz")),

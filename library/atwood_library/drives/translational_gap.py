@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from atwood import (
-    Component,
-    CoordinateLoad,
-    ParameterError,
     Scalar,
     Slide,
     connector,
     event,
-    force,
     observable,
     parameter,
-    potential,
 )
-from atwood_library.interfaces.along_coordinates import between, gap_contact, push
+from atwood_library.interfaces.along_coordinates import between
+from atwood_library.interfaces.gap import Gap
 
 
-class TranslationalGap(Component):
+class TranslationalGap(Gap):
     """Play between two displacements, or from one to the ground, with elastic and damped contacts at both ends.
 
     Within the play nothing acts. In contact the damper pushes at most as much as the spring, and nothing pulls. Where a
@@ -28,7 +22,6 @@ class TranslationalGap(Component):
     """
 
     synonyms = ("ElastoGap", "Backlash", "Stop", "MassWithStopAndFriction")
-    modes = ("apart", "upper", "lower")
 
     stiffness: float = parameter(1e4, unit="N/m", above=0.0, doc="Force for a unit beyond the play.")
     damping: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of the rate in contact.")
@@ -39,47 +32,15 @@ class TranslationalGap(Component):
     a: Slide = connector(Slide, "The displacement that it acts against.", when={"against": ("flange",)})
     b: Slide = connector(Slide, "The displacement that it acts on.")
 
-    def check_values(self) -> None:
-        """Refuse ends the wrong way round."""
-        if not self.lower < self.upper:
-            raise ParameterError(
-                f"the lower end {self.lower:g} is not below the upper one, {self.upper:g}", where=f"{self.path}.lower"
-            )
-
-    def beyond(self, end: float) -> Scalar:
-        """Return by how much b is beyond an end of the play."""
-        return between(self)[0] - end
-
-    @potential(modes=("upper",))
-    def upper_energy(self) -> Scalar:
-        """Return the energy of the upper contact."""
-        return 0.5 * self.stiffness * self.beyond(self.upper) ** 2
-
-    @potential(modes=("lower",))
-    def lower_energy(self) -> Scalar:
-        """Return the energy of the lower contact."""
-        return 0.5 * self.stiffness * self.beyond(self.lower) ** 2
-
-    @force(modes=("upper",))
-    def upper_damping(self) -> Iterable[CoordinateLoad]:
-        """Return the damping of the upper contact."""
-        yield from push(self, -gap_contact(self.beyond(self.upper), between(self)[1], self.damping, self.stiffness))
-
-    @force(modes=("lower",))
-    def lower_damping(self) -> Iterable[CoordinateLoad]:
-        """Return the damping of the lower contact."""
-        depth, rate = -self.beyond(self.lower), -between(self)[1]
-        yield from push(self, gap_contact(depth, rate, self.damping, self.stiffness))
-
     @event(modes=("apart",), direction=1, unit="m", target="upper", message="it touches above")
     def touches_above(self) -> Scalar:
         """Return by how much it is beyond the upper end."""
-        return self.lower - self.upper if self.ends == "lower" else self.beyond(self.upper)
+        return self.above_upper_end()
 
     @event(modes=("apart",), direction=-1, unit="m", target="lower", message="it touches below")
     def touches_below(self) -> Scalar:
         """Return by how much it is above the lower end."""
-        return self.upper - self.lower if self.ends == "upper" else self.beyond(self.lower)
+        return self.above_lower_end()
 
     @event(modes=("upper",), direction=-1, unit="m", target="apart", message="it lets go above")
     def lets_go_above(self) -> Scalar:
