@@ -117,10 +117,17 @@ class Lookout:
         Address of ``int (solve, steps, memory, double t_out, double *reached, y, yp, double *y_at, double *yp_at, long
         allowed, data)``: sends a solver on to a time from look to look, with the addresses of its functions that go
         on and that count steps.
+    fill
+        Address of ``int (solve, steps, dky, current, memory, double *reached, y, yp, double *y_at, double *yp_at, long
+        allowed, data, double *times, long wanted, double *table, long *filled, double *end)``: sends a solver on
+        through times in the same way and fills a row of a table with y at each, with the addresses of its functions
+        that read a solution and that tell the end of the last step, which is put into `end`.
     noticed
-        The flag that it then returns; else it returns the solver's, or -1 after as many steps as were allowed.
+        The flag that `drive` then returns; else it returns the solver's, or -1 after as many steps as were allowed.
+    paused
+        The flag of `fill` where it has taken as many steps as were allowed, and read what lies in the last of them.
     data
-        Its last argument.
+        Their own data.
     due
         When the next look is to be taken.
     keep
@@ -128,7 +135,9 @@ class Lookout:
     """
 
     drive: int
+    fill: int
     noticed: int
+    paused: int
     data: int
     due: Callable[[], float]
     keep: object = None
@@ -270,6 +279,11 @@ class Budget:
     max_steps: int | None = None
     wall_seconds: float | None = None
     poll: Callable[[float], object] | None = None
+
+    @property
+    def is_unlimited(self) -> bool:
+        """Whether there is nothing to look at between internal steps."""
+        return self.max_steps is None and self.wall_seconds is None and self.poll is None
 
 
 class Status(Enum):

@@ -16,12 +16,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.sundials.lookout_text import AT, CAPACITY, CARRIED, FIELDS, NOTICED, STATE, Shape, lookout_text
+from atwood.codegen.sundials.lookout_text import (
+    AT,
+    CAPACITY,
+    CARRIED,
+    FIELDS,
+    NOTICED,
+    PAUSED,
+    STATE,
+    Shape,
+    lookout_text,
+)
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
 
-__all__ = ["NOTICED", "LookoutCode", "LookoutData", "Pace", "compile_lookout"]
+__all__ = ["NOTICED", "PAUSED", "LookoutCode", "LookoutData", "Pace", "compile_lookout"]
 _LOOK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
 _PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 
@@ -67,11 +77,13 @@ class LookoutCode:
         Address of ``int (solve, steps, memory, double t_out, double *reached, y, yp, double *y_at, double *yp_at, long
         allowed, data)``: sends IDA on to a time from look to look, with the addresses of ``IDASolve`` and
         ``IDAGetNumSteps``. It returns `NOTICED`, or IDA's flag.
+    fill
+        See `~atwood.integrators.protocol.Lookout`. It returns the same, or `PAUSED` or `UNREADABLE`.
     """
 
     def __init__(self, program: Program, shape: Shape, built: Built) -> None:
         self.program, self.shape, self.built = program, shape, built
-        self.drive = built.code.addresses["drive"]
+        self.drive, self.fill = (built.code.addresses[name] for name in ("drive", "fill"))
         self.look = _LOOK(built.code.addresses["look"])
 
     def bind(self, parameter_values: ArrayLike, sizes: ArrayLike, kept: Sequence[int], pace: Pace) -> LookoutData:
@@ -206,5 +218,5 @@ def compile_lookout(program: Program, speeds: int, size: int, places: tuple[Arra
     shape = Shape(inputs[1], speeds, size, outputs[0], tuple(zip(rows, columns, strict=True)))
     part = Part("held", program)
     text = lookout_text(shape)
-    built = build_code([part], default_options([part]), more=text, exports=["look", "drive"])
+    built = build_code([part], default_options([part]), more=text, exports=["look", "drive", "fill"])
     return LookoutCode(program, shape, built)

@@ -11,13 +11,16 @@ from atwood.codegen.llvm.routine import Routine
 from atwood.codegen.llvm.text import literal
 from atwood.late import dataclass
 
-__all__ = ["AT", "CAPACITY", "CARRIED", "FIELDS", "NOTICED", "STATE", "Shape", "lookout_text"]
+__all__ = ["AT", "CAPACITY", "CARRIED", "FIELDS", "NOTICED", "PAUSED", "STATE", "UNREADABLE", "Shape", "lookout_text"]
 
 NOTICED = 98
 """The flag of `LookoutCode.drive` where somebody should look at what was noted; IDA has none of this number."""
 
 _WORKED_ENOUGH = -1
 """IDA's own flag after as many steps as it was allowed to take."""
+
+PAUSED, UNREADABLE = 96, 97
+"""Flags of `LookoutCode.fill` beside those: enough steps were taken, and IDA has no value at a time."""
 
 CAPACITY, CARRIED = 24, 6
 """So many looks are noted; of those among which nothing was low the last few are carried on."""
@@ -78,8 +81,8 @@ class Shape:
 
 
 def lookout_text(shape: Shape) -> str:
-    """Write what looks at a state, and what sends IDA from look to look."""
-    return _look_text(shape) + _drive_text()
+    """Write what looks at a state, what sends IDA from look to look, and what fills a table on the way."""
+    return _look_text(shape) + _drive_text() + _fill_text(shape)
 
 
 def _look_text(shape: Shape) -> str:
@@ -281,4 +284,77 @@ judge:
 pause:
   ret i32 {_WORKED_ENOUGH}
 }}
+"""
+
+
+def _fill_text(shape: Shape) -> str:
+    """Write the function that sends IDA on through times and fills a row of a table at each.
+
+    A row is read from the last step that IDA has taken, once no look is due before its time.
+    """
+    state, following = FIELDS.index("state"), AT["next"]
+    functions = (
+        "ptr %solve, ptr %steps, ptr %dky, ptr %current, ptr %memory, ptr %reached, ptr %y, ptr %yp, ptr %y_at, "
+    )
+    tables = "ptr %yp_at, i64 %allowed, ptr %data, ptr %times, i64 %wanted, ptr %table, ptr %filled, ptr %end"
+    drive = "ptr %solve, ptr %steps, ptr %memory, double %t, ptr %reached, ptr %y, ptr %yp, ptr %y_at, ptr %yp_at, "
+    return f"""define i32 @fill({functions}{tables}) #0 {{
+entry:
+  %count = alloca i64
+  store i64 0, ptr %count
+  %s0 = call i32 %steps(ptr %memory, ptr %count)
+  %before = load i64, ptr %count
+  %c0 = call i32 %current(ptr %memory, ptr %end)
+  %state.at = getelementptr ptr, ptr %data, i64 {state}
+  %state = load ptr, ptr %state.at
+  %next.at = getelementptr double, ptr %state, i64 {following}
+  br label %turn
+turn:
+  %i = load i64, ptr %filled
+  %more = icmp slt i64 %i, %wanted
+  br i1 %more, label %one, label %done
+done:
+  ret i32 0
+one:
+  %t.at = getelementptr double, ptr %times, i64 %i
+  %t = load double, ptr %t.at
+  %known = load double, ptr %end
+  %next = load double, ptr %next.at
+  %inside = fcmp ole double %t, %known
+  %early = fcmp olt double %t, %next
+  %reads = and i1 %inside, %early
+  br i1 %reads, label %read, label %go
+{_row_text(shape)}go:
+  %flag = call i32 @drive({drive}i64 %allowed, ptr %data)
+  %c1 = call i32 %current(ptr %memory, ptr %end)
+  %well = icmp eq i32 %flag, 0
+  br i1 %well, label %turn, label %arrived
+arrived:
+  ret i32 %flag
+}}
+declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)
+"""
+
+
+def _row_text(shape: Shape) -> str:
+    """Write what reads a row from the last step, and whether enough steps were taken then."""
+    return f"""read:
+  %code = call i32 %dky(ptr %memory, double %t, i32 0, ptr %y)
+  %lost = icmp ne i32 %code, 0
+  br i1 %lost, label %unreadable, label %keep
+unreadable:
+  ret i32 {UNREADABLE}
+keep:
+  %place = mul i64 %i, {shape.size}
+  %row = getelementptr double, ptr %table, i64 %place
+  call void @llvm.memcpy.p0.p0.i64(ptr %row, ptr %y_at, i64 {8 * shape.size}, i1 false)
+  %following = add i64 %i, 1
+  store i64 %following, ptr %filled
+  %s1 = call i32 %steps(ptr %memory, ptr %count)
+  %now = load i64, ptr %count
+  %taken = sub i64 %now, %before
+  %tired = icmp sge i64 %taken, %allowed
+  br i1 %tired, label %pause, label %turn
+pause:
+  ret i32 {PAUSED}
 """

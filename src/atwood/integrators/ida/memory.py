@@ -223,6 +223,30 @@ class IdaMemory:
 
         return go
 
+    def fill(self, lookout: Lookout) -> Callable[[FloatArray, FloatArray, int, int], tuple[int, float, int]]:
+        """Return what goes on through times and fills the rows of a table after some that are filled already.
+
+        It is given times, table, how many rows are filled, and how many steps to take at most; it returns a flag, the
+        time that belongs to `y` and `yp` where that is IDA's own or a look's, and how many rows are filled then.
+        """
+        library, count, end = self.library, c_long(), c_double()
+        call = ctypes.CFUNCTYPE(c_int, *[c_void_p] * 10, c_long, c_void_p, c_void_p, c_long, *[c_void_p] * 3)(
+            lookout.fill
+        )
+        names = ("IDASolve", "IDAGetNumSteps", "IDAGetDky", "IDAGetCurrentTime")
+        functions = tuple(ctypes.cast(getattr(library, name), c_void_p) for name in names)
+        reached, y, yp = ctypes.addressof(self._time), self.y.ctypes.data, self.yp.ctypes.data
+        places = reached, self._y, self._yp, y, yp
+        data, filled_at, end_at = c_void_p(lookout.data), ctypes.addressof(count), ctypes.addressof(end)
+
+        def go(times: FloatArray, table: FloatArray, filled: int, allowed: int) -> tuple[int, float, int]:
+            count.value = filled
+            given = times.ctypes.data, len(times), table.ctypes.data, filled_at, end_at
+            flag = call(*functions, self._ida, *places, allowed, data, *given)
+            return flag, self._time.value, count.value
+
+        return go
+
     def interpolate(self, t: float) -> int:
         """Put the solution at a time inside the last step into `y` and `yp`; return IDA's flag."""
         flag: int = self.library.IDAGetDky(self._ida, t, 0, self._y)

@@ -109,12 +109,16 @@ class NativeSession:
         self._by_steps = self.budget.poll is not None or (self._locator is not None and not self._finds_events)
         self.looks_out = lookout is not None and not self._by_steps
         self._look_out = None if lookout is None or self._by_steps else self._memory.look_out(lookout)
+        self._fill = None if lookout is None or self._by_steps else self._memory.fill(lookout)
+        self._goes_on = self._fill is not None and self._locator is None and not self._record.calls_python
         self._noticed_flag = None if lookout is None else lookout.noticed
+        self._paused_flag = 0 if lookout is None else lookout.paused
         self._due = lookout.due if lookout is not None and self.looks_out else lambda: inf
         self._no_events = (0,) * problem.event_count
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
         self._starts = 0
         self._seconds = 0.0
+        self._pending: StepResult | None = None
         self._pace = Pace(FIRST_CHUNK if self._record.calls_python else first_chunk(problem.size))
         self._begin(state)
 
@@ -168,6 +172,9 @@ class NativeSession:
             Where it ended and why, always with a good state.
         """
         self._check_open()
+        if self._pending is not None:
+            pending, self._pending = self._pending, None
+            return pending
         if not self._here[0] <= t_out < inf:
             raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
         if self._stop_time is not None and t_out > self._stop_time:
@@ -221,6 +228,7 @@ class NativeSession:
         self._looks_on = False  # whether IDA itself looks at what is left of its last step when it goes on
         self._pace.mark, self._pace.lap = (state[0], 0), (state[0], 0, 0)
         self._stale = False
+        self._pending = None  # what ended the last reading, for the next advance
         self._starts += 1
 
     def _since_start(self) -> Statistics:
@@ -287,20 +295,68 @@ class NativeSession:
     def read_on(self, times: Sequence[float], first: int, past: int) -> FloatArray:
         """See `~atwood.integrators.protocol.ReadingSession`."""
         self._check_open()
+        if past <= first or self._stale or self._pending is not None:
+            return np.empty((0, self._problem.size))
+        if self._goes_on and not self._is_first and self.budget.is_unlimited:
+            return self._filled(np.array(times[first:past], dtype=float))
         known = self._reached if self._locator is None else min(self._searched, self._reached)
         root = None if self._root is None else self._root.state
         limit = min(self._due(), *(one[0] for one in (self._newest, root) if one is not None), inf)
         past = min(bisect_right(times, known, first, past), bisect_left(times, limit, first, past))
-        if past <= first or self._stale:
+        if past <= first:
             return np.empty((0, self._problem.size))
         began = time.perf_counter()
-        rows, yp = self._memory.interpolate_each(times[first:past])
-        if not is_finite(rows.ravel(), yp):  # an advance says so
-            rows = rows[:0]
-        else:
-            self._here = times[past - 1], rows[-1].copy(), yp
-        self._seconds += time.perf_counter() - began
+        try:
+            return self._table(times[first:past])
+        finally:
+            self._seconds += time.perf_counter() - began
+
+    def _table(self, times: Sequence[float]) -> FloatArray:
+        """Return the solution at times within the last step; none if it is not finite, which an advance says."""
+        rows, yp = self._memory.interpolate_each(times)
+        if not is_finite(rows.ravel(), yp):
+            return rows[:0]
+        self._here = times[-1], rows[-1].copy(), yp
         return rows
+
+    def _filled(self, times: FloatArray) -> FloatArray:
+        """Let IDA go on through times by itself; what ended that is told by the next advance."""
+        fill, before, table = self._fill, self._here, np.empty((len(times), self._problem.size))
+        assert fill is not None
+        allowed, filled = self._allow(), 0
+        began = time.perf_counter()
+        self._opened = self._opened or began
+        try:
+            with self._guard:
+                flag, t, filled = fill(times, table, filled, allowed)
+                while flag == STOPPED_BY_WEIGHTS and self._attend(t):
+                    flag, t, filled = fill(times, table, filled, allowed)
+            rows = table[:filled]
+            if filled:
+                self._here = float(times[filled - 1]), rows[-1].copy(), before[2]
+            if flag in (0, self._paused_flag):
+                self._read(filled)
+            else:
+                self._pending = self._passed(flag, t)
+            bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+            if len(bad):
+                rows, self._stale = rows[: bad[0]], True
+                self._here = (float(times[bad[0] - 1]), rows[-1].copy(), before[2]) if len(rows) else before
+                self._pending = self._stopped(Status.FAILED, "the solution is no longer finite")
+            return rows
+        except BaseException:
+            self._stale = True
+            raise
+        finally:
+            spent = time.perf_counter() - began
+            self._seconds += spent
+            self._pace.learn(spent, filled < len(times))
+
+    def _read(self, filled: int) -> None:
+        """Take up that all that was filled has been read, the last of it from the last step."""
+        self._reached, self._newest, self._behind = self._memory.time(), None, True
+        if filled and self._memory.interpolate(self._here[0]) == 0:
+            self._here = (*self._here[:2], self._memory.yp.copy())
 
     def _steps(self) -> int:
         return self._earlier.steps + self._memory.steps()
@@ -332,16 +388,25 @@ class NativeSession:
 
     def _stride(self, t_out: float) -> StepResult | None:
         """Take steps until a time is passed or a moment is over, and return an answer only if that failed."""
+        self._allow()
+        began = time.perf_counter()
+        flag, t = self._solve(t_out, TO_TIME)
+        self._pace.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
+        return self._passed(flag, t)
+
+    def _allow(self) -> int:
+        """Tell IDA how many steps it may take; return that."""
         pace, allowed = self._pace, self._pace.chunk
         if self.budget.max_steps is not None:
             allowed = min(allowed, self.budget.max_steps - self._steps())
         if allowed != pace.allowed:
             self._memory.call("IDASetMaxNumSteps", allowed)
             pace.allowed = allowed
-        began = time.perf_counter()
-        flag, t = self._solve(t_out, TO_TIME)
+        return allowed
+
+    def _passed(self, flag: int, t: float) -> StepResult | None:
+        """Take up where IDA has gone to by itself, and return an answer only if that failed, or somebody is to look."""
         self._newest, self._behind = None, True
-        pace.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
         if flag >= 0:
             self._reached = self._memory.time()
             if flag == self._noticed_flag:

@@ -112,6 +112,6 @@ def compiled_looks(plan: Plan, whole: float) -> LookoutData | None:
 
 def as_lookout(data: LookoutData) -> Lookout:
     """Return what a session is given to look with."""
-    from atwood.codegen.sundials.lookout import NOTICED
+    from atwood.codegen.sundials.lookout import NOTICED, PAUSED
 
-    return Lookout(data.code.drive, NOTICED, data.address, data.due, data)
+    return Lookout(data.code.drive, data.code.fill, NOTICED, PAUSED, data.address, data.due, data)
