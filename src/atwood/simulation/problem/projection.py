@@ -42,6 +42,9 @@ _LEAST = 1e-17
 
 _STEPS = 12
 
+_FEW = 12
+"""Of so many entries for each state the largest is found one after another."""
+
 _CHUNK = 4_000_000
 """Numbers in the matrices that are worked on at once."""
 
@@ -223,8 +226,18 @@ def _normal(plan: Plan) -> Normal | None:
     return plan.assembly.shared.get(_NORMAL, make, plan.assembly.form, plan.finding.kept)
 
 
+def _largest_entry(values: FloatArray) -> FloatArray:
+    """Return the size of the largest of the entries along the last axis; of few in turn, which is faster."""
+    if not 0 < values.shape[-1] <= _FEW:
+        return np.asarray(np.max(np.abs(values), axis=-1))
+    found: FloatArray = np.abs(values[..., 0])
+    for k in range(1, values.shape[-1]):
+        np.maximum(found, np.abs(values[..., k]), out=found)
+    return found
+
+
 def _largest(now: ConstraintsAt, speeds: FloatArray) -> FloatArray:
-    return np.stack([np.max(np.abs(now.value), axis=1), np.max(np.abs(now.rate(speeds)), axis=1)])
+    return np.stack([_largest_entry(now.value), _largest_entry(now.rate(speeds))])
 
 
 def constraints_at(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> ConstraintsAt:
@@ -249,7 +262,7 @@ def constraints_at(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> C
     full = np.zeros((count, p.constraints, p.speeds))
     full[:, p.jacobian_rows, p.jacobian_columns] = jacobian.T
     full *= plan.sizes
-    rows = trusted_sizes(np.max(np.abs(full), axis=2), errors)
+    rows = trusted_sizes(_largest_entry(full), errors)
     return ConstraintsAt(value.T / rows, full / rows[:, :, None], explicit_rate.T / rows, kept, None, rows)
 
 
@@ -262,7 +275,7 @@ def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Project
     last = np.full(len(t), np.inf)
     active = np.ones(len(t), dtype=bool)
     for _ in range(_STEPS):
-        miss = np.max(np.abs(now.value), axis=1)
+        miss = _largest_entry(now.value)
         active &= (miss > _LEAST) & ((miss >= tolerances.MET) | (miss < 0.5 * last))
         if not active.any():
             break
