@@ -210,8 +210,8 @@ def compare(
     ----------
     scene
         The scene. Where its class has a method ``closed_form(t)`` that gives trajectories by path, and its start is
-        the one that the closed form belongs to, errors are measured against that; else against a solution that is far
-        more accurate.
+        the one that the closed form belongs to, errors are measured against that; where all coordinates but one are
+        ignorable, against quadratures (`atwood.reduced`); else against a solution that is far more accurate.
     t_end
         Time of the end, s; the scene's own if not given.
     rtols

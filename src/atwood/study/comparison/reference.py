@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,12 @@ _BEFORE = 0.99
 _COMPARED = ("m", "rad", "1")
 """Units of what is compared: positions, angles, axes."""
 
+_FEW = 4
+"""Up to so many speeds it is looked whether all coordinates but one are ignorable."""
+
+_ROUNDING = 1e-14
+"""Relative: the error of a quadrature in each period, at least."""
+
 _HOLDS = 1e-6
 """A closed form that misses a tight solution by more belongs to another start."""
 
@@ -44,7 +50,7 @@ class Reference:
     Attributes
     ----------
     kind
-        ``"closed form"`` or ``"tight solution"``.
+        ``"closed form"``, ``"quadrature"`` or ``"tight solution"``.
     description
         What it is, in words.
     time
@@ -77,7 +83,7 @@ def find_reference(
     max_seconds: float | None,
     watch: Callable[[str], object],
 ) -> Reference:
-    """Return the reference of a scene: its closed form where it has one that holds, else its tightest solution.
+    """Return the reference of a scene: its closed form where it has one that holds, a quadrature, or a solution.
 
     Parameters
     ----------
@@ -115,6 +121,13 @@ def find_reference(
             text = f"closed form of the scene; {said} agrees with it to {miss:.1e}"
             return Reference("closed form", text, time, known, known_scales, 1e-15, note)
         note = f"{note} The closed form of the scene belongs to another start and is not used.".strip()
+    done = _by_quadrature(assembled, best, time, paths)
+    if done is not None:
+        known, own_error = done
+        miss = scaled_difference(known, table_at(best, known, time), scales)
+        if miss < max(_HOLDS, 100.0 * error):
+            text = f"quadrature of its effective potential; {said} agrees with it to {miss:.1e}"
+            return Reference("quadrature", text, time, known, {path: scales[path] for path in known}, own_error, note)
     text = f"{said}; its error is at most about {error:.1e}, by {other}"
     return Reference("tight solution", text, time, quantities, scales, error, note)
 
@@ -221,6 +234,27 @@ def scaled_difference(
         Size of each.
     """
     return max((float(np.max(np.abs(one[path] - other[path]))) / scales[path] for path in one), default=0.0)
+
+
+def _by_quadrature(
+    assembled: Assembled, best: Result, time: FloatArray, paths: Sequence[str]
+) -> tuple[dict[str, FloatArray], float] | None:
+    """Return quantities by quadrature and their error, where the motion is one of one coordinate; None elsewhere."""
+    assembly = assembled("reduced", "ggl")
+    e = assembly.reduced
+    if assembly.modes or best.events or e.constraints or not 0 < len(e.speeds) <= _FEW:
+        return None
+    from atwood.theory.reduction import reduced
+
+    try:
+        motion = reduced(assembly)
+        known = motion.table(time, paths)
+    except AtwoodError:  # most motions are none of one coordinate
+        return None
+    if not known:
+        return None
+    turns = max(1.0, float(time[-1] - time[0]) / motion.period)
+    return known, max(_ROUNDING, 10.0 * motion.error) * turns
 
 
 def _closed_form(scene: Model, result: Result) -> dict[str, FloatArray]:

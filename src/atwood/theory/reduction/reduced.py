@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from atwood.analysis.conservation.quantities import Quantities
 from atwood.analysis.reduction.parts import parts_of
 from atwood.analysis.reduction.quadrature import Path, find_path
 from atwood.analysis.reduction.radial import Radial
 from atwood.arguments import TEXT, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.expr import OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
+from atwood.forms.program import state_groups
+from atwood.forms.quantities import observer
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
+from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.reduction.routhian import Routhian, ignorable_of, routhian_of
 
@@ -120,6 +125,34 @@ class ReducedMotion:
             found[path] = (self.start[path] + values).reshape(np.shape(times))
         return found
 
+    def table(self, times: FloatArray, paths: Sequence[str]) -> dict[str, FloatArray]:
+        """Return quantities that follow from the coordinates alone, at times.
+
+        Parameters
+        ----------
+        times
+            s, shape (times,).
+        paths
+            Positions, angles and axes by path; of those that depend on velocities or forces, and of angles that are
+            not counted, none are returned.
+        """
+        assembly, found = self.routhian.formulas.assembly, self.at(times)
+        e = assembly.reduced
+        late = [*e.speeds, *e.accelerations, *(one.symbol for one in assembly.reactions)]
+        own = {one.name for one in e.names}
+        chosen = []
+        for path in paths:
+            one = assembly.observables.get(path)
+            if one is not None and not depends_on(one.value, late) and (path in own or not one.periodic):
+                chosen.append(path)
+        if not chosen:
+            return {}
+        q = np.array([found[one.name] for one in e.names])
+        still = np.zeros((len(e.speeds), len(times)))
+        kernel = assembly.kernel(observer(assembly, tuple(chosen)), vectorized=True)
+        values = kernel(times[None, :], q, still, still, np.zeros((len(assembly.reactions), len(times))))[0]
+        return {path: np.broadcast_to(row, times.shape) for path, row in zip(chosen, values, strict=True)}
+
     def __repr__(self) -> str:
         low, high = self.turning_points
         told = f"{self.kind} between {low:.6g} and {high:.6g}" if self.kind == "libration" else self.kind
@@ -199,11 +232,6 @@ def reduced(scene: Model | Assembly, coordinate: str | None = None, *, orientati
 
 def _start_of(assembly: Assembly, found: Lagrangian) -> tuple[FloatArray, FloatArray]:
     """Return coordinates and their derivatives where a scene starts."""
-    from atwood.analysis.conservation.quantities import Quantities
-    from atwood.expr import OutputGroup, Program
-    from atwood.forms.program import state_groups
-    from atwood.simulation.dynamics.orientation_coordinates import from_regular
-
     start, e = find_start(assembly), assembly.reduced
     q = from_regular(assembly, start.coordinates)
     rates = Quantities(assembly, found).on_speeds(list(found.velocities))
