@@ -393,4 +393,9 @@ class Assembly:
         return self.shared.get(_START_OBSERVABLES, lambda: self._observe(self.regular))
 
     def _observe(self, equations: Equations) -> Mapping[str, Observable]:
-        return observe(self.mechanism, equations, self.reactions, self.shared.lock)
+        def momenta() -> Mapping[str, Observable]:
+            from atwood.forms.momenta import momenta_of  # the Lagrangian is made of assemblies
+
+            return momenta_of(self, equations)
+
+        return observe(self.mechanism, equations, self.reactions, self.shared.lock, momenta)

@@ -5,7 +5,7 @@ A large scene has ten thousands of quantities, of which a run needs a few.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import partial
@@ -22,7 +22,10 @@ from atwood.model.local.laws import LocalPart
 from atwood.model.returned import call_law, law_value, not_evaluated, one_scalar
 from atwood.model.values.vector import Vector
 
-__all__ = ["Observables", "Reader", "observe"]
+__all__ = ["MOMENTUM", "Observables", "Reader", "observe"]
+
+MOMENTUM = "p:"
+"""What the path of a momentum begins with, before that of its coordinate."""
 
 
 def observe(
@@ -30,6 +33,7 @@ def observe(
     equations: Equations,
     reactions: Sequence[Reaction],
     lock: AbstractContextManager[Any] | None = None,
+    momenta: Callable[[], Mapping[str, Observable]] | None = None,
 ) -> Mapping[str, Observable]:
     """Return every observable of every component, by path.
 
@@ -43,8 +47,10 @@ def observe(
         What `list_reactions` gave.
     lock
         Held while expressions are made, where several threads may ask.
+    momenta
+        Gives the momenta of coordinates by path, such as ``p:rail.displacement``, which are not listed.
     """
-    return Observables(mechanism, equations, reactions, lock or nullcontext())
+    return Observables(mechanism, equations, reactions, lock or nullcontext(), momenta)
 
 
 class Observables(Mapping[str, Observable]):
@@ -52,7 +58,7 @@ class Observables(Mapping[str, Observable]):
 
     Parameters
     ----------
-    mechanism, equations, reactions, lock
+    mechanism, equations, reactions, lock, momenta
         See `observe`.
     """
 
@@ -62,8 +68,9 @@ class Observables(Mapping[str, Observable]):
         equations: Equations,
         reactions: Sequence[Reaction],
         lock: AbstractContextManager[Any],
+        momenta: Callable[[], Mapping[str, Observable]] | None = None,
     ) -> None:
-        self._mechanism, self._lock = mechanism, lock
+        self._mechanism, self._lock, self._momenta = mechanism, lock, momenta
         self._reader = Reader(mechanism, equations, reactions)
         self._reactions = {one.path: one for one in reactions}
         self._made: dict[str, dict[str, Observable]] = {}
@@ -76,6 +83,8 @@ class Observables(Mapping[str, Observable]):
         one = self._reactions.get(path)
         if one is not None:
             return Observable(one.path, one.unit, one.doc, False, one.symbol)
+        if path.startswith(MOMENTUM) and self._momenta is not None:
+            return self._momenta()[path]
         part = path.rpartition(".")[0]
         while part:
             if part in self._mechanism.locals_:
