@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property, partial
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -393,9 +394,6 @@ class Assembly:
         return self.shared.get(_START_OBSERVABLES, lambda: self._observe(self.regular))
 
     def _observe(self, equations: Equations) -> Mapping[str, Observable]:
-        def momenta() -> Mapping[str, Observable]:
-            from atwood.forms.momenta import momenta_of  # the Lagrangian is made of assemblies
-
-            return momenta_of(self, equations)
-
+        # The Lagrangian is made of assemblies, and looked up when a momentum is wanted.
+        momenta = lambda: import_module("atwood.forms.lagrangian").momenta_of(self, equations)  # noqa: E731
         return observe(self.mechanism, equations, self.reactions, self.shared.lock, momenta)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from atwood.errors import UsageError
 from atwood.expr import (
@@ -27,16 +28,22 @@ from atwood.expr import (
     vjp,
 )
 from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.kept import Key
 from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Constraint, Equations, balance_rows, inertia_forces
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
 from atwood.mechanics.kinematics.orientation_coordinates import euler_spin
-from atwood.mechanics.outputs.observables import add_up, part_energies
+from atwood.mechanics.outputs.observables import Observable, add_up, part_energies
+from atwood.mechanics.outputs.reading import MOMENTUM
 from atwood.model.local.laws import LocalPart
 from atwood.topology.spanning_forest import Coordinate
 
 __all__ = ["Contribution", "Lagrangian", "lagrangian_along_speeds", "lagrangian_of", "rows_by_part"]
+
+
+_MOMENTA: Key[Mapping[str, Observable]] = Key("momenta of coordinates")
+_UNITS = {"m": "kg*m/s", "rad": "kg*m^2/s"}
 
 
 @dataclass(frozen=True)
@@ -432,3 +439,42 @@ def _along_angles(made: Lagrangian) -> Lagrangian:
         constraint_rows=on_angles(made.constraint_rows),
         constraints=tuple(constraints),
     )
+
+
+def momenta_of(assembly: Assembly, equations: Equations) -> Mapping[str, Observable]:
+    """Return the momenta ``dL/dq'`` of coordinates by path.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    equations
+        Its equations in the coordinates that are meant: generalized ones.
+
+    Returns
+    -------
+    dict
+        Empty in maximal coordinates, and where constraints on velocities are solved, whose momenta are not free.
+    """
+    if equations is assembly.maximal:
+        return {}
+    form = "reduced" if equations is assembly.reduced else "regular"
+    return assembly.shared.get(_MOMENTA, lambda: _momenta(assembly, form), form)
+
+
+def _momenta(assembly: Assembly, form: Any) -> Mapping[str, Observable]:
+    found = lagrangian_of(assembly, form)
+    if found.is_restricted:
+        return {}
+    own = found.equations
+    pairs = zip(found.velocities, found.moves, own.speeds, strict=True)
+    on_speeds: dict[Any, Any] = {v: own.rates[place] for v, place, u in pairs if v is not u and place is not None}
+    momenta = list(found.momenta)
+    momenta = substitute(momenta, on_speeds) if on_speeds else momenta
+    made = {}
+    for value, place in zip(momenta, found.moves, strict=True):
+        if place is not None and found.names[place].unit in _UNITS:
+            name = found.names[place]
+            path, unit = f"{MOMENTUM}{name.name}", _UNITS[name.unit]
+            made[path] = Observable(path, unit, f"Momentum of {name.name}.", False, value)
+    return made
