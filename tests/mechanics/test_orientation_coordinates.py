@@ -118,5 +118,5 @@ def test_what_there_is_not_is_refused_with_what_is_near() -> None:
         check_orientation("euler-zyz", "dae", "space")
     for kind in ("rodrigues", "rotation-vector"):
         with pytest.raises(UsageError, match="euler-zyz"):
-            check_orientation(kind, "reduced")
+            check_orientation(kind, "reduced", "space")
     assert len(ORIENTATIONS) == 13
