@@ -75,7 +75,6 @@ LONG_FILES = {
     "forms/program.py",
     "integrators/explicit_session.py",
     "integrators/ida/native.py",
-    "integrators/protocol.py",
     "model/compose/composite.py",
     "model/declare/component.py",
     "simulation/run/segment.py",

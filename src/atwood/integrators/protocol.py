@@ -18,6 +18,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import UsageError
+from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.late import dataclass
 from atwood.tolerances import tolerances
 
@@ -27,8 +28,6 @@ __all__ = [
     "ImplicitProblem",
     "IndexArray",
     "LinearSolver",
-    "Lookout",
-    "NativeCallbacks",
     "OpenSession",
     "ReadingSession",
     "Session",
@@ -47,100 +46,6 @@ SPARSE_SIZE = 90
 
 SPARSE_DENSITY = 0.15
 """The largest share of entries that are not zero for which it pays."""
-
-
-@dataclass(frozen=True, eq=False)
-class NativeCallbacks:
-    """Addresses of compiled functions with SUNDIALS' own C signatures, for one session.
-
-    Residual and Jacobian return 0, or +1 where a value is not finite, which makes IDA try a smaller step.
-
-    Parameters
-    ----------
-    residual
-        An ``IDAResFn``: ``int (double t, N_Vector y, N_Vector yp, N_Vector out, void *data)``.
-    jacobian
-        An ``IDALsJacFn``: ``int (double t, double cj, N_Vector y, N_Vector yp, N_Vector out, SUNMatrix J,
-        void *data, N_Vector, N_Vector, N_Vector)``.  The matrix comes filled with zeros; a sparse one (by column)
-        has its index arrays zeroed too, so that these are written as well.
-    user_data
-        The last argument of all of them, this session's own; 0 for none.
-    weights
-        An ``IDAEwtFn``: ``int (N_Vector y, N_Vector weights, void *data)``, or 0 for none.
-    set_weights
-        ``set_weights(relative, absolute)``, called once before `weights` is used: it makes it give
-        ``1 / (relative[i] * |y[i]| + absolute[i])``.
-    events
-        An ``IDARootFn``: ``int (double t, N_Vector y, N_Vector yp, double *values, void *data)``; 0 for none.  It
-        writes the values of the problem's event functions and returns 0, or 1 where one is not finite.  It tells
-        in which steps something happens; what and when is then found out with the problem's own functions.
-    restart_events
-        ``restart_events(t)``: called before IDA starts at a time.
-    has_noticed
-        Asked where `events` did not return 0: whether that was to say that a value may have passed zero and come back
-        since they were called before, in which case they return 0 when they are called again.
-    undefined_values
-        How often residual and Jacobian had no finite value so far, if somebody counts it.
-    attend
-        ``attend(t, y)``, called where `weights` have made IDA stop between two steps: None if that was not on
-        purpose, else whether the equations are written in another way from now on, at the same solution.
-    last_rate
-        The factor cj of the last Jacobian, with which it is worked out anew when the equations have changed.
-    keep
-        Whatever must live as long as the addresses are used.
-    data_bytes
-        How long what `user_data` leads to is, if it holds nothing but pointers and so may be copied; else 0.
-    """
-
-    residual: int
-    jacobian: int
-    user_data: int = 0
-    weights: int = 0
-    set_weights: Callable[[FloatArray, FloatArray], None] | None = None
-    events: int = 0
-    restart_events: Callable[[float], None] | None = None
-    has_noticed: Callable[[], bool] | None = None
-    undefined_values: Callable[[], int] | None = None
-    attend: Callable[[float, FloatArray], bool | None] | None = None
-    last_rate: Callable[[], float] | None = None
-    keep: object = None
-    data_bytes: int = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Lookout:
-    """Compiled functions that look at a motion now and then, and say when somebody else should.
-
-    Parameters
-    ----------
-    drive
-        Address of ``int (solve, steps, memory, double t_out, double *reached, y, yp, double *y_at, double *yp_at, long
-        allowed, data)``: sends a solver on to a time from look to look, with the addresses of its functions that go
-        on and that count steps.
-    fill
-        Address of ``int (solve, steps, dky, current, memory, double *reached, y, yp, double *y_at, double *yp_at, long
-        allowed, data, double *times, long wanted, double *table, long *filled, double *end)``: sends a solver on
-        through times in the same way and fills a row of a table with y at each, with the addresses of its functions
-        that read a solution and that tell the end of the last step, which is put into `end`.
-    noticed
-        The flag that `drive` then returns; else it returns the solver's, or -1 after as many steps as were allowed.
-    paused
-        The flag of `fill` where it has taken as many steps as were allowed, and read what lies in the last of them.
-    data
-        Their own data.
-    due
-        When the next look is to be taken.
-    keep
-        Whatever must live as long as the addresses are used.
-    """
-
-    drive: int
-    fill: int
-    noticed: int
-    paused: int
-    data: int
-    due: Callable[[], float]
-    keep: object = None
 
 
 @dataclass(frozen=True, eq=False)

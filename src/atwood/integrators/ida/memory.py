@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from atwood.errors import UsageError
+from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.ida.signatures import JACOBIAN
 from atwood.integrators.ida.sparse import SparseSolver
-from atwood.integrators.protocol import FloatArray, LinearSolver, Lookout
+from atwood.integrators.protocol import FloatArray, LinearSolver
 from atwood.late import dataclass
 
 __all__ = ["ONE_STEP", "ROOT_RETURN", "STOPPED_BY_WEIGHTS", "TOO_MUCH_WORK", "TO_TIME", "Counts", "IdaMemory"]

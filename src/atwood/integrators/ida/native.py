@@ -20,6 +20,7 @@ from math import inf
 import numpy as np
 
 from atwood.errors import KernelEvaluationError, UsageError
+from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import EventLocator, Root, State
 from atwood.integrators.ida.callbacks import InterruptLater, Record, explain
 from atwood.integrators.ida.library import available, why_not
@@ -32,7 +33,6 @@ from atwood.integrators.protocol import (
     Budget,
     FloatArray,
     ImplicitProblem,
-    Lookout,
     SolverOptions,
     Statistics,
     Status,

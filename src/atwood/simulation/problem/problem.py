@@ -17,7 +17,8 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.dae import keep_constraints
 from atwood.forms.kept import Key
 from atwood.forms.program import FormProgram
-from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks
+from atwood.integrators.compiled_functions import NativeCallbacks
+from atwood.integrators.protocol import ImplicitProblem, LinearSolver
 from atwood.late import dataclass
 from atwood.linalg.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of

@@ -34,8 +34,9 @@ from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.choice import Choice, check_solver, choose
 from atwood.simulation.run.made import Run, as_asked
+from atwood.simulation.run.outcome import Outcome, Segment
 from atwood.simulation.run.record import Recorder, SegmentRecord
-from atwood.simulation.run.segment import Outcome, Segment, run_segment
+from atwood.simulation.run.segment import run_segment
 from atwood.simulation.run.session import KeptSession
 from atwood.simulation.run.tolerances import allowed
 from atwood.stages import stage

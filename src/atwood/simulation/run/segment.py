@@ -14,100 +14,29 @@ from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.integrators.explicit_session import SamplingSession
 from atwood.integrators.protocol import Budget, FloatArray, ReadingSession, Session, Statistics, Status, StepResult
-from atwood.late import dataclass
 from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
 )
 from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.dynamics.undefined_values import find_undefined_value, states_ahead
-from atwood.simulation.events.modes import EventProbe, EventRecord
-from atwood.simulation.problem.options import RunOptions, Samples
+from atwood.simulation.events.modes import EventRecord
 from atwood.simulation.problem.preparation import pack_state
-from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely
-from atwood.simulation.run.choice import Choice, dead_centre, stiffness_of, turned_stiff
+from atwood.simulation.run.choice import dead_centre, stiffness_of, turned_stiff
+from atwood.simulation.run.outcome import Outcome, Segment
 from atwood.simulation.run.record import Recorder
-from atwood.simulation.run.session import KeptSession, SolverRequest, open_explicit_session, open_implicit_session
+from atwood.simulation.run.session import SolverRequest, open_explicit_session, open_implicit_session
 from atwood.simulation.run.tolerances import too_tight
 
 if TYPE_CHECKING:
     from atwood.simulation.singular.crossing import SingularCrossing
     from atwood.simulation.singular.monitor import SingularityMonitor
 
-__all__ = ["Outcome", "Segment", "run_segment"]
+__all__ = ["run_segment"]
 
 _BLOCKS = 50
 """Progress is told about so many times."""
-
-
-@dataclass(frozen=True, eq=False)
-class Segment:
-    """What one stretch is to be.
-
-    Attributes
-    ----------
-    plan, probe
-        The scene in its mode, and what is watched.
-    options
-        What the run was asked for.
-    choice
-        What solves it, at first.
-    samples
-        Samples, of which the last is its end.
-    first_shown
-        Whether the start is an output.
-    spent
-        What the run has cost before.
-    kept
-        The session of an explicit method that the run has opened before.
-    """
-
-    plan: Plan
-    probe: EventProbe
-    options: RunOptions
-    choice: Choice
-    samples: Samples
-    first_shown: bool
-    spent: Statistics
-    kept: KeptSession
-
-    @property
-    def end(self) -> float:
-        """Where it ends if nothing happens before."""
-        return float(self.samples.times[-1])
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """How a stretch ended.
-
-    Attributes
-    ----------
-    t
-        When.
-    status, message
-        Why: ``"finished"``, ``"event"``, or as in `atwood.simulation.run.run.Run`.
-    statistics
-        What it cost.
-    event
-        The event that ended it.
-    choices
-        What solved it, one after the other.
-    error
-        What went wrong, where that names a part.
-    noted
-        Events on the way that change nothing.
-    """
-
-    t: float
-    status: str
-    message: str
-    statistics: Statistics
-    choices: tuple[Choice, ...]
-    event: EventRecord | None = None
-    error: SolveError | None = None
-    noted: tuple[EventRecord, ...] = ()
 
 
 def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u: FloatArray) -> Outcome:

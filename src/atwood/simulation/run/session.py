@@ -8,17 +8,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from atwood.errors import UsageError
+from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession, Leave
-from atwood.integrators.protocol import (
-    Budget,
-    FloatArray,
-    ImplicitProblem,
-    LinearSolver,
-    NativeCallbacks,
-    Session,
-    SolverOptions,
-)
+from atwood.integrators.protocol import Budget, FloatArray, ImplicitProblem, LinearSolver, Session, SolverOptions
 from atwood.late import dataclass
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe

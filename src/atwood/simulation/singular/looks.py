@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from atwood.forms.kept import Key
-from atwood.integrators.protocol import FloatArray, Lookout
+from atwood.integrators.compiled_functions import Lookout
+from atwood.integrators.protocol import FloatArray
 from atwood.simulation.problem.problem import Plan
 
 if TYPE_CHECKING:

@@ -13,7 +13,8 @@ import time
 import numpy as np
 
 from atwood.errors import AtwoodError, SolveError
-from atwood.integrators.protocol import FloatArray, Lookout, Status, StepResult
+from atwood.integrators.compiled_functions import Lookout
+from atwood.integrators.protocol import FloatArray, Status, StepResult
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely, project_states
 from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow
