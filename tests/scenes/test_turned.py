@@ -283,8 +283,8 @@ def test_shares_that_are_open_do_not_depend_on_the_unit_of_length(form: str) -> 
 # -- on what turns ----------------------------------------------------------------------------------------------------
 
 
-def run(scene: Scene, form: str) -> Result:
-    found = simulate(scene, form=form, rtol=1e-12, outputs=13)
+def run(scene: Scene, form: str, rtol: float = 1e-12) -> Result:
+    found = simulate(scene, form=form, rtol=rtol, outputs=13)
     assert found.status == "finished"
     return found
 
@@ -301,15 +301,34 @@ def apart(found: Result, expected: Result, stand: Stand) -> tuple[float, float]:
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize(("make", "form"), [(driven, "reduced"), (driven, "dae"), (governor, "reduced")])
-def test_what_is_redundant_changes_as_a_plate_turns(make: Callable[[Stand], Scene], form: str) -> None:
+@pytest.mark.parametrize(
+    ("make", "form", "rtol"),
+    [(driven, "reduced", 1e-13), (driven, "dae", 1e-13), (governor, "reduced", 1e-13), (governor, "dae", 3e-13)],
+)
+def test_what_is_redundant_changes_as_a_plate_turns(make: Callable[[Stand], Scene], form: str, rtol: float) -> None:
     """The plane of the four-bar turns through coordinate planes, so that other components follow from the rest."""
     stand = Stand(0.7)
-    found, expected = run(make(stand), form), run(make(UPRIGHT), form)
+    found, expected = run(make(stand), form, rtol), run(make(UPRIGHT), form, rtol)
     motion, forces = apart(found, expected, stand)
     assert motion < 1e-9
     assert forces < 3e-7
     assert max(found.energy.max_drift, expected.energy.max_drift) < 1e-7
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("angle", [2e-5, -1e-7, 1e-4, 1e-6, -3e-5])
+@pytest.mark.parametrize("form", FORMS)
+def test_a_plate_that_turns_may_stand_a_little_turned(form: str, angle: float) -> None:
+    """What a drive prescribes rounds also in rows that hold nothing: that is no contradiction of speeds."""
+    found = seen(driven(Stand(angle)), form)
+    assert (found.freedom, len(found.redundant)) == (1, 3 if form == "dae" else len(found.redundant))
+
+
+def test_speeds_that_contradict_a_drive_are_refused() -> None:
+    scene = driven(Stand(2e-5))
+    scene.start["pivot1.angular_velocity"] = 0.5
+    with pytest.raises(StartError, match=r"angular_velocity.*contradict"):
+        seen(scene, "reduced")
 
 
 def test_speeds_that_contradict_each_other_are_named() -> None:

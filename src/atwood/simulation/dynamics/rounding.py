@@ -134,6 +134,16 @@ class RowErrors:
         errors = np.where(is_followed, errors, np.maximum(errors, sizes))
         return self._shared(errors)
 
+    def of_values(self, t: float, q: FloatArray, scales: FloatArray) -> FloatArray:
+        """Return how far rounding can take values at a place where nothing moves by itself, shape (rows,).
+
+        Parameters
+        ----------
+        t, q, scales
+            See `near`.
+        """
+        return self._shared(_spread(self._rough(t, q, scales, 1.0)[0]))
+
     def _shared(self, errors: FloatArray) -> FloatArray:
         """Return for each condition the largest error of those of its law."""
         largest = np.zeros(len(errors))
