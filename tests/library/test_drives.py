@@ -156,6 +156,23 @@ def test_a_resistance_takes_a_constant_power_or_force_at_its_level(domain: str) 
     assert result.energy.max_drift < 1e-6
 
 
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("domain", BOTH)
+def test_a_source_may_follow_a_law_of_displacement_rate_and_time(domain: str, form: str) -> None:
+    """``v' = -v^3`` gives ``v = v0/sqrt(1 + 2 v0^2 t)``; a spring by a law, driven, oscillates as one."""
+    drive = Drive(domain)
+    a, b, c = drive.body("a", 2.0, 0.0, 1.5), drive.body("b", 3.0, 0.4), drive.body("c", 1.0)
+    drive.join("brake", "source", a, law="-2*v**3")
+    drive.join("spring", "source", b, c, law=lambda x, v, t: -12.0 * x + 0.6 * t, value=0.3)
+    result = simulate(drive.scene, t_end=2.0, form=form, rtol=1e-10)
+    t = result.time
+    assert_allclose(result[f"a.{drive.rate}"], 1.5 / np.sqrt(1.0 + 4.5 * t), atol=1e-7)
+    w = sqrt(12.0 / 0.75)
+    between = 0.025 + 0.05 * t + 0.375 * np.cos(w * t) - 0.05 / w * np.sin(w * t)
+    assert_allclose(result[f"b.{drive.place}"] - result[f"c.{drive.place}"], between, atol=1e-7)
+    assert result.energy.max_drift < 1e-6
+
+
 @pytest.mark.parametrize(("domain", "form", "space"), combinations())
 def test_a_source_between_two_bodies_follows_a_command(domain: str, form: str, space: str) -> None:
     drive = Drive(domain, space)

@@ -135,11 +135,14 @@ class Example:
         What its published signals are here.
     options
         Further arguments of `simulate`.
+    long
+        Whether a run takes tens of seconds.
     """
 
     make: Callable[[], Scene]
     signals: Mapping[str, Signal | str]
     options: Mapping[str, Any] = field(default_factory=dict)
+    long: bool = False
 
     def signal(self, name: str) -> Signal:
         """Return a signal by its name in Modelica."""

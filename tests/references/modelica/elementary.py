@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from math import pi, sqrt
 
 import numpy as np
+from scipy.optimize import root
 
-from atwood import Component, Scalar, Scene, cos, exp, sin
+from atwood import (
+    Component,
+    Load,
+    Point,
+    Scalar,
+    Scene,
+    Vector,
+    as_vector,
+    connector,
+    cos,
+    derivative,
+    dot,
+    exp,
+    force,
+    norm,
+    parameter,
+    sin,
+    solve_linear,
+    state,
+)
 from atwood_library import (
     Damper,
     Drive,
@@ -36,6 +56,54 @@ from .building import WORLD, Example, bar, box, cylinder, made, orientation, rot
 __all__ = ["EXAMPLES", "filtered_sine"]
 
 Z = (0.0, 0.0, 1.0)
+
+
+class Knot(Component):
+    """Three springs from points to a knot without mass, where their forces balance at any time.
+
+    The knot moves with the ends so that the balance stays: ``sum K_i (v_i - v) = 0`` with the matrix of a spring
+    ``K = k e e + T/l (1 - e e)``, direction e, tension T and length l.
+    """
+
+    stiffness: tuple[float, float, float] = parameter((1.0, 1.0, 1.0), unit="N/m", size=3, doc="Of each spring.")
+    natural_length: float = parameter(0.1, unit="m", minimum=0.0, doc="Of all springs.")
+    a: Point = connector(Point, "The end of the first spring.")
+    b: Point = connector(Point, "The end of the second spring.")
+    c: Point = connector(Point, "The end of the third spring.")
+    x: Scalar = state(0.0, unit="m", doc="Place of the knot.")
+    y: Scalar = state(0.0, unit="m", doc="Place of the knot.")
+    z: Scalar = state(0.0, unit="m", doc="Place of the knot.")
+
+    def springs(self) -> list[tuple[Point, Vector, Scalar, Scalar, Scalar]]:
+        """Return ends, directions to them, lengths, stiffnesses and tensions."""
+        knot, found = Vector(self.x, self.y, self.z), []
+        k = as_vector(self.stiffness)
+        for end, stiffness in ((self.a, k.x), (self.b, k.y), (self.c, k.z)):
+            way = end.position - knot
+            length = norm(way)
+            found.append((end, way / length, length, stiffness, stiffness * (length - self.natural_length)))
+        return found
+
+    @derivative("x", "y", "z")
+    def rates(self) -> tuple[Scalar, Scalar, Scalar]:
+        """Return the velocity of the knot."""
+        matrix: list[list[Scalar]] = [[0.0] * 3 for _ in range(3)]
+        right: list[Scalar] = [0.0] * 3
+        for end, e, length, stiffness, tension in self.springs():
+            across = tension / length
+            pulled = end.velocity * across + e * ((stiffness - across) * dot(e, end.velocity))
+            for i, one in enumerate(e):
+                right[i] = right[i] + list(pulled)[i]
+                for j, other in enumerate(e):
+                    matrix[i][j] = matrix[i][j] + (stiffness - across) * one * other + (across if i == j else 0.0)
+        x, y, z = solve_linear(matrix, right)
+        return x, y, z
+
+    @force
+    def pull(self) -> Iterable[Load]:
+        """Return what the springs pull their ends with."""
+        for end, e, _, _, tension in self.springs():
+            yield Load(end, e * -tension)
 
 
 def double_pendulum() -> Scene:
@@ -378,6 +446,35 @@ def surfaces() -> Scene:
     )
 
 
+def three_springs() -> Scene:
+    """Return a body that hangs on three springs, which meet in a point without mass."""
+    ends, stiffness = np.array([(0.3, 0.0, 0.0), (0.0, 0.0, 0.3), (0.5, -0.3, 0.0)]), np.array([20.0, 20.0, 40.0])
+
+    def unbalanced(knot: np.ndarray) -> np.ndarray:
+        ways = ends - knot
+        lengths = np.linalg.norm(ways, axis=1)
+        balance: np.ndarray = (stiffness * (1.0 - 0.1 / lengths)) @ ways
+        return balance
+
+    knot = root(unbalanced, ends.mean(axis=0), tol=1e-14).x
+    start = {f"place.position.{axis}": value for axis, value in zip("xyz", (0.5, -0.3, 0.0), strict=True)}
+    start |= {f"{what}.{axis}": 0.0 for what in ("place.velocity", "body1.spin") for axis in "xyz"}
+    return made(
+        {
+            "ground1": Ground(position=(0.3, 0.0, 0.0)),
+            "ground2": Ground(position=(0.0, 0.0, 0.3)),
+            "springs": Knot(stiffness=tuple(stiffness)),
+            "body1": RigidBody(mass=0.8, center=(0.0, -0.2, 0.0), moments=(0.1, 0.1, 0.1)),
+            "place": PositionSensor(),
+        },
+        "ground1.frame - springs.a, ground2.frame - springs.b, body1.frame - springs.c - place.point",
+        start
+        | {f"springs.{axis}": value for axis, value in zip("xyz", knot, strict=True)}
+        | orientation("body1", rotation("")),
+        **WORLD,
+    )
+
+
 def filtered_sine(amplitude: float, frequency: float) -> Callable[[Scalar], Scalar]:
     """Return what the filter in Modelica's sources of position makes of a sine, as a function of time.
 
@@ -519,6 +616,14 @@ EXAMPLES = {
         },
     ),
     "Surfaces": Example(surfaces, {"prismatic.s": "place.position.x", "prismatic.v": "place.velocity.x"}),
+    "ThreeSprings": Example(
+        three_springs,
+        {
+            **_vector("body1.frame_a.r_0", "place.position"),
+            **_vector("body1.v_0", "place.velocity"),
+            **_vector("body1.w_a", "body1.spin"),
+        },
+    ),
     "UserDefinedGravityField": Example(user_defined_gravity_field, _hinges("rev")),
 }
 """By the name of the model."""

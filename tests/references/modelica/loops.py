@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from math import pi
+from collections.abc import Callable
+from math import asin, cos, pi, radians, sin, sqrt
 
-from atwood import Component, CoordinateLoad, Scalar, Scene, Slide, connector, force, parameter, select
+from atwood import Component, Scalar, Scene, select
 from atwood_library import (
+    FirstOrder,
     Ground,
     Inertia,
     Pivot,
+    PointOnLine,
     RigidBody,
     Rod,
     RotaryDrive,
     RotationalCoupling,
+    RotationalResistance,
     Slider,
+    TranslationalSource,
     Weld,
 )
 
-from .building import WORLD, Example, bar, box, cylinder, made
+from .building import WORLD, Example, bar, box, cylinder, made, overlong
 from .elementary import filtered_sine
 
 __all__ = ["EXAMPLES"]
@@ -26,32 +30,28 @@ __all__ = ["EXAMPLES"]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
-class GasForce(Component):
-    """The force of the gas in a cylinder, a rough law of Modelica's engines: as it expands and as it shrinks."""
+def gas(stroke: float, diameter: float = 0.1) -> TranslationalSource:
+    """Return the force of the gas in a cylinder by GasForce2, a rough law of Modelica's engines.
 
-    stroke: float = parameter(0.35, unit="m", above=0.0, doc="Length of the cylinder.")
-    diameter: float = parameter(0.1, unit="m", above=0.0, doc="Diameter of the cylinder.")
-    piston: Slide = connector(Slide, "The distance of the piston from the end of the cylinder.")
+    The displacement is the distance of the piston from the end of the cylinder; the law differs as the gas expands and
+    as it shrinks.
+    """
 
-    def pressure(self) -> Scalar:
-        """Return the pressure, Pa, with the coefficients of GasForce2."""
-        x = 1.0 - self.piston.value / self.stroke
+    def law(x: Scalar, v: Scalar) -> Scalar:
+        place = 1.0 - x / stroke
         shrinks = select(
-            x < 0.986061,
-            _polynomial(x, 177.4132, -287.2189, 151.8252, -24.9973, 2.4),
-            _polynomial(x, 2836360.0, -10569296.0, 14761814.0, -9158505.0, 2129670.0),
+            place < 0.986061,
+            _polynomial(place, 177.4132, -287.2189, 151.8252, -24.9973, 2.4),
+            _polynomial(place, 2836360.0, -10569296.0, 14761814.0, -9158505.0, 2129670.0),
         )
         expands = select(
-            x > 0.933,
-            _polynomial(x, -3929704.0, 14748765.0, -20747000.0, 12964477.0, -3036495.0),
-            _polynomial(x, 145.930, -131.707, 17.3438, 17.9272, 2.4),
+            place > 0.933,
+            _polynomial(place, -3929704.0, 14748765.0, -20747000.0, 12964477.0, -3036495.0),
+            _polynomial(place, 145.930, -131.707, 17.3438, 17.9272, 2.4),
         )
-        return 1e5 * select(self.piston.rate < 0.0, shrinks, expands)
+        return 1e5 * pi * diameter**2 / 4.0 * select(v < 0.0, shrinks, expands)
 
-    @force
-    def push(self) -> Iterable[CoordinateLoad]:
-        """Return the force on the piston."""
-        yield CoordinateLoad(self.piston, self.pressure() * pi * self.diameter**2 / 4.0)
+    return TranslationalSource(law=law)
 
 
 def _polynomial(x: Scalar, *coefficients: float) -> Scalar:
@@ -62,11 +62,11 @@ def _polynomial(x: Scalar, *coefficients: float) -> Scalar:
     return total
 
 
-def engine1a(gas: bool = False) -> Scene:
+def engine1a(burning: bool = False) -> Scene:
     """Return a cylinder of an engine: crank, connecting rod, piston and a flywheel."""
     return made(
         {
-            **({"gas": GasForce()} if gas else {}),
+            **({"gas": gas(0.35)} if burning else {}),
             "ground": Ground(),
             "above": Ground(position=(0.15, 0.45, 0.0)),
             "bearing": Pivot(axis=X),
@@ -86,7 +86,7 @@ def engine1a(gas: bool = False) -> Scene:
         """ground.frame - bearing.a, bearing.b - crank1.a, bearing.shaft - shaft.b, inertia.flange - shaft.a
         crank1.b - crank2.a, crank2.b - crank3.a - mid.a, crank3.b - crank4.a
         above.frame - cylinder.a, cylinder.b - piston.a, piston.b - b1.a, b1.b - rod.a, rod.b - b2.b, mid.b - b2.a"""
-        + ("\ncylinder.carriage - gas.piston" if gas else ""),
+        + ("\ncylinder.carriage - gas.b" if burning else ""),
         {"inertia.angle": 0.0, "inertia.angular_velocity": 10.0},
         **WORLD,
     )
@@ -94,7 +94,110 @@ def engine1a(gas: bool = False) -> Scene:
 
 def engine1b() -> Scene:
     """Return the cylinder with a gas force."""
-    return engine1a(gas=True)
+    return engine1a(burning=True)
+
+
+def engine_v6(
+    cylinder: Callable[[str], tuple[dict[str, Component], str]], length: float, throw: float, rod: float, torque: float
+) -> Scene:
+    """Return six cylinders in two rows, a load and a filter of the torque between them.
+
+    Parameters
+    ----------
+    cylinder
+        Returns the parts of a cylinder, and how they are joined, with `crank.a` at the crank and `row.a` at the row;
+        all names begin with its own. Its loop is closed in its plane alone, so that no reaction is left open.
+    length, throw, rod
+        Distance of one cylinder from the next, throw of the crank, length of the rod, m.
+    torque
+        Torque on the load at the start, at which the filter is at rest, N m.
+    """
+    rate = 2.0 * pi * 5.0 / sqrt(sqrt(2.0) - 1.0)
+    parts: dict[str, Component] = {
+        "ground": Ground(),
+        "bearing": Pivot(axis=X),
+        "crank": RigidBody(mass=0.0),
+        "load": Inertia(axis=X),
+        "fan": RotationalResistance(quadratic=100.0 / 200.0**2),
+        "sensor": RotationalCoupling(),
+        "filter1": FirstOrder(time_constant=1.0 / rate),
+        "filter2": FirstOrder(time_constant=1.0 / rate),
+    }
+    joined = """ground.frame - bearing.a, bearing.b - crank.frame
+    bearing.shaft - sensor.a, load.flange - sensor.b - fan.b
+    sensor.torque > filter1.u, filter1.y > filter2.u"""
+    guess = {}
+    for n, (turn, tilt) in enumerate(((-30, -30), (90, 30), (210, -30), (210, 30), (90, -30), (-30, 30))):
+        name = f"c{n + 1}"
+        more, text = cylinder(name)
+        parts |= more | {
+            f"{name}_turn": Weld(displacement=(n * length, 0.0, 0.0), axis=X, angle=radians(turn)),
+            f"{name}_tilt": Weld(displacement=(n * length, 0.0, 0.0), axis=X, angle=radians(tilt)),
+        }
+        joined += f"""
+        crank.frame - {name}_turn.a, {name}_turn.b - {name}_crank.a, ground.frame - {name}_tilt.a
+        {name}_tilt.b - {name}_row.a
+        {text}"""
+        apart = radians(turn - tilt)
+        lean = asin(throw * sin(apart) / rod)
+        guess[f"{name}_slider.displacement"] = 0.42 - 0.1 - throw * cos(apart) - rod * cos(lean)
+        guess[f"{name}_b1.angle"] = -lean - apart
+    start = {"load.angle": 0.0, "load.angular_velocity": 10.0, "filter1.y": torque, "filter2.y": torque}
+    scene = made(parts, joined, start, **WORLD)
+    scene.guess = guess
+    return scene
+
+
+def engine_v6_of_shapes() -> Scene:
+    """Return the engine with cranks, rods and pistons of steel."""
+
+    def cylinder_of(name: str) -> tuple[dict[str, Component], str]:
+        parts = {
+            "crank": overlong((0.1, 0.0, 0.0), cylinder((0.12, 0.0, 0.0), 0.05), (0.05, 0.0, 0.0)),
+            "web": box((0.0, 0.1, 0.0), 0.02, 0.05, X),
+            "pin": overlong((0.1, 0.0, 0.0), cylinder((0.12, 0.0, 0.0), 0.03), (0.05, 0.0, 0.0)),
+            "back": box((0.0, -0.1, 0.0), 0.02, 0.05, X),
+            "mid": Weld(displacement=(0.05, 0.0, 0.0)),
+            "row": Weld(displacement=(0.15, 0.42, 0.0)),
+            "slider": Slider(axis=(0.0, -1.0, 0.0)),
+            "piston": cylinder((0.0, 0.1, 0.0), 0.1),
+            "rod": overlong((0.0, 0.2, 0.0), box((0.0, 0.22, 0.0), 0.02, 0.06, X), (0.0, 0.09, 0.0)),
+            "b1": Pivot(axis=X),
+            "b2": PointOnLine(axis=X),
+            "gas": gas(0.22),
+        }
+        joined = f"""{name}_crank.b - {name}_web.a, {name}_web.b - {name}_pin.a - {name}_mid.a
+        {name}_pin.b - {name}_back.a
+        {name}_row.b - {name}_slider.a, {name}_slider.b - {name}_piston.b, {name}_piston.a - {name}_b2.a
+        {name}_mid.b - {name}_b1.a, {name}_b1.b - {name}_rod.a, {name}_rod.b - {name}_b2.b
+        {name}_slider.carriage - {name}_gas.b"""
+        return {f"{name}_{part}": component for part, component in parts.items()}, joined
+
+    return engine_v6(cylinder_of, 0.2, 0.1, 0.2, 563.186235502)
+
+
+def engine_v6_of_numbers() -> Scene:
+    """Return the engine with bodies given by mass and inertia."""
+
+    def cylinder_of(name: str) -> tuple[dict[str, Component], str]:
+        parts = {
+            "crank": Weld(displacement=(0.09, 0.05, 0.0)),
+            "row": Weld(displacement=(0.09, 0.42, 0.0)),
+            "slider": Slider(axis=(0.0, -1.0, 0.0)),
+            "piston": bar((0.0, 0.1, 0.0), 6.0, (0.0, 0.05, 0.0), 0.0088, 0.0076, 0.0088),
+            "rod": bar((0.0, 0.175, 0.0), 1.0, (0.0, 0.0875, 0.0), 0.006, 0.0005, 0.006),
+            "b1": Pivot(axis=X),
+            "b2": PointOnLine(axis=X),
+            "gas": gas(0.195),
+        }
+        joined = f"""{name}_row.b - {name}_slider.a, {name}_slider.b - {name}_piston.b, {name}_piston.a - {name}_b2.a
+        {name}_crank.b - {name}_b1.a, {name}_b1.b - {name}_rod.a, {name}_rod.b - {name}_b2.b
+        {name}_slider.carriage - {name}_gas.b"""
+        return {f"{name}_{part}": component for part, component in parts.items()}, joined
+
+    scene = engine_v6(cylinder_of, 0.14, 0.05, 0.175, 238.056148886)
+    scene.crank.mass, scene.crank.center, scene.crank.moments = 180.0, (0.3, 0.0, 0.0), (0.1, 0.1, 0.1)
+    return scene
 
 
 def _fourbar(parts: dict, joined: str) -> Scene:
@@ -181,10 +284,19 @@ def planar_loops() -> Scene:
     return made(parts, joined, None, **WORLD)
 
 
+_V6 = {
+    "filter.x[1]": "filter1.y",
+    "filter.x[2]": "filter2.y",
+    "load.phi": "load.angle",
+    "load.w": "load.angular_velocity",
+}
+
 EXAMPLES = {
     "Engine1a": Example(engine1a, {"inertia.phi": "inertia.angle", "inertia.w": "inertia.angular_velocity"}),
     "Engine1b": Example(engine1b, {"inertia.phi": "inertia.angle", "inertia.w": "inertia.angular_velocity"}),
     "Engine1b_analytic": Example(engine1b, {"inertia.phi": "inertia.angle", "inertia.w": "inertia.angular_velocity"}),
+    "EngineV6": Example(engine_v6_of_shapes, _V6, long=True),
+    "EngineV6_analytic": Example(engine_v6_of_numbers, _V6, long=True),
     "Fourbar1": Example(fourbar1, {"j1.phi": "j1.angle", "j1.w": "j1.angular_velocity"}),
     "Fourbar2": Example(fourbar2, {"j1.phi": "j1.angle", "j1.w": "j1.angular_velocity"}),
     "Fourbar_analytic": Example(fourbar2, {"j1.phi": "j1.angle", "j1.w": "j1.angular_velocity"}),
