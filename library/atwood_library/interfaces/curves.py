@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from typing import Any
 
 from atwood import AtwoodError, ParameterError
@@ -34,6 +35,18 @@ def check_curve(curve: Any, lower: float | None, upper: float | None, where: str
     """
     if lower is not None and upper is not None and lower >= upper:
         raise ParameterError(f"its upper end {upper:g} is not beyond its lower end {lower:g}", where=where)
+    said = _roughness(curve, lower, upper)
+    if said:
+        raise ParameterError(
+            said,
+            where=where,
+            advice="Give a curve that is smooth where the point goes; lower_end and upper_end say how far that is.",
+        )
+
+
+@lru_cache(maxsize=64)
+def _roughness(curve: Any, lower: float | None, upper: float | None) -> str:
+    """Return what makes a curve no smooth one; empty if nothing does."""
     low = lower if lower is not None else min(-_REACH, (upper or 0.0) - _REACH)
     high = upper if upper is not None else max(_REACH, (lower or 0.0) + _REACH)
     slope = curve.derivative("p")
@@ -51,23 +64,16 @@ def check_curve(curve: Any, lower: float | None, upper: float | None, where: str
         if sizes[i] <= sizes[i - 1] and sizes[i] <= sizes[i + 1] and sizes[i] < 0.2 * largest:
             p = _lowest(size, inside[i - 1], inside[i + 1])
             if size(p) < 1e-6 * largest:
-                raise _refused(f"the curve has a cusp at p = {p:.6g}, where its tangent is zero", where)
+                return f"the curve has a cusp at p = {p:.6g}, where its tangent is zero"
     for p in _corners(curve, inside):
         step = 1e-7 * max(1.0, abs(p))
         before, after = ([float(c) for c in curve(p + side * step)] for side in (-1.0, 1.0))
         if math.dist(before, after) > 1e-4 * max(largest, 1.0):
-            raise _refused(f"the curve jumps at p = {p:.6g}", where)
+            return f"the curve jumps at p = {p:.6g}"
         before, after = ([float(c) for c in slope(p + side * step)] for side in (-1.0, 1.0))
         if math.dist(before, after) > 1e-4 * largest:
-            raise _refused(f"the curve has a corner at p = {p:.6g}", where)
-
-
-def _refused(message: str, where: str) -> ParameterError:
-    return ParameterError(
-        message,
-        where=where,
-        advice="Give a curve that is smooth where the point goes, or say by lower_end and upper_end how far that is.",
-    )
+            return f"the curve has a corner at p = {p:.6g}"
+    return ""
 
 
 def _lowest(function: Callable[[float], float], low: float, high: float) -> float:
