@@ -10,7 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, cos, jacobian, live, sin, solve, substitute
+from atwood.expr import (
+    Expression,
+    InputGroup,
+    OutputGroup,
+    Program,
+    cos,
+    depends_on,
+    jacobian,
+    live,
+    sin,
+    solve,
+    substitute,
+)
 from atwood.forms.accelerations import AccelerationProgram
 from atwood.forms.loops.branches import ClosedLoops, Group
 from atwood.late import dataclass
@@ -53,8 +65,11 @@ def closed_form(
     parameters: Sequence[Expression],
     loops: ClosedLoops,
     rows: Sequence[Expression] | None = None,
-) -> ClosedForm:
+) -> ClosedForm | None:
     """Return the programs of a mechanism whose loops are solved by formulas.
+
+    None where a dependent coordinate is read otherwise than by its sine and cosine, as by a law in a sum with another
+    angle that is not one of the mechanism.
 
     Parameters
     ----------
@@ -92,6 +107,9 @@ def closed_form(
     looked_at = substitute(looked_at, places) if places and looked_at else looked_at
     cut = len(looked_at) - len(beside)
     watched = OutputGroup("ahead", tuple(looked_at[:cut])), OutputGroup("beside", tuple(looked_at[cut:]))
+    dependent = [*(one for i, one in enumerate(q) if i not in free), *(one for i, one in enumerate(u) if i not in free)]
+    if any(depends_on(one, dependent) for one in (*found, *places.values(), *speeds.values(), *looked_at)):
+        return None
     title = f"{name} (closed form)"
     accelerations = Program(f"{title} accelerations", inputs, known, (OutputGroup("accelerations", tuple(found)),))
     return ClosedForm(
