@@ -10,7 +10,8 @@ from atwood import Component
 from atwood.cli import main
 from atwood.cli.parts import parts_called
 
-PARTS = [name for name in atwood_library.__all__ if issubclass(getattr(atwood_library, name), Component)]
+OFFERED = {name: getattr(atwood_library, name) for name in atwood_library.__all__}
+PARTS = [name for name, one in OFFERED.items() if isinstance(one, type) and issubclass(one, Component)]
 
 
 def run(*arguments: str) -> Result:
