@@ -197,6 +197,20 @@ def test_what_falls_keeps_its_momentum_across(seed: int) -> None:
     assert abs(np.dot(about.direction, down)) == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("away", [100.0, 1e4, -3e6])
+def test_far_from_the_origin_nothing_else_is_conserved(away: float) -> None:
+    shift = np.array([away, 0.5 * away, 3.0])
+    found = conserved(hanging(np.eye(3), shift))
+    assert found.names == ("h", "L.z")
+    assert found["L.z"].point == pytest.approx((away, 0.5 * away, 0.0), rel=1e-9)
+
+
+@pytest.mark.parametrize(("size", "mass", "constant"), [(1e-9, 1e-26, 1.0), (1e11, 1e30, 6.67e-11)])
+def test_atoms_and_planets(size: float, mass: float, constant: float) -> None:
+    scene = SCENES["two-body"](mass1=2.0 * mass, mass2=mass, constant=constant, semi_major_axis=size)
+    assert conserved(scene).names == ("h", "P.x", "K.x", "P.y", "K.y", "P.z", "K.z", "L.x", "L.y", "L.z")
+
+
 # -- what is not conserved --------------------------------------------------------------------------------------------
 
 

@@ -14,7 +14,14 @@ from dataclasses import replace
 import numpy as np
 
 from atwood.analysis.conservation.directions import axis_name, axis_text, planar_point, rotations_of, straight_of
-from atwood.analysis.conservation.invariance import KEPT, conserved_directions, is_constant, is_kept, readable_basis
+from atwood.analysis.conservation.invariance import (
+    KEPT,
+    about_center,
+    conserved_directions,
+    is_constant,
+    is_kept,
+    readable_basis,
+)
 from atwood.analysis.conservation.proof import Generator, Prover
 from atwood.analysis.conservation.quantities import Quantities
 from atwood.analysis.conservation.states import RandomStates, State
@@ -31,6 +38,9 @@ __all__ = ["Finding", "Findings", "find_conserved"]
 
 _FEW = 24
 """Up to so many velocities each momentum is looked at; beyond, those whose force is zero as it is written."""
+
+_FAR = 10.0
+"""In sizes of the scene: beyond that far from the origin, angular momenta are compared about the middle of it."""
 
 _ALIKE = 1e-11
 """Relative to the largest: values of one quantity, computed in two ways."""
@@ -136,7 +146,7 @@ class _Search:
         count = max(12, len(found.velocities) + 6) if len(found.velocities) <= _FEW else 12
         self.states = states.draw(count)
         if not self.states:
-            self.notes.append("its laws have no value at random states near its start, so nothing was checked")
+            self.notes.append(f"nothing could be checked at random states near its start: {states.reason}")
             return Findings((), tuple(self.notes))
         self._energy(energy, total, states.is_plain)
         for number, k in zip(momenta, plain, strict=True):
@@ -214,10 +224,16 @@ class _Search:
         motions, n = self.quantities.motions, len(linear)
         length = scene_length(self.assembly)
         units = np.array([1.0] * n + [length] * len(angular))
-        kept = conserved_directions(self.states, [*linear, *angular], units)
+        center = self.quantities.center()
+        if float(np.max(np.abs(center), initial=0.0)) > _FAR * length:
+            there, matrix = about_center(self.states, linear, angular, center, length)
+            kept = matrix @ conserved_directions(there, range(len(units)), units)
+        else:
+            kept = conserved_directions(self.states, [*linear, *angular], units)
         if not kept.shape[1]:
             return
-        straight = straight_of(kept, n)
+        scaled = kept * units[:, None]
+        straight = straight_of(scaled, n)
         for axis in straight.T:
             value, numeric = self._combined(axis, motions.momentum, linear)
             d = self._in_world(axis)
@@ -228,7 +244,8 @@ class _Search:
                 self._take(f"P{name}", "linear momentum", "kg*m/s", told, value, proven, numeric, tuple(d))
             if moments:
                 self._boost(axis, name, told, moments, linear, angular)
-        for axis, about in rotations_of(kept, n, straight):
+        for axis, moved in rotations_of(scaled, n, straight):
+            about = length * moved  # a rotation in its own units
             coefficients = np.concatenate([about, axis])
             every = [*motions.momentum, *motions.angular_momentum]
             value, numeric = self._combined(coefficients, every, [*linear, *angular])

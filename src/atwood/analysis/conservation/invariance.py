@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from atwood.analysis.conservation.states import State
 from atwood.arrays import FloatArray
 
-__all__ = ["KEPT", "conserved_directions", "is_constant", "is_kept", "readable_basis"]
+__all__ = ["KEPT", "about_center", "conserved_directions", "is_constant", "is_kept", "readable_basis"]
 
 KEPT = 1e-9
 """Relative to its terms: how well the rate of a quantity must vanish at each state."""
@@ -64,6 +65,44 @@ def conserved_directions(states: Sequence[State], numbers: Sequence[int], units:
     vectors, sizes, _ = np.linalg.svd(rest, full_matrices=False)
     found = vectors[:, sizes > 0.5]
     return np.asarray(found / units[:, None])
+
+
+def about_center(
+    states: Sequence[State], linear: Sequence[int], angular: Sequence[int], center: FloatArray, length: float
+) -> tuple[list[State], FloatArray]:
+    """Return total momenta with angular ones about another point than the origin, and how these are made of the first.
+
+    Far away from the origin, what breaks a symmetry is little beside the angular momentum about it.
+
+    Parameters
+    ----------
+    states
+        The quantities at random states.
+    linear, angular
+        Which of them are total momenta.
+    center, length
+        The point, and the size of the scene.
+
+    Returns
+    -------
+    states, matrix
+        States with the total momenta alone, linear ones first, and their coefficients in terms of those about the
+        origin, as columns.
+    """
+    n, m, own = len(linear), len(angular), [*linear, *angular]
+    matrix = np.eye(n + m)
+    if m == 1:  # in the plane, counter-clockwise: r x p = x p_z - z p_x
+        matrix[:n, n] = [center[1], -center[0]]
+    elif m:
+        x, y, z = center
+        matrix[:n, n:] = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]).T
+    found = []
+    for one in states:
+        terms = one.terms[own].copy()
+        terms[n:] = length * np.max(terms[:n]) + 1e-4 * terms[n:]
+        values, rates = one.values[own] @ matrix, one.rates[own] @ matrix
+        found.append(replace(one, values=values, rates=rates, terms=terms, generators=one.generators[own]))
+    return found, matrix
 
 
 def _null_space(matrix: FloatArray) -> FloatArray:

@@ -10,6 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
+import numpy as np
+
+from atwood.arrays import FloatArray
 from atwood.expr import Expression, affine_coefficients, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
@@ -17,6 +20,8 @@ from atwood.forms.places import to_maximal
 from atwood.late import dataclass
 from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.mechanics.outputs.observables import add_up
+from atwood.simulation.dynamics.orientation_coordinates import from_regular
+from atwood.simulation.initialization.start import find_start
 from atwood.topology.spanning_forest import Attachment
 
 __all__ = ["Motions", "Quantities"]
@@ -108,6 +113,16 @@ class Quantities:
         turns = {"space": ("x", "y", "z"), "plane": ("",)}.get(space.name, ())
         n, m = count, count + len(spins)
         return Motions(space.axis_names, tuple(every[:n]), turns, tuple(every[n:m]), tuple(every[m:]))
+
+    def center(self) -> FloatArray:
+        """Return the mean place of the bodies where the scene starts, along the axes of the scene, m."""
+        assembly, start = self.assembly, find_start(self.assembly)
+        q = from_regular(assembly, start.coordinates)
+        places = np.asarray(assembly.kernel(to_maximal(assembly))([start.time], q, start.speeds)[0], dtype=float)
+        count = len(assembly.mechanism.space.basis)
+        every = [places[list(one.coordinates)] for one in assembly.maximal.forest.attachments]
+        free = [one for one in every if len(one) == count]
+        return np.mean(free, axis=0) if free else np.zeros(count)
 
     def _in_generalized(self, values: Sequence[Expression]) -> list[Expression]:
         """Return expressions of maximal coordinates in terms of generalized ones and their velocities."""

@@ -36,6 +36,12 @@ _SEED = 19180726
 _REACHES = (1.0, 0.3, 0.1)
 """How far states are from the start, in sizes of the scene and radians; nearer where constraints are not met there."""
 
+_DECADES = 5.0
+"""Every second state is nearer and slower by up to so many powers of ten."""
+
+_TRIALS = 9
+"""For each state that is wanted, so many are tried."""
+
 _MET = 1e-9
 """Relative to the sizes of the scene: how well constraints hold at a state."""
 
@@ -107,6 +113,7 @@ class RandomStates:
         program = Program(f"{assembly.flat.name} conserved", own.program.inputs, assembly.parameters, outputs)
         moving = {*e.coordinates, *e.speeds}
         self._free = loosen(program, _Relations(assembly.relations), moving)
+        self.reason = "constraints are not met near its start"
         self._kernel = compile_program(self._free.program)
         self._probe = compile_program(self._free.probe)
 
@@ -116,7 +123,7 @@ class RandomStates:
         return self._free.is_plain
 
     def draw(self, count: int) -> list[State]:
-        """Return quantities at so many random states, fewer where laws have no value at most places.
+        """Return quantities at so many random states; none where constraints or laws allow too few.
 
         Parameters
         ----------
@@ -135,21 +142,24 @@ class RandomStates:
         pace = self._pace(start.time, q0, start.speeds, sizes)
         span = max(self.assembly.flat.t_end - start.time, 1.0 / pace)
         found: list[State] = []
-        for trial in range(6 * count):
-            reach = _REACHES[trial * len(_REACHES) // (6 * count)]
+        for trial in range(_TRIALS * count):
+            reach = _REACHES[trial * len(_REACHES) // (_TRIALS * count)]
             t = start.time + span * float(random.uniform())
-            step = reach * sizes * random.uniform(-1.0, 1.0, len(sizes))
-            u = pace * sizes * random.uniform(-1.0, 1.0, len(sizes))
+            # What a scene is far away from makes its size: some states are near by and slow beside that.
+            near, slow = (10.0 ** -random.uniform(0.0, _DECADES, 2)) if trial % 2 else (1.0, 1.0)
+            step = near * reach * sizes * random.uniform(-1.0, 1.0, len(sizes))
+            u = slow * pace * sizes * random.uniform(-1.0, 1.0, len(sizes))
             try:
                 q = self._balance.kinematic_map.moved(t, q0, step)
                 q, u = self._balance.project(t, q, u, sizes)
-                if self._is_met(t, q, u, sizes, pace):
+                if self._is_met(t, q, u, sizes, slow * pace):
                     found.append(self._at(t, q, u, sizes, random, len(found)))
-            except (AtwoodError, ArithmeticError, np.linalg.LinAlgError):
+            except (AtwoodError, ArithmeticError, np.linalg.LinAlgError) as error:
+                self.reason = str(error)
                 continue
             if len(found) == count:
                 break
-        return found
+        return found if len(found) == count else []
 
     def _pace(self, t: float, q: FloatArray, u: FloatArray, sizes: FloatArray) -> float:
         """Return how fast things happen, 1/s."""
@@ -201,6 +211,7 @@ class RandomStates:
         slopes = slopes.reshape(self._count, -1)
         still = np.zeros_like(gamma)
         flows = [solve_balance(replace(now, bias=-one, gamma=still), kept, t)[0] for one in slopes[:, -n:]]
-        return State(
-            t, q, u, quantities, slopes @ along, np.abs(slopes) @ np.abs(along), np.reshape(flows, (self._count, n))
-        )
+        # Accelerations are known as well as the largest of them, each in its own size.
+        fastest = sizes * float(np.max(np.abs(a) / sizes, initial=0.0))
+        terms = np.abs(slopes) @ np.concatenate([[1.0], np.abs(rates), np.maximum(np.abs(a), fastest)])
+        return State(t, q, u, quantities, slopes @ along, terms, np.reshape(flows, (self._count, n)))

@@ -82,9 +82,10 @@ def check_symmetry(symmetry: Symmetry, quantities: Quantities, prover: Prover, f
     value = add_up([found.graph.zero, *(momenta[k] * w for k, w in generator.items())]) - f
     if all(one.is_zero for one in generator.values()):
         raise UsageError("its generator displaces nothing", where=f"{scene}: {symmetry.name}")
-    states = RandomStates(quantities.assembly, quantities.on_speeds([value])).draw(_STATES)
+    drawn = RandomStates(quantities.assembly, quantities.on_speeds([value]))
+    states = drawn.draw(_STATES)
     if not states:
-        raise UsageError("its laws have no value at random states near its start", where=scene)
+        raise UsageError(f"nothing could be checked at random states near its start: {drawn.reason}", where=scene)
     worst = max(states, key=lambda one: abs(float(one.rates[0])) / (float(one.terms[0]) or 1.0))
     if abs(float(worst.rates[0])) > KEPT * float(worst.terms[0]):
         raise UsageError(
