@@ -31,7 +31,6 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.mechanics.outputs.observables import add_up
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
-from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.events.modes import find_event_functions
 
 __all__ = ["Finding", "Findings", "find_conserved"]
@@ -144,7 +143,7 @@ class _Search:
         moments = self.add(motions.moments)
         states = RandomStates(self.assembly, q.on_speeds(self._values))
         count = max(12, len(found.velocities) + 6) if len(found.velocities) <= _FEW else 12
-        self.states = states.draw(count)
+        self.states = states.draw(count, q.center[1])
         if not self.states:
             self.notes.append(f"nothing could be checked at random states near its start: {states.reason}")
             return Findings((), tuple(self.notes))
@@ -222,9 +221,8 @@ class _Search:
 
     def _totals(self, linear: Sequence[int], angular: Sequence[int], moments: Sequence[int]) -> None:
         motions, n = self.quantities.motions, len(linear)
-        length = scene_length(self.assembly)
+        center, length = self.quantities.center
         units = np.array([1.0] * n + [length] * len(angular))
-        center = self.quantities.center()
         if float(np.max(np.abs(center), initial=0.0)) > _FAR * length:
             there, matrix = about_center(self.states, linear, angular, center, length)
             kept = matrix @ conserved_directions(there, range(len(units)), units)
@@ -262,10 +260,10 @@ class _Search:
             direction, point, pitch = axis, np.cross(axis, about) / size, float(axis @ about) / size
             name = axis_name(axis)
             told = f"angular momentum about {axis_text(axis)}"
-        point = np.where(np.abs(point) < 1e-9 * scene_length(self.assembly), 0.0, point)
+        point = np.where(np.abs(point) < 1e-9 * self.quantities.center[1], 0.0, point)
         if np.any(point):
             told += f" through {axis_text(point)} m"
-        if abs(pitch) > 1e-9 * scene_length(self.assembly):
+        if abs(pitch) > 1e-9 * self.quantities.center[1]:
             told = f"{told}, with {pitch:.6g} m of the linear momentum along it (a screw)"
         if self._is_known(numeric, told):
             return

@@ -18,6 +18,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.forms.places import to_maximal
 from atwood.late import dataclass
+from atwood.mechanics.build import extent
 from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.mechanics.outputs.observables import add_up
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
@@ -114,15 +115,20 @@ class Quantities:
         n, m = count, count + len(spins)
         return Motions(space.axis_names, tuple(every[:n]), turns, tuple(every[n:m]), tuple(every[m:]))
 
-    def center(self) -> FloatArray:
-        """Return the mean place of the bodies where the scene starts, along the axes of the scene, m."""
+    @cached_property
+    def center(self) -> tuple[FloatArray, float]:
+        """Mean place of the bodies at the start, along the axes of the scene, and the size of the scene about it, m."""
         assembly, start = self.assembly, find_start(self.assembly)
         q = from_regular(assembly, start.coordinates)
         places = np.asarray(assembly.kernel(to_maximal(assembly))([start.time], q, start.speeds)[0], dtype=float)
         count = len(assembly.mechanism.space.basis)
         every = [places[list(one.coordinates)] for one in assembly.maximal.forest.attachments]
         free = [one for one in every if len(one) == count]
-        return np.mean(free, axis=0) if free else np.zeros(count)
+        if not free:
+            return np.zeros(count), start.length
+        middle = np.mean(free, axis=0)
+        apart = float(np.max(np.linalg.norm(np.array(free) - middle, axis=1)))
+        return middle, max(extent(assembly.mechanism), apart) or start.length
 
     def _in_generalized(self, values: Sequence[Expression]) -> list[Expression]:
         """Return expressions of maximal coordinates in terms of generalized ones and their velocities."""

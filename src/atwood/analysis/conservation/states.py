@@ -122,13 +122,15 @@ class RandomStates:
         """Whether neither a relation of time nor a switch decides anything."""
         return self._free.is_plain
 
-    def draw(self, count: int) -> list[State]:
+    def draw(self, count: int, length: float) -> list[State]:
         """Return quantities at so many random states; none where constraints or laws allow too few.
 
         Parameters
         ----------
         count
             How many.
+        length
+            Size of the scene, m.
 
         Raises
         ------
@@ -137,7 +139,7 @@ class RandomStates:
         """
         start = find_start(self.assembly)
         random = np.random.default_rng(_SEED)
-        sizes = motion_scales(self._equations, start.length)
+        sizes = motion_scales(self._equations, length)
         q0 = from_regular(self.assembly, start.coordinates)
         pace = self._pace(start.time, q0, start.speeds, sizes)
         span = max(self.assembly.flat.t_end - start.time, 1.0 / pace)

@@ -83,7 +83,7 @@ def check_symmetry(symmetry: Symmetry, quantities: Quantities, prover: Prover, f
     if all(one.is_zero for one in generator.values()):
         raise UsageError("its generator displaces nothing", where=f"{scene}: {symmetry.name}")
     drawn = RandomStates(quantities.assembly, quantities.on_speeds([value]))
-    states = drawn.draw(_STATES)
+    states = drawn.draw(_STATES, quantities.center[1])
     if not states:
         raise UsageError(f"nothing could be checked at random states near its start: {drawn.reason}", where=scene)
     worst = max(states, key=lambda one: abs(float(one.rates[0])) / (float(one.terms[0]) or 1.0))
