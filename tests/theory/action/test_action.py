@@ -8,7 +8,9 @@ import pytest
 from atwood import Scene, SolveError, UnsupportedError, UsageError, action, connect, motions_between, simulate
 from atwood_library import Ground, Mass1D, Spring
 from atwood_library.scenes import (
+    ChargedParticle,
     DoublePendulum,
+    DrivenPendulum,
     ElasticPendulum,
     FallingWithDrag,
     FourBar,
@@ -49,7 +51,11 @@ def test_derivatives_of_s_are_momentum_and_energy():
     assert by_time == pytest.approx(-0.125, abs=1e-5)
 
 
-@pytest.mark.parametrize("scene", [pendulum(), DoublePendulum(), ElasticPendulum()], ids=["one", "two", "spring"])
+@pytest.mark.parametrize(
+    "scene",
+    [pendulum(), DoublePendulum(), ElasticPendulum(), ChargedParticle(), DrivenPendulum()],
+    ids=["one", "two", "spring", "magnetic", "driven"],
+)
 def test_the_first_variation_is_zero_on_motions(scene):
     found = action(scene, t_end=2.0).variation()
     assert found.largest < 1e-10
@@ -161,6 +167,14 @@ def test_ends_that_no_motion_joins_are_one_error():
     assert motion.is_minimum
     (later,) = motions_between(Oscillator(), {path: 1.3}, t_end=1.2 * np.pi)
     np.testing.assert_allclose(later.conjugate_times, [0.5 * np.pi, np.pi], rtol=1e-6)
+
+
+def test_the_principal_function_of_the_oscillator():
+    """``S = m w ((a^2 + b^2) cos(w T) - 2 a b)/(2 sin(w T))`` from a to b (Landau and Lifshitz, section 43)."""
+    (motion,) = motions_between(Oscillator(), {"mass.displacement": 1.3}, t_end=1.0)
+    a, b, w = 0.5, 0.3, 2.0
+    value = w * ((a * a + b * b) * np.cos(w) - 2.0 * a * b) / (2.0 * np.sin(w))
+    assert motion.action.value == pytest.approx(value, rel=1e-10)
 
 
 def test_ends_are_coordinates_of_the_scene():

@@ -30,6 +30,14 @@ def test_kepler_separates_in_polar_and_parabolic_coordinates():
     assert not separation(scene, {"body.position.x": "a*b", "body.position.z": "a + b"}).separates
 
 
+def test_kepler_separates_in_elliptic_coordinates_and_with_a_field_in_parabolic_ones():
+    """One focus is the centre; in a uniform field along the axis, as of weight, polar coordinates do not do."""
+    elliptic = {"body.position.x": "cosh(u)*cos(v) - 1", "body.position.z": "sinh(u)*sin(v)"}
+    assert separation(Kepler(), elliptic).separates
+    assert separation(Kepler(gravity=0.3), PARABOLIC).separates
+    assert not separation(Kepler(gravity=0.3), POLAR).separates
+
+
 def test_three_bodies_do_not_separate():
     found = separation(NBody())
     assert not found.separates
@@ -145,5 +153,7 @@ def test_wrong_coordinates_are_named():
         separation(Kepler(), {"body.position.x": "r"})
     with pytest.raises(UsageError, match="2 coordinates are given by 3 others"):
         separation(Kepler(), {"body.position.x": "a*b", "body.position.z": "c"})
+    with pytest.raises(UsageError, match="their Jacobian is zero"):
+        separation(Kepler(), {"body.position.x": "a + b", "body.position.z": "a + b"})
     with pytest.raises(UsageError, match="none of the coordinates"):
         separation(Kepler(), POLAR).motion("x", [0.0, 1.0], [1.0, 0.0])

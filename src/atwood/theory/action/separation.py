@@ -24,6 +24,12 @@ __all__ = ["SeparatedMotion", "Separation", "separation"]
 _STATES, _TRIALS = 6, 200
 """So many random states at which H is real are enough, among so many."""
 
+_SHORT = 150
+"""Up to so many operations H in other coordinates is tidied up to be read."""
+
+_FEW = 3
+"""Up to so many coordinates the old momenta are written over one determinant."""
+
 _DIGITS, _ZERO = 40, 1e-12
 """Conditions are evaluated with so many digits, and hold where their terms cancel to the second.
 
@@ -238,14 +244,47 @@ def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, 
             f"its {len(old)} coordinates are given by {len(new)} others: {', '.join(map(str, new))}", where=h.name
         )
     momenta = tuple(sympy.Symbol(f"p_{one}") for one in new)
-    jacobian = sympy.Matrix([[places[path].diff(one) for one in new] for path in old])
-    along = jacobian.T.LUsolve(sympy.Matrix(momenta))
+    along = _old_momenta([[places[path].diff(one) for path in old] for one in new], momenta)
     by = {q: places[path] for path, (q, _) in old.items()}
     by |= {p: along[k] for k, (_, p) in enumerate(old.values())}
     made = h.expression.xreplace(by)
-    made = sympy.trigsimp(made) if coordinates is not None and made.count_ops() < 150 else made
+    made = _tidied(made) if coordinates is not None and made.count_ops() < _SHORT else made
     worst = _worst(made, new, momenta, h.values, h.name)
     return Separation(h.name, new, momenta, made, h.values, worst[2] <= _ZERO, worst)
+
+
+def _old_momenta(transposed: Sequence[Sequence[Sympy]], momenta: Sequence[Sympy]) -> list[Sympy]:
+    """Return the old momenta in terms of the new ones, ``P = J^T p``, over one determinant."""
+    import sympy
+
+    matrix = sympy.Matrix(transposed)
+    if len(momenta) > _FEW:
+        return list(matrix.LUsolve(sympy.Matrix(momenta)))
+    determinant = _tidied(matrix.det(method="berkowitz"))
+    if determinant == 0:
+        raise UsageError("the coordinates do not determine each other: their Jacobian is zero")
+    found = matrix.adjugate() * sympy.Matrix(momenta)
+    return [one / determinant for one in found]
+
+
+def _tidied(made: Sympy) -> Sympy:
+    """Return an expression expanded, with no even power of a cosine: sums of squares of sines and cosines are one.
+
+    `sympy.trigsimp` finds more, and can take hours.
+    """
+    import sympy
+
+    def without(e: Sympy) -> Sympy:
+        base, power = e.base, int(e.exp)
+        x, sign = base.args[0], -1 if base.func is sympy.cos else 1
+        other = sympy.sin(x) if sign < 0 else sympy.sinh(x)
+        return (1 + sign * other**2) ** (power // 2) * base ** (power % 2)
+
+    def is_even(e: Sympy) -> bool:
+        return bool(e.is_Pow and e.exp.is_Integer and e.exp > 1 and isinstance(e.base, (sympy.cos, sympy.cosh)))
+
+    made = made.replace(lambda e: bool(e.is_Pow and not e.exp.is_Integer), lambda e: _tidied(e.base) ** e.exp)
+    return sympy.expand(sympy.expand(made).replace(is_even, without))
 
 
 def _read(given: Any, paths: list[str], where: str) -> dict[str, Sympy]:
