@@ -20,7 +20,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import check_time
 from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError
-from atwood.expr import Expression, Program
+from atwood.expr import Expression, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.loops.assur_groups import Loops
@@ -52,7 +52,7 @@ _CLEAR = 0.003
 _MOST = 60
 """More choices of independent coordinates are not tried."""
 
-_TURN = 72
+_TURN = 144
 """In so many positions of a whole turn it is seen whether there is a dead centre."""
 
 _AGREES = 1e-7
@@ -79,6 +79,8 @@ class Solved:
     least
         What is left of that in a whole turn of the independent coordinate; 0 where it meets a dead centre, or does not
         turn.
+    is_clear
+        Whether that is so much that no dead centre needs to be looked out for.
     """
 
     form: ClosedForm
@@ -86,6 +88,7 @@ class Solved:
     branches: Mapping[Expression, float]
     margin: float = 0.0
     least: float = 0.0
+    is_clear: bool = False
     _kernels: dict[tuple[Program, bool], BoundKernel] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -265,8 +268,11 @@ def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArr
     misses = np.abs(made[: len(q)] - q) / plan.coordinate_sizes
     if not (np.all(misses <= _AGREES) and _holds(plan, solved, t, y)):
         return None
-    least = _least(solved, t, y)
-    return replace(solved, margin=margin, least=least) if margin > _START or least else None
+    least, steepest = _least(solved, t, y)
+    if not (margin > _START or least):
+        return None
+    rests = not any(depends_on(one, [plan.assembly.reduced.time]) for one in form.watched.results)
+    return replace(solved, margin=margin, least=least, is_clear=rests and least > steepest)
 
 
 def _margins(solved: Solved, t: float, y: FloatArray) -> Sequence[float]:
@@ -291,17 +297,21 @@ def _holds(plan: Plan, solved: Solved, t: float, y: FloatArray) -> bool:
     return bool(np.all(misses[0] <= _AGREES) and np.all(misses[1] * plan.scales.time <= _AGREES))
 
 
-def _least(solved: Solved, t: float, y: FloatArray) -> float:
-    """Return what is left of the distance from a dead centre in a whole turn of the only independent coordinate."""
+def _least(solved: Solved, t: float, y: FloatArray) -> tuple[float, float]:
+    """Return what is left of the distance from a dead centre in a whole turn of the only independent coordinate.
+
+    The second number is the most by which it changes from one position that was looked at to the next.
+    """
     loops = solved.form.loops
     names = solved.assembly.reduced.names
     if not loops.margins or len(loops.independent) > 1 or names[loops.independent[0]].unit != "rad":
-        return 0.0
-    angles = y[0] + np.linspace(0.0, math.tau, _TURN, endpoint=False)
+        return 0.0, 0.0
+    angles = y[0] + np.linspace(0.0, math.tau, _TURN + 1)
     with np.errstate(all="ignore"):
         found = solved.kernel(solved.form.watched, vectorized=True)([[t]], angles[None, :], np.array([[y[1]]]))[0]
-    least = float(np.min(found[: len(loops.margins)]))  # not a number where the loop does not close
-    return least if least > _CLEAR else 0.0
+    margins = found[: len(loops.margins)]
+    least = float(np.min(margins))  # not a number where the loop does not close
+    return (least, float(np.max(np.abs(np.diff(margins))))) if least > _CLEAR else (0.0, 0.0)
 
 
 def levels(solved: Solved) -> tuple[float, float]:

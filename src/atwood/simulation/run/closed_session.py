@@ -114,7 +114,7 @@ class ClosedLoopSession:
         if result.status is not Status.EVENT:
             return full
         own = [i for i, fired in enumerate(result.events[self._count :]) if fired]
-        margins = 2 * len(self._solved.form.loops.margins)
+        margins = 2 * self._watched(self._solved)[0]
         dead = any(i < margins for i in own)
         for i in own:
             if i >= margins:
@@ -167,7 +167,7 @@ class ClosedLoopSession:
     def _open(self, t: float, y: FloatArray) -> ExplicitSession:
         request, solved, probe = self._request, self._solved, self._request.probe
         found, assembly = solved.form.accelerations, solved.assembly
-        margins, counted = len(solved.form.loops.margins), len(solved.form.loops.counted)
+        margins, counted = self._watched(solved)
         low, near = levels(solved)
         shifts = np.repeat([-low, -near, 0.0], [margins, margins, counted])
         directions = (*probe.directions, *(-1 for _ in range(2 * margins)), *(0 for _ in range(counted)))
@@ -196,6 +196,11 @@ class ClosedLoopSession:
 
         return open_explicit(problem, settings, t, y, budget, leave=None if given is None else leave, end=request.end)
 
+    @staticmethod
+    def _watched(solved: Solved) -> tuple[int, int]:
+        """Return how many dead centres and counted directions are looked out for."""
+        return 0 if solved.is_clear else len(solved.form.loops.margins), len(solved.form.loops.counted)
+
     def _settings(self, t: float, solved: Solved) -> SolverOptions:
         settings = self._request.settings(t, LOOSEST)
         absolute = np.asarray(settings.absolute_tolerances)
@@ -211,10 +216,11 @@ class ClosedLoopSession:
         """Return all event functions, in Python."""
         own = self._request.probe.function()
         n, kernel = len(solved.independent), solved.kernel(solved.form.watched)
-        margins = len(solved.form.loops.margins)
+        margins, _ = self._watched(solved)
+        first = len(solved.form.loops.margins) - margins
 
         def values(t: float, y: FloatArray, yp: FloatArray) -> FloatArray:
-            found = kernel([t], y[:n], y[n:])[0]
+            found = kernel([t], y[:n], y[n:])[0][first:]
             watched = np.array([*found[:margins], *found]) + shifts
             if own is None:
                 return watched
@@ -227,7 +233,7 @@ class ClosedLoopSession:
         """Return a problem whose event functions are machine code too, if they can be."""
         probe, kept, key = self._request.probe, self._request.plan.finding.kept, self._request.probe.key
         shared = solved.assembly.shared
-        made = shared.get(_CODE, lambda: _event_code(self._request, solved), solved.form, kept, key)
+        made = shared.get(_CODE, lambda: _event_code(self._request, solved), solved.form, solved.is_clear, kept, key)
         if made is None:
             return problem
         self._events, code = made
@@ -251,8 +257,8 @@ def _event_code(request: SolverRequest, solved: Solved) -> tuple[Program, EventC
         if found is None:
             return None
         own, shift = substitute(list(found.results), form.known), found.inputs[3].symbols
-    ahead = watched.outputs[0].expressions
-    ahead = (*ahead[: len(form.loops.margins)], *ahead)  # margins have two levels
+    all_ahead, margins = watched.outputs[0].expressions, len(form.loops.margins)
+    ahead = all_ahead[margins:] if solved.is_clear else (*all_ahead[:margins], *all_ahead)  # margins have two levels
     more = tuple(graph.symbol(f"event shift of loops {i}") for i in range(len(ahead)))
     values = (*own, *(v + s for v, s in zip(ahead, more, strict=True)))
     groups = (*watched.inputs, InputGroup("shift", (*shift, *more)))
