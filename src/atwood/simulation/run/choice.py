@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from atwood.simulation.problem.explicit_scene import explicit_problem, explicit_
 from atwood.simulation.problem.options import SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.stiffness import Stiffness, can_be_stiff, find_stiffness
+
+if TYPE_CHECKING:
+    from atwood.simulation.problem.closed_loops import Solved
 
 __all__ = [
     "ASKED",
@@ -144,7 +148,24 @@ def _choose_for_loops(plan: Plan, options: RunOptions, t: float, q: FloatArray, 
         return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
     names = plan.assembly.reduced.names
     free = ", ".join(names[i].name for i in solved.independent)
-    return Choice(t, "explicit", f"formulas solve its closed loops, in terms of {free}, and the problem is not stiff")
+    how = f"formulas solve its closed loops, in terms of {free}"
+    if found is None and options.relative_tolerance <= VERY_ACCURATE and _has_closed_series(plan, options, solved):
+        return Choice(t, "taylor", f"{how}, nothing dies away, and {VERY_ACCURATE:g} or better is asked for")
+    return Choice(t, "explicit", f"{how}, and the problem is not stiff")
+
+
+def _has_closed_series(plan: Plan, options: RunOptions, solved: Solved) -> bool:
+    """Return whether accelerations with solved loops have Taylor series that no event keeps short."""
+    from atwood.simulation.events.modes import find_event_functions
+    from atwood.simulation.problem.taylor_scene import recurrences_of
+
+    if not solved.is_clear or solved.form.loops.counted or options.conditions or find_event_functions(plan.assembly):
+        return False
+    try:
+        recurrences_of(plan.assembly, solved.form.accelerations)
+    except AtwoodError:
+        return False
+    return True
 
 
 def dead_centre(t: float) -> Choice:
