@@ -32,6 +32,17 @@ _BETTER = 2.0
 """Another choice takes over where it is so many times as far from a dead centre."""
 
 
+_FARTHEST = 0.3
+"""Where dead centres may be near, no angle changes by more radians in a step.
+
+One angle and its rate are so few unknowns that now and then an estimate of the error is small by chance: of steps twice
+as long, one in some thousands erred by a thousand tolerances.
+"""
+
+_FIRST = 0.05
+"""The first step after a change of coordinates, as a share of that."""
+
+
 class ClosedLoopSession:
     """A run in progress; see `~atwood.integrators.explicit_session.ExplicitSession`.
 
@@ -182,6 +193,9 @@ class ClosedLoopSession:
         if directions and problem.compiled is not None:
             problem = self._with_compiled(problem, solved, shifts)
         settings, budget = self._settings(t, solved), self._budget()
+        longest = np.inf if solved.is_clear else self._longest_step(solved, t, y)
+        if self._before.steps and np.isfinite(longest):  # steps grow by themselves from one that is surely short
+            settings = replace(settings, first_step=min(_FIRST * longest, settings.horizon))
         if self._solver == "taylor":
             from atwood.simulation.problem.taylor_scene import open_taylor, taylor_problem
 
@@ -194,7 +208,19 @@ class ClosedLoopSession:
         def leave(t: float, y: FloatArray) -> bool:
             return given is not None and given(t, self._solved.state(t, y))
 
-        return open_explicit(problem, settings, t, y, budget, leave=None if given is None else leave, end=request.end)
+        session = open_explicit(
+            problem, settings, t, y, budget, leave=None if given is None else leave, end=request.end
+        )
+        if np.isfinite(longest):
+            session.limit_steps(longest)
+        return session
+
+    @staticmethod
+    def _longest_step(solved: Solved, t: float, y: FloatArray) -> float:
+        """Return in what time no angle changes by more than formulas near a dead centre let be estimated."""
+        is_angle = np.array([one.unit == "rad" for one in solved.assembly.reduced.names])
+        fastest = float(np.max(np.abs(solved.state(t, y)[len(is_angle) :][is_angle]), initial=0.0))
+        return _FARTHEST / fastest if fastest > 0.0 else np.inf
 
     @staticmethod
     def _watched(solved: Solved) -> tuple[int, int]:
