@@ -108,6 +108,25 @@ def test_behaves_as_the_standard_library(few, monkeypatch):
         assert ours == theirs
 
 
+@pytest.mark.parametrize("dataclass", [late.dataclass, dataclasses.dataclass])
+def test_replace_is_that_of_the_standard_library(dataclass):
+    point, heavy, tally, same, _ = classes(dataclass)
+    for one in (point(1.0, names=["a"]), heavy(1.0, 3.0, mass=2.0), same(4), tally((1,))):
+        ours, theirs = late.replace(one), dataclasses.replace(one)
+        assert vars(ours) == vars(theirs)
+        assert ours is not one
+    assert late.replace(heavy(1.0, 3.0), mass=2.0, x=5.0) == dataclasses.replace(heavy(5.0, 3.0), mass=2.0)
+    counted = tally((1,))
+    counted._hidden = 7
+    assert late.replace(counted, items=())._hidden == 0
+    with pytest.raises(ValueError, match="mass"):
+        late.replace(heavy(1.0), mass=-1.0)
+    with pytest.raises(TypeError, match="weight"):
+        late.replace(heavy(1.0), weight=1.0)
+    child = type("Child", (heavy,), {})(1.0)
+    assert type(late.replace(child, y=4.0)) is type(child)
+
+
 @late.dataclass(frozen=True)
 class Pair:
     """Two numbers, in a module from which it can be loaded again."""

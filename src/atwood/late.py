@@ -4,7 +4,7 @@
 millisecond a class: for all classes of Atwood that takes as long as to import NumPy. A process uses few of them, and
 makes few instances of most of these. Here one method, the constructor, is written when a class has got some instances;
 all classes share the others, and what sets the fields of the first instances. The standard library is asked when
-somebody asks for the fields of a class, as its `replace`, `fields` and `asdict` do.
+somebody asks for the fields of a class, as its `fields` and `asdict` do; `replace` is here.
 """
 
 from __future__ import annotations
@@ -17,11 +17,22 @@ from typing import TYPE_CHECKING, Any
 
 from atwood.showing import brief
 
-__all__ = ["dataclass"]
+__all__ = ["dataclass", "replace"]
 
 if TYPE_CHECKING:
-    from dataclasses import dataclass as dataclass
+    from dataclasses import dataclass as dataclass, replace as replace
 else:
+
+    def replace(one, /, **changes):
+        """Return an instance with some fields changed, as `dataclasses.replace` does, which asks for far more."""
+        completion = getattr(type(one), "_completion", None)
+        if completion is None or type(one) is not completion.cls:
+            return dataclasses.replace(one, **changes)
+        completion.complete()
+        for name in completion.given_names:
+            if name not in changes:
+                changes[name] = getattr(one, name)
+        return type(one)(**changes)
 
     def dataclass(cls=None, /, *, frozen=False, eq=True):
         """Make a class a dataclass, as `dataclasses.dataclass` does with the same options."""

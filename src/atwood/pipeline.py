@@ -11,7 +11,6 @@ stage of `atwood.stages` took.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -25,6 +24,7 @@ from atwood.forms.places import to_maximal
 from atwood.forms.reassembly import modes_of
 from atwood.forms.source import Source
 from atwood.forms.starting import with_constants_of_start
+from atwood.late import replace
 from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene, flatten

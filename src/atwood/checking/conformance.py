@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Any, get_args
 
 from atwood.checking.expressions import wrong_on_expressions
@@ -16,6 +15,7 @@ from atwood.consistency.check import contradictions
 from atwood.consistency.draws import make_trial
 from atwood.consistency.names import wrong_names
 from atwood.errors import AtwoodError, UsageError
+from atwood.late import replace
 from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
 from atwood.model.declare.law import Kind

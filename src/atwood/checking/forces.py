@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from atwood.checking.report import Finding
 from atwood.consistency.joints import Unknown, attempt
 from atwood.consistency.trials import Pose, Trial, nudged
+from atwood.late import replace
 from atwood.model.declare.connectors import Motion
 from atwood.model.declare.contributions import Load
 from atwood.model.declare.law import Law

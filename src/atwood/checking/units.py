@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from atwood.checking.report import Finding
 from atwood.consistency.trials import Body, Trial
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia

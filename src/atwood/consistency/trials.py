@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.connectors import Motion
 from atwood.model.declare.contributions import Placement

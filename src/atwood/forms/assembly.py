@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from functools import cached_property, partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
@@ -31,7 +31,7 @@ from atwood.forms.reassembly import follow, other_mode, with_flat
 from atwood.forms.reduced import reduced_form
 from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
 from atwood.forms.source import Source, no_start_quantity
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.build import Mechanism, build_equations
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import discrete_states_of

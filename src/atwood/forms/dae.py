@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
 
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, substitute
 from atwood.forms.program import FormProgram, Level, either_sign, kinematic_rows, make_form_program
+from atwood.late import replace
 from atwood.mechanics.dynamics.equations import Equations
 
 __all__ = ["LEVELS", "check_level", "dae_form", "keep_constraints"]

@@ -12,7 +12,6 @@ equation 5.39). Angular velocities are rates of angles where orientations are in
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from atwood.errors import UsageError
@@ -29,7 +28,7 @@ from atwood.expr import (
 )
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.kept import Key
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Constraint, Equations, balance_rows, inertia_forces
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from functools import cached_property, partial, reduce
 from operator import add
 from typing import Any, Literal
@@ -25,7 +24,7 @@ from atwood.expr import (
     substitute,
 )
 from atwood.forms.derivative import Derivative, derive, directions, is_too_long
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.topology.orientation_coordinates import OrientationCoordinates
 

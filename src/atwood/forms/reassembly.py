@@ -6,7 +6,6 @@ What keeps the structure goes on with the same equations, programs and code; any
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import UsageError
@@ -14,6 +13,7 @@ from atwood.forms.kept import Key
 from atwood.forms.shared import Shared
 from atwood.forms.source import Source
 from atwood.forms.starting import moved_to, with_constants_of_start
+from atwood.late import replace
 from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.local.flatten import FlatScene
 from atwood.stages import stage

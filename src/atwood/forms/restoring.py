@@ -7,7 +7,6 @@ the same order, and machine code comes from the cache on disk where it was compi
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from atwood.errors import UsageError
@@ -15,6 +14,7 @@ from atwood.forms.kept import Key
 from atwood.forms.shared import Shared
 from atwood.forms.source import Source
 from atwood.forms.starting import with_constants_of_start
+from atwood.late import replace
 from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.local.flatten import FlatScene
 from atwood.topology.orientation_coordinates import Orientation

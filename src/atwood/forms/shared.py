@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from dataclasses import replace
 from typing import Any, TypeVar
 
 from atwood.expr import Expression
 from atwood.forms.kept import Key
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.build import Mechanism, check_closures
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Decision

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from atwood.forms.kept import Key
 from atwood.forms.shared import DECIDED, Shared, decided_alike, with_values_of
+from atwood.late import replace
 from atwood.mechanics.constraints.values import holds_velocities
 from atwood.mechanics.kinematics.mechanism import Mechanism, started_at
 from atwood.model.local.flatten import FlatScene

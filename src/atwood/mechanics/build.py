@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 
 from atwood.errors import DeclarationError
 from atwood.expr import Expression, Graph, depends_on, live, substitute
+from atwood.late import replace
 from atwood.mechanics.constraints.elimination import SOLVED, check_held, drop_closed, eliminate_linear
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
 from atwood.mechanics.constraints.read_multipliers import known_multipliers, with_known

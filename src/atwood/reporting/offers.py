@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from atwood.errors import AtwoodError
 from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import coordinate_program, state_program
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.linalg.matrices import scaled
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
 from atwood.model.local.flatten import FlatScene

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 
 from atwood.errors import SolveError
+from atwood.late import replace
 from atwood.result.result import Result
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run

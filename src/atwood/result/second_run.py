@@ -7,14 +7,13 @@ solved by other methods, and mostly at a fraction of the cost.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
+from atwood.late import replace
 from atwood.simulation.events.sampling import find_sampler
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from fractions import Fraction
 from itertools import permutations
 
@@ -14,6 +13,7 @@ from atwood.analysis.formulas.order import in_brackets, in_order
 from atwood.analysis.formulas.tree import Sum, Symbol, Term, cost, product
 from atwood.expr import Expression, jacobian, substitute
 from atwood.forms.lagrangian import Lagrangian
+from atwood.late import replace
 
 __all__ = ["hamiltonian_formula", "momentum_symbol", "with_momenta"]
 

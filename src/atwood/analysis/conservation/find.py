@@ -9,7 +9,6 @@ brought to a normal form, rates are looked at at random states.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from atwood.analysis.conservation.states import RandomStates, State
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.observables import add_up
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.events.modes import find_event_functions

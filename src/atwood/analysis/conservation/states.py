@@ -8,7 +8,6 @@ comes later and a stop that nothing touches yet are not overlooked.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from atwood.errors import AtwoodError, SolveError
 from atwood.expr import Expression, OutputGroup, Program, vjp
 from atwood.expr.core.relations import Relation, TimeRelations
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.linalg.matrices import from_entries, to_array
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, solve_balance
 from atwood.simulation.dynamics.columns import mass_at

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 from atwood.analysis.formulas.tree import Call, Factor, Name, Sum, Symbol, Term, names_in
+from atwood.late import replace
 
 __all__ = ["in_brackets", "in_order", "place_of_term"]
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from fractions import Fraction
 from typing import TypeAlias
 
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 
 __all__ = [
     "Call",

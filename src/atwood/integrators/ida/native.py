@@ -14,7 +14,6 @@ import time
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -39,6 +38,7 @@ from atwood.integrators.protocol import (
     StepResult,
     choose_linear_solver,
 )
+from atwood.late import replace
 
 __all__ = ["IdaTuning", "NativeSession", "available", "open_session", "why_not"]
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
-from dataclasses import replace
 from itertools import accumulate
 from math import inf, log2
 
@@ -28,6 +27,7 @@ from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.integrators.taylor.code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
 from atwood.integrators.taylor.problem import DEFECT, FLOOR, TaylorProblem, choose_order, share_of_radius
 from atwood.integrators.taylor.stepping_code import LANES, ROWS, STRIDE, positions
+from atwood.late import replace
 
 __all__ = ["CompiledRecurrences", "CompiledStepper"]
 

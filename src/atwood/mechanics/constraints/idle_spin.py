@@ -8,14 +8,13 @@ velocity along the axis is zero. This constraint needs no force, so that all the
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, Scalar, depends_on, evaluate, is_zero
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.dynamics.inertia import RigidMass, add_masses
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, derivation_of
 from atwood.mechanics.kinematics.motion import Movement

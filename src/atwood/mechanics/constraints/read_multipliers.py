@@ -10,10 +10,10 @@ what has not converged has no value.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from atwood.errors import AtwoodError, UnsupportedError
 from atwood.expr import Expression, absolute, depends_on, jacobian, select, solve, sqrt, substitute
+from atwood.late import replace
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of, minimum_degree
 from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism

@@ -10,13 +10,12 @@ constraint stays as it is.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from atwood.expr import Expression, depends_on, evaluate, jacobian, jvp, substitute, vjp
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.constraints.elimination import SOLVED, eliminate_linear
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN, idle_speeds
 from atwood.mechanics.constraints.pfaffian import (

@@ -6,11 +6,11 @@ Each is found on the local symbols of a part, and then put where the part is.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Graph, Scalar, depends_on, is_zero, jvp, substitute, vjp
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world, torque_components
 from atwood.mechanics.kinematics.positions import Kinematics, Placements
 from atwood.model.local.laws import LocalConstraint, LocalPart

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import field, fields, replace
+from dataclasses import field, fields
 from typing import Any, TypeVar
 
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.expr.core.relations import TimeRelations, values_just_after
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, plain, rotate
 from atwood.model.local.laws import LocalPart
 from atwood.model.local.parameters import ParameterTable

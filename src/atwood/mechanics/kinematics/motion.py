@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Protocol
 
 from atwood.expr import Expression, jvp, substitute
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.orientation_coordinates import orientation_rates
 from atwood.mechanics.kinematics.positions import (

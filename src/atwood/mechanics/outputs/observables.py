@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from atwood.expr import Expression, Scalar, jvp, live, substitute, vjp
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.dynamics.carried_inertia import CarriedInertia
 from atwood.mechanics.dynamics.equations import Equations

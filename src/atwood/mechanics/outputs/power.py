@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from atwood.expr import Expression, jvp, substitute
+from atwood.late import replace
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces

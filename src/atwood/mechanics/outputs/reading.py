@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from atwood.errors import AtwoodError
 from atwood.expr import Expression
+from atwood.late import replace
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable, Reaction, add_up, make_binding, part_energies, take

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
 from atwood.errors import AtwoodError, DeclarationError, UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, depends_on, live
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.model.declare.carried_inertia import Asked, Carried
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia

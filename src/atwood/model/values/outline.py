@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 
 from atwood.arguments import FLAG, NAME, Kind, Refused, check, number, one_of, real, show, takes_names
 from atwood.errors import DeclarationError, UsageError
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 
 __all__ = ["Outline"]
 

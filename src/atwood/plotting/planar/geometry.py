@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from functools import cached_property
 from typing import Literal
 
@@ -14,7 +14,7 @@ from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, Scalar, depends_on, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import state_program
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
 from atwood.model.declare.connectors import Groove

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.plotting.scene3d.reading import Lump
 from atwood.plotting.shapes.meshes import Mesh, box, cylinder, frame_along
 from atwood.plotting.shapes.outlines import outline_mesh

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import depends_on, is_zero
 from atwood.forms.quantities import state_program
+from atwood.late import replace
 from atwood.mechanics.build import Mechanism
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.contributions import BodyInertia

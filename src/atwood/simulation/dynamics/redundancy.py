@@ -6,7 +6,7 @@ which must not be taken for additional freedom.
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import KernelEvaluationError
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.linalg.matrices import scaled, to_array
 from atwood.simulation.dynamics.balance import Balance
 from atwood.simulation.dynamics.rank import independent_rows, open_directions, review_rows, row_sizes

@@ -7,8 +7,6 @@ balance of forces.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from atwood.arrays import FloatArray
@@ -18,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.forms.starting import starting
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble, from_regular, own_names, switch_coordinates

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,7 @@ from atwood.forms.loops.assur_groups import Loops
 from atwood.forms.loops.branches import Place
 from atwood.forms.loops.closed_form import ClosedForm, closed_form
 from atwood.forms.program import rates_are_speeds
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +10,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
+from atwood.late import replace
 from atwood.linalg.matrices import to_array
 from atwood.simulation.dynamics.balance import balance_of, solve_balance
 from atwood.simulation.dynamics.determined_reactions import check_read_reactions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from atwood.forms.kept import Key
 from atwood.forms.program import FormProgram
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.linalg.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of
 from atwood.simulation.dynamics.columns import columns_of

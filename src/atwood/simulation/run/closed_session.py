@@ -7,7 +7,6 @@ the reduced form. Dead centres and quarter turns of counted directions are event
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +18,7 @@ from atwood.forms.kept import Key
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession, Leave
 from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status, StepResult
+from atwood.late import replace
 from atwood.simulation.problem.closed_loops import Solved, levels, on_branch, solve_at
 from atwood.simulation.problem.explicit_scene import explicit_problem_of
 

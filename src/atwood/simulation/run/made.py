@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.integrators.protocol import Statistics
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import (
     CoordinateSwitch,
 )

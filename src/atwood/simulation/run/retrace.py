@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
 from atwood.errors import AtwoodError
 from atwood.integrators.protocol import FloatArray
+from atwood.late import replace
 from atwood.simulation.run.made import Run
 
 __all__ = ["run_again", "times_of_steps"]

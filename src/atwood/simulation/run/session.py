@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from atwood.errors import UsageError
@@ -12,7 +11,7 @@ from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession, Leave
 from atwood.integrators.protocol import Budget, FloatArray, ImplicitProblem, LinearSolver, Session, SolverOptions
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.options import FIXED_STEPS, SOLVERS, RunOptions

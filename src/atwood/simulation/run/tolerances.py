@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 
 from atwood.errors import AtwoodError, SolveError
 from atwood.integrators.protocol import Budget, Status, StepResult
+from atwood.late import replace
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.session import SolverRequest, open_implicit_session
 

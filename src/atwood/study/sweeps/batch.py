@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from atwood.forms.accelerations import accelerations_of
 from atwood.forms.quantities import find_observables, observer
 from atwood.integrators.explicit_problem import LOOSEST
 from atwood.integrators.protocol import SolverOptions
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.columns import masses_at
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.reactions import ReactionSolver

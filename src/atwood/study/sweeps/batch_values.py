@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Slot, decisions_of, find_slots
 from atwood.forms.starting import starting
+from atwood.late import replace
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from atwood.arguments import BY_PATH, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE, assembly_of

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from atwood.arrays import ComplexArray
+from atwood.late import replace
 from atwood.result.result import Result
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.initialization.start import Start

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import ParameterError, StartError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.linalg.matrices import to_array
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene
