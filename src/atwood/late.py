@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from atwood.showing import brief
 
-__all__ = ["dataclass", "replace"]
+__all__ = ["dataclass", "names_of", "replace"]
 
 if TYPE_CHECKING:
     from dataclasses import dataclass as dataclass, replace as replace
@@ -37,6 +37,13 @@ else:
     def dataclass(cls=None, /, *, frozen=False, eq=True):
         """Make a class a dataclass, as `dataclasses.dataclass` does with the same options."""
         return _declare(cls, frozen, eq) if cls is not None else lambda cls: _declare(cls, frozen, eq)
+
+
+def names_of(cls: Any) -> tuple[str, ...]:
+    """Return the names of the fields of such a class, those of its bases first."""
+    completion = cls._completion
+    completion.complete()
+    return tuple(completion.found)
 
 
 _TAKEN = ("__dataclass_fields__", "__dataclass_params__", "__match_args__")

@@ -14,7 +14,6 @@ coordinates, in terms of which everything is written.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
 from typing import TYPE_CHECKING, Literal, cast
 
 from atwood.errors import AtwoodError
@@ -33,7 +32,7 @@ from atwood.forms.derived import derive_once
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.forms.program import rates_are_speeds, state_groups
-from atwood.late import dataclass
+from atwood.late import dataclass, names_of
 from atwood.mechanics.dynamics.augmented import (
     Step,
     SymmetricSystem,
@@ -135,7 +134,7 @@ _NOT_READ = ("locals_", "site", "masses", "shapes", "decisions", "constants")
 
 def _read(equations: Equations) -> list[object]:
     """Return all of equations that their derivation can read."""
-    return [getattr(equations, one.name) for one in fields(equations) if one.name not in _NOT_READ]
+    return [getattr(equations, name) for name in names_of(type(equations)) if name not in _NOT_READ]
 
 
 def _cheapest(assembly: Assembly, method: Method | None, is_tree: bool) -> tuple[str, list[Expression]]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
-from dataclasses import fields
 from itertools import accumulate
 from math import inf
 from typing import TYPE_CHECKING
@@ -36,7 +35,7 @@ from atwood.integrators.explicit_problem import (
 )
 from atwood.integrators.machine_text import WIDTH
 from atwood.integrators.protocol import FloatArray, SolverOptions
-from atwood.late import dataclass
+from atwood.late import dataclass, names_of
 
 if TYPE_CHECKING:
     from atwood.integrators.ensemble.batch import BatchPlaces
@@ -176,14 +175,12 @@ class CompiledStepper:
         begin, sample = (_code().code.addresses[name] for name in ("begin", "sample"))
         limit, steps, filled = (self._counts[k:].ctypes.data for k in (_LIMIT, _STEPS, _FILLED))
         tolerance = self._arrays[ROWS["absolute"]].ctypes.data
-        return BatchPlaces(
-            begin, sample, self._session.value or 0, limit, steps, filled, tolerance, len(fields(Counts)), self
-        )
+        return BatchPlaces(begin, sample, self._session.value or 0, limit, steps, filled, tolerance, _COUNTED, self)
 
     @property
     def counts(self) -> Counts:
         """What it has done so far, over all starts."""
-        return Counts(*self._counts[_STEPS : _STEPS + len(fields(Counts))].tolist())
+        return Counts(*self._counts[_STEPS : _STEPS + _COUNTED].tolist())
 
     def watch(self, events: CompiledEvents) -> None:
         """Let `run` and `sample` come back with `Outcome.NOTICED` after a step in which an event may have happened."""
@@ -207,7 +204,7 @@ class CompiledStepper:
 
     def renew(self, horizon: float) -> None:
         """Count from zero again, for a run of another typical length, s."""
-        self._counts[_STEPS : _STEPS + len(fields(Counts))] = 0
+        self._counts[_STEPS : _STEPS + _COUNTED] = 0
         self._numbers[_HORIZON] = horizon
         self._numbers[_LONGEST] = self._options.max_step or inf
 
@@ -278,6 +275,8 @@ class CompiledStepper:
         function = _RATES(rates)
         return CompiledRates(ctypes.cast(function, c_void_p).value or 0, 0, function)
 
+
+_COUNTED = len(names_of(Counts))
 
 _T, _STOP, _R, _LONGEST, _HORIZON, _FIRST = map(NUMBERS.index, ("t", "stop", "relative", "longest", "horizon", "first"))
 _T_OLD = NUMBERS.index("t_old")

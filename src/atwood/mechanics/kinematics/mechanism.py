@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import field, fields
+from dataclasses import field
 from typing import Any, TypeVar
 
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.expr.core.relations import TimeRelations, values_just_after
-from atwood.late import dataclass, replace
+from atwood.late import dataclass, names_of, replace
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, plain, rotate
 from atwood.model.local.laws import LocalPart
 from atwood.model.local.parameters import ParameterTable
@@ -168,7 +168,7 @@ class Derivation(Mechanism):
 
 def derivation_of(mechanism: Mechanism) -> Derivation:
     """Return a mechanism as a derivation in which nothing has been decided."""
-    own = {one.name: getattr(mechanism, one.name) for one in fields(Mechanism)}
+    own = {name: getattr(mechanism, name) for name in names_of(Mechanism)}
     own["table"] = replace(mechanism.table, values=dict(mechanism.table.values))
     return Derivation(**own)
 
