@@ -87,6 +87,7 @@ if TYPE_CHECKING:
     from atwood.plotting.plots.phase import plot_phase_portrait, plot_section
     from atwood.plotting.plots.precision import plot_comparison
     from atwood.plotting.plots.quantities import plot
+    from atwood.plotting.plots.reduction import plot_effective_potential, plot_top_path
     from atwood.plotting.plots.sweep import plot_sweep
     from atwood.plotting.polhodes import plot_polhodes
     from atwood.reporting import MechanismReport, report
@@ -258,6 +259,7 @@ __all__ += [
     "plot_bode",
     "plot_branches",
     "plot_comparison",
+    "plot_effective_potential",
     "plot_mechanism",
     "plot_mode",
     "plot_nyquist",
@@ -266,6 +268,7 @@ __all__ += [
     "plot_root_locus",
     "plot_section",
     "plot_sweep",
+    "plot_top_path",
 ]
 
 # Components of one's own

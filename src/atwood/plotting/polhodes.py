@@ -12,10 +12,10 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
 from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, save_figure
 from atwood.plotting.scene3d.space_reading import read_scene
+from atwood.plotting.sphere import SEEN, draw_on_sphere, draw_sphere
 from atwood.result.result import Result
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["plot_polhodes", "polhode"]
@@ -93,22 +93,18 @@ def plot_polhodes(result: Result, body: str | None = None, file: str | os.PathLi
     size = np.linalg.norm(momentum, axis=0)
     figure = new_figure(6.0, 6.0)
     axes = figure.subplots()
-    axes.set_axis_off()
-    axes.set_aspect("equal")
-    around = np.linspace(0.0, 2.0 * np.pi, 200)
-    axes.fill(np.cos(around), np.sin(around), color="#eef2f6", zorder=0)
-    axes.plot(np.cos(around), np.sin(around), color=GREY, linewidth=1.2)
+    draw_sphere(axes)
     inverse = 1.0 / moments
     for low, high in ((inverse[2], inverse[1]), (inverse[1], inverse[0])):
         for share in (0.04, 0.18, 0.42, 0.72):
             for curve in polhode(moments, low + share * (high - low)):
-                _draw(axes, curve, GREY, 0.9)
+                draw_on_sphere(axes, curve, GREY, 0.9)
     for curve in polhode(moments, float(inverse[1])):
-        _draw(axes, curve, COLOURS[1], 1.5)
+        draw_on_sphere(axes, curve, COLOURS[1], 1.5)
     if np.all(size > 0.0):
-        _draw(axes, (momentum / size).T, COLOURS[0], 2.6)
+        draw_on_sphere(axes, (momentum / size).T, COLOURS[0], 2.6)
     for k, name in enumerate(("smallest", "middle", "largest")):
-        begin, end = _SEEN[:2, k], 1.25 * _SEEN[:2, k]
+        begin, end = SEEN[:2, k], 1.25 * SEEN[:2, k]
         axes.plot(*np.stack([begin, end]).T, color=INK, linewidth=1.2)
         label = f"{name} moment\n{moments[k]:.4g} kg m\N{SUPERSCRIPT TWO}"
         x, y = (float(one) for one in end + 0.16 * end / np.linalg.norm(end))
@@ -120,24 +116,6 @@ def plot_polhodes(result: Result, body: str | None = None, file: str | os.PathLi
     if file is not None:
         save_figure(figure, file)
     return figure
-
-
-def _view(azimuth: float, elevation: float) -> FloatArray:
-    """Return the axes of the picture (right, up, towards the eye) as rows."""
-    (sa, ca), (se, ce) = ((np.sin(angle), np.cos(angle)) for angle in np.radians([azimuth, elevation]))
-    return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
-
-
-_SEEN = _view(38.0, 24.0)
-"""The smallest moment points to the lower left, the middle one to the lower right, the largest one up."""
-
-
-def _draw(axes: Axes, curve: FloatArray, colour: str, width: float) -> None:
-    """Draw a curve on the sphere, faint where it is behind."""
-    x, y, depth = _SEEN @ curve.T
-    for shown, alpha in ((depth >= 0.0, 1.0), (depth < 0.0, 0.22)):
-        wide = shown | np.roll(shown, 1)
-        axes.plot(np.where(wide, x, np.nan), np.where(wide, y, np.nan), color=colour, linewidth=width, alpha=alpha)
 
 
 def _principal(result: Result, body: str | None) -> tuple[str, FloatArray, FloatArray]:

@@ -1,0 +1,180 @@
+"""Pictures of motions that are reduced to one coordinate: effective potentials, and the path of a top's axis."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from atwood.arguments import FILE, TEXT, instance, optional, takes, whole
+from atwood.arrays import FloatArray
+from atwood.errors import UsageError, suggestion
+from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
+from atwood.plotting.sphere import draw_on_sphere, draw_sphere
+from atwood.theory.reduction import ReducedMotion
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["plot_effective_potential", "plot_top_path"]
+
+_POINTS = 800
+
+_MOTION = instance("a ReducedMotion, as reduced returns it", ReducedMotion)
+
+
+@takes(motion=_MOTION, file=optional(FILE))
+def plot_effective_potential(motion: ReducedMotion, file: str | os.PathLike[str] | None = None) -> Figure:
+    """Draw the effective potential about a motion, its energy, and where it turns.
+
+    Parameters
+    ----------
+    motion
+        What `atwood.reduced` gave.
+    file
+        Where to save the picture.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    figure = new_figure(6.6, 4.4)
+    axes = figure.subplots()
+    low, high = _range(motion)
+    s = np.linspace(low, high, _POINTS)
+    with np.errstate(all="ignore"):
+        potential = motion.effective_potential(s)
+    top, bottom = _heights(motion, potential)
+    axes.plot(s, potential, color=COLOURS[0], linewidth=1.8, label="effective potential")
+    axes.axhline(motion.energy, color=COLOURS[1], linewidth=1.2, label="energy")
+    axes.fill_between(s, potential, motion.energy, where=potential <= motion.energy, color=COLOURS[1], alpha=0.12)
+    for point in motion.turning_points:
+        if np.isfinite(point):
+            axes.plot(point, motion.energy, marker="o", color=INK, markersize=6)
+            axes.annotate(f"{point:.4g}", (point, motion.energy), (0, 8), textcoords="offset points", ha="center",
+                          fontsize=9, color=INK)  # fmt: skip
+    axes.set_xlim(low, high)
+    axes.set_ylim(bottom, top)
+    polish(axes, f"{motion.coordinate}, {_unit(motion)}", "energy, J")
+    axes.legend(frameon=False, fontsize=9, labelcolor=INK)
+    axes.set_title(f"{_scene(motion)}: {motion.kind}", loc="left", fontsize=11, fontweight="bold", color=INK)
+    if file is not None:
+        save_figure(figure, file)
+    return figure
+
+
+def _scene(motion: ReducedMotion) -> str:
+    return motion.routhian.formulas.assembly.flat.name
+
+
+def _unit(motion: ReducedMotion) -> str:
+    names = motion.routhian.formulas.expressions.names
+    return next(one.unit for one in names if one.name == motion.coordinate)
+
+
+def _range(motion: ReducedMotion) -> tuple[float, float]:
+    """Return what is shown of the coordinate: the motion, and as much again beside it."""
+    low, high = motion.turning_points
+    place = motion.start[motion.coordinate]
+    if motion.kind == "rotation":
+        return place - np.pi, place + np.pi
+    width = high - low if np.isfinite(high - low) and high > low else max(abs(place), 0.1)
+    ends = [low if np.isfinite(low) else place - width, high if np.isfinite(high) else place + 3.0 * width]
+    return ends[0] - 0.6 * width, ends[1] + 0.6 * width
+
+
+def _heights(motion: ReducedMotion, potential: FloatArray) -> tuple[float, float]:
+    """Return the range of energies: the well of the motion, and as much again above."""
+    known = potential[np.isfinite(potential)]
+    inside = known[known <= motion.energy]
+    depth = motion.energy - float(np.min(inside)) if len(inside) else 0.0
+    depth = depth or 0.1 * max(abs(motion.energy), 1e-300)
+    return motion.energy + 1.2 * depth, motion.energy - 1.4 * depth
+
+
+@takes(motion=_MOTION, azimuth=optional(TEXT), periods=optional(whole("a number of periods", 1)), file=optional(FILE))
+def plot_top_path(
+    motion: ReducedMotion,
+    azimuth: str | None = None,
+    periods: int | None = None,
+    file: str | os.PathLike[str] | None = None,
+) -> Figure:
+    """Draw ``F(u)``, ``u = cos(theta)``, with its roots, and the path of the axis on the sphere between their circles.
+
+    ``u'^2 = F(u)`` is the motion of the axis' height (Goldstein, section 5.7; there it is f(u)).
+
+    Parameters
+    ----------
+    motion
+        What `atwood.reduced` gave of a top, or of what else has a polar angle for its coordinate.
+    azimuth
+        Path of the angle about the vertical; the first ignorable coordinate if not given.
+    periods
+        How many periods of nutation; as many as one turn about the vertical takes, if not given.
+    file
+        Where to save the picture.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+
+    Raises
+    ------
+    UsageError
+        If there is no such angle, or the polar angle does not come back.
+    """
+    known = motion.ignorable
+    if not known:
+        raise UsageError(
+            "nothing turns about the vertical in it", where=_scene(motion), advice="It has one coordinate."
+        )
+    path = known[0] if azimuth is None else azimuth
+    if path not in known:
+        raise UsageError("there is no such ignorable angle", where=path, advice=suggestion(path, known))
+    if motion.kind not in ("libration", "rest"):
+        raise UsageError("its polar angle does not come back", where=_scene(motion))
+    advance = abs(motion.advance[path])
+    count = periods or (max(1, min(60, round(2.0 * np.pi / advance))) if advance else 1)
+    found = motion.at(motion.t_start + np.linspace(0.0, count * motion.period, 200 * min(count, 30)))
+    theta, phi = found[motion.coordinate], found[path]
+    figure = new_figure(10.0, 4.8)
+    left, right = figure.subplots(1, 2)
+    _draw_f(left, motion)
+    draw_sphere(right)
+    around = np.linspace(0.0, 2.0 * np.pi, 300)
+    for end in motion.turning_points:
+        draw_on_sphere(right, _direction(np.full_like(around, end), around), GREY, 1.0)
+    draw_on_sphere(right, _direction(theta, phi), COLOURS[0], 1.8)
+    right.set_title(f"path of the axis, {count} periods", loc="left", fontsize=10, color=INK)
+    figure.suptitle(_scene(motion), x=0.02, ha="left", fontsize=11, fontweight="bold", color=INK)
+    if file is not None:
+        save_figure(figure, file)
+    return figure
+
+
+def _draw_f(axes: Axes, motion: ReducedMotion) -> None:
+    low, high = sorted(float(np.cos(end)) for end in motion.turning_points)
+    width = max(high - low, 1e-3)
+    u = np.linspace(max(-1.0, low - 0.8 * width), min(1.0, high + 0.8 * width), _POINTS)[1:-1]
+    now = motion.radial.at(np.arccos(u))
+    f = (1.0 - u**2) * 2.0 * (motion.energy - now.potential) / now.inertia
+    axes.plot(u, f, color=COLOURS[0], linewidth=1.8)
+    axes.axhline(0.0, color=GREY, linewidth=0.9)
+    for root in (low, high):
+        axes.plot(root, 0.0, marker="o", color=INK, markersize=6)
+        axes.annotate(
+            f"{root:.4g}", (root, 0.0), (0, 8), textcoords="offset points", ha="center", fontsize=9, color=INK
+        )
+    inside = (u >= low) & (u <= high)
+    largest = float(np.max(f[inside], initial=0.0)) or 1.0
+    axes.set_ylim(-1.2 * largest, 1.4 * largest)
+    polish(axes, "u = cos \N{GREEK SMALL LETTER THETA}", "F(u), 1/s\N{SUPERSCRIPT TWO}")
+
+
+def _direction(theta: FloatArray, phi: FloatArray) -> FloatArray:
+    """Return unit vectors from polar angles and azimuths, shape (points, 3)."""
+    return np.stack([np.sin(theta) * np.sin(phi), -np.sin(theta) * np.cos(phi), np.cos(theta)], axis=1)

@@ -1,0 +1,52 @@
+"""Curves on the unit sphere, as seen from a place above one side."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.plotting.canvas import GREY
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["SEEN", "draw_on_sphere", "draw_sphere"]
+
+
+def _view(azimuth: float, elevation: float) -> FloatArray:
+    """Return the axes of the picture (right, up, towards the eye) as rows."""
+    (sa, ca), (se, ce) = ((np.sin(angle), np.cos(angle)) for angle in np.radians([azimuth, elevation]))
+    return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
+
+
+SEEN = _view(38.0, 24.0)
+"""The first axis points to the lower left, the second to the lower right, the third up."""
+
+
+def draw_sphere(axes: Axes) -> None:
+    """Draw the outline of the sphere."""
+    axes.set_axis_off()
+    axes.set_aspect("equal")
+    around = np.linspace(0.0, 2.0 * np.pi, 200)
+    axes.fill(np.cos(around), np.sin(around), color="#eef2f6", zorder=0)
+    axes.plot(np.cos(around), np.sin(around), color=GREY, linewidth=1.2)
+
+
+def draw_on_sphere(axes: Axes, curve: FloatArray, colour: str, width: float) -> None:
+    """Draw a curve on the sphere, faint where it is behind.
+
+    Parameters
+    ----------
+    axes
+        Where.
+    curve
+        Unit vectors, shape (points, 3).
+    colour, width
+        Of the line.
+    """
+    x, y, depth = SEEN @ curve.T
+    for shown, alpha in ((depth >= 0.0, 1.0), (depth < 0.0, 0.22)):
+        wide = shown | np.roll(shown, 1)
+        axes.plot(np.where(wide, x, np.nan), np.where(wide, y, np.nan), color=colour, linewidth=width, alpha=alpha)
