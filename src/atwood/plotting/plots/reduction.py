@@ -54,8 +54,7 @@ def plot_effective_potential(motion: ReducedMotion, file: str | os.PathLike[str]
     for point in motion.turning_points:
         if np.isfinite(point):
             axes.plot(point, motion.energy, marker="o", color=INK, markersize=6)
-            axes.annotate(f"{point:.4g}", (point, motion.energy), (0, 8), textcoords="offset points", ha="center",
-                          fontsize=9, color=INK)  # fmt: skip
+            _label(axes, point, motion.energy)
     axes.set_xlim(low, high)
     axes.set_ylim(bottom, top)
     polish(axes, f"{motion.coordinate}, {_unit(motion)}", "energy, J")
@@ -64,6 +63,11 @@ def plot_effective_potential(motion: ReducedMotion, file: str | os.PathLike[str]
     if file is not None:
         save_figure(figure, file)
     return figure
+
+
+def _label(axes: Axes, x: float, y: float) -> None:
+    """Write the value of x above a point."""
+    axes.annotate(f"{x:.4g}", (x, y), (0, 8), textcoords="offset points", ha="center", fontsize=9, color=INK)
 
 
 def _scene(motion: ReducedMotion) -> str:
