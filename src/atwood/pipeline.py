@@ -3,9 +3,18 @@
     scene --flatten--> FlatScene --read_mechanism--> Mechanism --assemble_flat--> Assembly      `assemble`
           Assembly --find_start--> Start --run--> Run --> Result                                `simulate`
 
-Each stage takes frozen values and gives frozen values. What an assembly is asked for (equations, programs, their code)
-is worked out once and kept with it, or with all assemblies of its structure. `Result.timings` says how long each
-stage of `atwood.stages` took.
+| value | what it is | made in |
+|---|---|---|
+| `FlatScene` | the leaves of a scene with their values, and their connections | `model.local.flatten` |
+| `Mechanism` | the laws of all parts on symbols, and the joints and bodies they make | `mechanics.read` |
+| `Assembly` | a mechanism in one form; equations and programs are derived when they are asked for | here |
+| `Start` | consistent coordinates and speeds at the start | `simulation.initialization.start` |
+| `Run` | the samples of a run, in segments of one mode each, and what happened on the way | `simulation.run.run` |
+| `Result` | quantities by path, energies and reactions, computed when they are asked for | `result.result` |
+
+Each stage takes frozen values and gives frozen values; what is derived from an assembly is kept in caches beside it.
+Events enter other modes of an assembly, which is assembled anew for them (`forms.reassembly`). `Result.timings` says
+how long each stage of `atwood.stages` took.
 """
 
 from __future__ import annotations
@@ -137,7 +146,7 @@ def assemble_flat(
     all_modes = modes_of(flat) | dict(modes or {})
     with stage("mechanism"):
         mechanism = read_mechanism(flat, all_modes, line_signs)
-    chosen: Any = form
+    chosen: Any = form  # its type says which there are
     level = level if form == "dae" else ""
     source, orientation_coordinates = Source(_find_places), Orientation(orientation)
     made = Assembly(flat, mechanism, chosen, level, all_modes, source, orientation=orientation_coordinates)
@@ -145,7 +154,10 @@ def assemble_flat(
 
 
 def _find_places(assembly: Assembly) -> dict[str, dict[Expression, float]]:
-    """Return where a scene starts whose constraints on velocities are still what they are."""
+    """Return the start of a scene by the symbols of its coordinates, in both forms.
+
+    Constraints on velocities that can be integrated have constants of integration, which are read from there.
+    """
     start = find_start(assembly)
     reduced, maximal = assembly.regular, assembly.maximal
     q, _ = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
@@ -381,9 +393,12 @@ def _refuse_contradictions(assembly: Assembly, given: Mapping[str, str]) -> None
 
 
 def _with_line_signs(assembly: Assembly) -> tuple[Assembly, Start]:
-    """Return an assembly whose lengths on a line are signed by where things start, and the start."""
+    """Return an assembly whose lengths on a line are signed as at the start, and the start.
+
+    Signs are assumed from the values that were given. A start that contradicts them is found again with its own.
+    """
     start = find_start(assembly)
-    for _ in range(3):  # which is known only then
+    for _ in range(3):
         actual = actual_line_signs(assembly, start.time, start.coordinates, start.speeds, "reduced")
         if not line_signs_differ(assembly, actual):
             return assembly, start
