@@ -201,6 +201,12 @@ def test_an_assembly_says_what_it_is_of(roots):
     )
 
 
+def test_what_an_assembly_has_says_what_it_is(roots):
+    assembly = roots["result"].assembly
+    assert repr(assembly.observables) == "<Observables of 61 parts, by path>"
+    assert repr(assembly.shared).startswith("<Shared: ")
+
+
 def test_a_scene_put_together_step_by_step_names_its_parts():
     scene = atwood.Scene(gravity=0.0)
     ground, rod = scene.add("ground", Ground()), scene.add("rod", Rod(length=2.0))

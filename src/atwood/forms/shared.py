@@ -64,6 +64,9 @@ class Shared:
         self._made: dict[Hashable, Any] = {}
         self.lock = threading.RLock()
 
+    def __repr__(self) -> str:
+        return f"<Shared: {len(self._made)} of equations, programs and the like>"
+
     def __reduce__(self) -> tuple[Any, ...]:
         return Shared, ()  # what was made belongs to the process; who shared it does so again
 

@@ -21,6 +21,7 @@ from atwood.model.declare.component import Binding, bind
 from atwood.model.local.laws import LocalPart
 from atwood.model.returned import call_law, law_value, not_evaluated, one_scalar
 from atwood.model.values.vector import Vector
+from atwood.showing import count_of
 
 __all__ = ["MOMENTUM", "Observables", "Reader", "observe"]
 
@@ -76,6 +77,9 @@ class Observables(Mapping[str, Observable]):
         self._made: dict[str, dict[str, Observable]] = {}
         self._wholes: dict[str, Mapping[str, Observable]] = {}
         self._all: dict[str, Observable] | None = None
+
+    def __repr__(self) -> str:
+        return f"<Observables of {count_of(len(self._mechanism.locals_), 'part')}, by path>"  # counting would make them all
 
     def __getitem__(self, path: str) -> Observable:
         if self._all is not None and path in self._all:
