@@ -79,7 +79,8 @@ class Observables(Mapping[str, Observable]):
         self._all: dict[str, Observable] | None = None
 
     def __repr__(self) -> str:
-        return f"<Observables of {count_of(len(self._mechanism.locals_), 'part')}, by path>"  # counting would make them all
+        # To count them would make them all.
+        return f"<Observables of {count_of(len(self._mechanism.locals_), 'part')}, by path>"
 
     def __getitem__(self, path: str) -> Observable:
         if self._all is not None and path in self._all:
