@@ -26,10 +26,8 @@ from typing import Any
 from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import StartError, UsageError
-from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import check_level
-from atwood.forms.places import to_maximal
 from atwood.forms.reassembly import modes_of
 from atwood.forms.source import Source
 from atwood.forms.starting import with_constants_of_start
@@ -40,7 +38,7 @@ from atwood.model.local.flatten import FlatScene, flatten
 from atwood.progress import told
 from atwood.result.result import Result
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
-from atwood.simulation.initialization.start import Start, find_start
+from atwood.simulation.initialization.start import Start, find_places, find_start
 from atwood.simulation.problem.arguments import (
     ACCURACY,
     ATOL,
@@ -116,7 +114,7 @@ def assemble(
     with stage("flatten"):
         flat, own = flatten(scene, name), scene.copy()
     made = assemble_flat(flat, form=form, level=level, orientation=orientation)
-    return replace(made, source=Source(_find_places, own))
+    return replace(made, source=Source(find_places, own))
 
 
 def assemble_flat(
@@ -148,24 +146,9 @@ def assemble_flat(
         mechanism = read_mechanism(flat, all_modes, line_signs)
     chosen: Any = form  # its type says which there are
     level = level if form == "dae" else ""
-    source, orientation_coordinates = Source(_find_places), Orientation(orientation)
+    source, orientation_coordinates = Source(find_places), Orientation(orientation)
     made = Assembly(flat, mechanism, chosen, level, all_modes, source, orientation=orientation_coordinates)
     return with_constants_of_start(made)
-
-
-def _find_places(assembly: Assembly) -> dict[str, dict[Expression, float]]:
-    """Return the start of a scene by the symbols of its coordinates, in both forms.
-
-    Constraints on velocities that can be integrated have constants of integration, which are read from there.
-    """
-    start = find_start(assembly)
-    reduced, maximal = assembly.regular, assembly.maximal
-    q, _ = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
-    time = {assembly.mechanism.time: start.time, **assembly.known_relations}
-    return {
-        "reduced": {**time, **dict(zip(reduced.coordinates, start.coordinates.tolist(), strict=True))},
-        "dae": {**time, **dict(zip(maximal.coordinates, (float(x) for x in q), strict=True))},
-    }
 
 
 def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str | None) -> Assembly:

@@ -11,7 +11,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, KernelEvaluationError, StartError
-from atwood.expr import SparseMatrix, evaluate, jacobian
+from atwood.expr import Expression, SparseMatrix, evaluate, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
@@ -27,7 +27,7 @@ from atwood.simulation.initialization.speeds import solve_speeds
 from atwood.simulation.initialization.targets import sort_targets
 from atwood.tolerances import tolerances
 
-__all__ = ["Start", "find_start", "maximal_state", "own_state", "settle"]
+__all__ = ["Start", "find_places", "find_start", "maximal_state", "own_state", "settle"]
 
 
 @dataclass(frozen=True)
@@ -193,3 +193,18 @@ def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
     kept = [before.coordinates.index(symbol) for symbol in after.coordinates]
     speeds = np.array([u[symbol] for symbol in after.speeds])
     return replace(start, coordinates=start.coordinates[kept], speeds=speeds, rough=start.rough[kept])
+
+
+def find_places(assembly: Assembly) -> dict[str, dict[Expression, float]]:
+    """Return the start of a scene by the symbols of its coordinates, in both forms.
+
+    Constraints on velocities that can be integrated have constants of integration, which are read from there.
+    """
+    start = find_start(assembly)
+    reduced, maximal = assembly.regular, assembly.maximal
+    q, _ = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
+    time = {assembly.mechanism.time: start.time, **assembly.known_relations}
+    return {
+        "reduced": {**time, **dict(zip(reduced.coordinates, start.coordinates.tolist(), strict=True))},
+        "dae": {**time, **dict(zip(maximal.coordinates, (float(x) for x in q), strict=True))},
+    }
