@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from atwood import Result, Scene, assemble, simulate
+from atwood import Result, Scene, assemble, compare, simulate
 from atwood.arrays import FloatArray
 from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.initialization.start import find_start, own_state
@@ -363,3 +363,15 @@ def test_other_values_and_starts_use_the_same_programs() -> None:
     scene = FourBar(coupler_length=2.6)
     scene.start["crank.angle"] = 0.7
     assert_allclose(states(again), states(simulate(scene, t_end=0.2)), atol=1e-9)
+
+
+def test_comparisons_show_both_ways_to_close_the_loop() -> None:
+    found = compare(SliderCrank(t_end=0.3), rtols=(1e-5, 1e-7), forms=("reduced",))
+    assert {row.label for row in found.rows} == {"reduced", "reduced, explicit"}
+    tight = {row.label: row for row in found.rows if row.rtol == 1e-7}
+    numeric, closed = (tight[label] for label in ("reduced", "reduced, explicit"))
+    assert closed.steps is not None
+    assert numeric.steps is not None
+    assert closed.steps < 0.3 * numeric.steps
+    assert closed.error is not None
+    assert closed.error < 1e-4

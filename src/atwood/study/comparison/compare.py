@@ -10,6 +10,7 @@ import numpy as np
 
 from atwood.arguments import each, instance, takes, whole
 from atwood.errors import AtwoodError
+from atwood.forms.assembly import Assembly
 from atwood.forms.canonical import is_canonical
 from atwood.forms.dae import LEVELS
 from atwood.late import dataclass
@@ -18,8 +19,11 @@ from atwood.model.local.flatten import flatten
 from atwood.pipeline import assemble_flat
 from atwood.progress import told
 from atwood.showing import count_of, fitted, html_table
+from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRESS, RTOL, T_END, check_span
+from atwood.simulation.problem.closed_loops import solve_at
 from atwood.simulation.problem.options import SOLVERS
+from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.run.choice import implicit_solver
 from atwood.study.comparison.reference import (
     Assembled,
@@ -272,9 +276,19 @@ def _kinds(assembled: Assembled, forms: Sequence[str], levels: Sequence[str]) ->
             yield "reduced", "", "explicit"
             if is_canonical(assembly):
                 yield "reduced", "", "gauss"
+        elif assembly.reduced.constraints and _formulas_solve(assembled("reduced", "ggl")):
+            yield "reduced", "", "explicit"
     if "dae" in forms:
         has_constraints = bool(assembly.maximal.constraints)
         yield from (("dae", level, shared) for level in (levels if has_constraints else levels[:1]))
+
+
+def _formulas_solve(assembly: Assembly) -> bool:
+    """Return whether formulas solve the closed loops of a scene where it starts."""
+    start = find_start(assembly)
+    q, u = own_state(assembly, start)
+    plan = make_plan(assembly, start.time, q, u, start.length, 1.0)
+    return solve_at(plan, start.time, q, u) is not None
 
 
 def _measure(
