@@ -21,6 +21,7 @@ __all__ = [
     "INK",
     "SUFFIXES",
     "check_picture",
+    "finished",
     "need_matplotlib",
     "new_figure",
     "polish",
@@ -126,3 +127,10 @@ def save_figure(figure: Figure, file: str | os.PathLike[str]) -> Path:
     metadata: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(target.suffix.lower(), {})
     write_atomically(target, lambda part: figure.savefig(part, dpi=160, metadata=metadata))
     return target
+
+
+def finished(figure: Figure, file: str | os.PathLike[str] | None) -> Figure:
+    """Save a figure, if a file is given, and return it."""
+    if file is not None:
+        save_figure(figure, file)
+    return figure

@@ -15,7 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.files import write_atomically
 from atwood.plotting.camera import View, as_camera, check_view
-from atwood.plotting.canvas import ANIMATED, COLOURS, INK, check_picture, need_matplotlib, new_figure, save_figure
+from atwood.plotting.canvas import ANIMATED, COLOURS, INK, check_picture, finished, need_matplotlib, new_figure
 from atwood.plotting.planar.geometry import Picture, find_connectors, make_picture
 from atwood.plotting.planar.strokes import Pen, draw_trace
 from atwood.plotting.scene3d.drawing import draw_space, frame_space, space_panels
@@ -86,9 +86,7 @@ def plot_mechanism(
         picture = make_picture(result, traced.values())
         drawn = _draw_apart if picture.direction else _draw_together
         figure = drawn(result, picture, moments, list(traced.values()))
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)
 
 
 def _moments(result: Result, times: Sequence[float] | None) -> list[int]:

@@ -6,7 +6,7 @@ import os
 from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, instance, optional, takes, whole
-from atwood.plotting.canvas import INK, save_figure
+from atwood.plotting.canvas import INK, finished
 from atwood.plotting.drawing import plot_mechanism
 from atwood.theory.linearization import NormalModes
 
@@ -51,6 +51,4 @@ def plot_mode(modes: NormalModes, mode: int = 0, file: str | os.PathLike[str] | 
         fontweight="bold",
         color=INK,
     )
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)

@@ -10,7 +10,7 @@ import numpy as np
 from atwood.arguments import FILE, TEXT, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, save_figure
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure
 from atwood.plotting.scene3d.space_reading import read_scene
 from atwood.plotting.sphere import SEEN, draw_on_sphere, draw_sphere
 from atwood.result.result import Result
@@ -113,9 +113,7 @@ def plot_polhodes(result: Result, body: str | None = None, file: str | os.PathLi
     axes.set_ylim(-1.35, 1.6)
     title = f"{result.assembly.flat.name}: angular momentum seen from {part}"
     axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK)
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)
 
 
 def _principal(result: Result, body: str | None) -> tuple[str, FloatArray, FloatArray]:

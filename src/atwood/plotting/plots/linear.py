@@ -11,7 +11,7 @@ import numpy as np
 from atwood.arguments import FILE, TEXT, each as several, instance, number, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
 from atwood.theory.linearization import EquilibriumBranches, LinearModel, RootLocus
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def plot_bode(
     polish(below, "angular frequency, rad/s", "phase, deg")
     above.legend(frameon=False, fontsize=9, labelcolor=INK)
     above.set_title(f"{model.scene}: frequency response", loc="left", fontsize=11, fontweight="bold", color=INK)
-    return _finished(figure, file)
+    return finished(figure, file)
 
 
 @takes(model=_MODEL, file=optional(FILE), angular_frequencies=_FREQUENCIES)
@@ -109,7 +109,7 @@ def plot_nyquist(
     polish(axes, "real part", "imaginary part")
     axes.legend(frameon=False, fontsize=9, labelcolor=INK)
     axes.set_title(f"{model.scene}: Nyquist diagram", loc="left", fontsize=11, fontweight="bold", color=INK)
-    return _finished(figure, file)
+    return finished(figure, file)
 
 
 @takes(locus=instance("a RootLocus, as root_locus returns it", RootLocus), file=optional(FILE), scale=number())
@@ -147,7 +147,7 @@ def plot_root_locus(locus: RootLocus, file: str | os.PathLike[str] | None = None
     polish(left, locus.path + (f" x {scale:g}" if scale != 1.0 else ""), "real part; imaginary part dashed, 1/s")
     polish(right, "real part, 1/s", "imaginary part, 1/s")
     left.set_title(f"{locus.scene}: eigenvalues", loc="left", fontsize=11, fontweight="bold", color=INK)
-    return _finished(figure, file)
+    return finished(figure, file)
 
 
 @takes(
@@ -205,14 +205,8 @@ def plot_branches(
     axes.set_title(
         f"{branches.scene}: equilibria, stable with full lines", loc="left", fontsize=11, fontweight="bold", color=INK
     )
-    return _finished(figure, file)
+    return finished(figure, file)
 
 
 def _colours(count: int) -> list[str]:
     return [COLOURS[k % len(COLOURS)] for k in range(count)]
-
-
-def _finished(figure: Figure, file: str | os.PathLike[str] | None) -> Figure:
-    if file is not None:
-        save_figure(figure, file)
-    return figure

@@ -10,7 +10,7 @@ import numpy as np
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
 from atwood.theory.flow import PhasePortrait, PoincareSection
 
 if TYPE_CHECKING:
@@ -70,9 +70,7 @@ def plot_phase_portrait(portrait: PhasePortrait, file: str | os.PathLike[str] | 
                 [_HALF_TURNS[k].replace("pi", "\N{GREEK SMALL LETTER PI}") for k in range(low, high + 1)]
             )
     axes.set_title(f"{portrait.scene}: phase portrait", loc="left", fontsize=11, fontweight="bold", color=INK)
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)
 
 
 def _draw(axes: Axes, curve: FloatArray, portrait: PhasePortrait, colour: str, width: float) -> None:
@@ -128,6 +126,4 @@ def plot_section(section: PoincareSection, file: str | os.PathLike[str] | None =
         )
     polish(axes, *(f"{path}, {section.units[path]}" for path in paths[:2]))
     axes.set_title(f"{section.scene}: {section.surface}", loc="left", fontsize=11, fontweight="bold", color=INK)
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)

@@ -6,7 +6,7 @@ import os
 from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, instance, optional, takes
-from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
 from atwood.study.comparison.compare import Comparison, ComparisonRow
 
 if TYPE_CHECKING:
@@ -59,9 +59,7 @@ def plot_comparison(comparison: Comparison, file: str | os.PathLike[str] | None 
     left.set_title(
         f"{comparison.scene} to t = {comparison.t_end:g} s", loc="left", fontsize=11, fontweight="bold", color=INK
     )
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)
 
 
 def _plain_ticks(axes: Axes) -> None:

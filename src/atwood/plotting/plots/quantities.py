@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.errors import ResultError
 from atwood.model.declare.quantities import PATHS
-from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
 from atwood.result.files import SavedResult
 from atwood.result.result import Result
 
@@ -91,9 +91,7 @@ def plot(
     panels[-1].set_xlabel("time, s", color=INK, fontsize=10)
     panels[0].set_title(_title(result), loc="left", fontsize=11, fontweight="bold", color=INK)
     figure.align_ylabels(list(panels))
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)
 
 
 def _title(result: Result | SavedResult) -> str:

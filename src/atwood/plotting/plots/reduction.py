@@ -10,7 +10,7 @@ import numpy as np
 from atwood.arguments import FILE, TEXT, instance, optional, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.plotting.canvas import COLOURS, GREY, INK, new_figure, polish, save_figure
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
 from atwood.plotting.sphere import draw_on_sphere, draw_sphere
 from atwood.theory.reduction import ReducedMotion
 
@@ -60,9 +60,7 @@ def plot_effective_potential(motion: ReducedMotion, file: str | os.PathLike[str]
     polish(axes, f"{motion.coordinate}, {_unit(motion)}", "energy, J")
     axes.legend(frameon=False, fontsize=9, labelcolor=INK)
     axes.set_title(f"{_scene(motion)}: {motion.kind}", loc="left", fontsize=11, fontweight="bold", color=INK)
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)
 
 
 def _label(axes: Axes, x: float, y: float) -> None:
@@ -155,9 +153,7 @@ def plot_top_path(
     draw_on_sphere(right, _direction(theta, phi), COLOURS[0], 1.8)
     right.set_title(f"path of the axis, {count} periods", loc="left", fontsize=10, color=INK)
     figure.suptitle(_scene(motion), x=0.02, ha="left", fontsize=11, fontweight="bold", color=INK)
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)
 
 
 def _draw_f(axes: Axes, motion: ReducedMotion) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.errors import UsageError
 from atwood.model.declare.quantities import PATHS
-from atwood.plotting.canvas import COLOURS, INK, new_figure, polish, save_figure
+from atwood.plotting.canvas import COLOURS, INK, finished, new_figure, polish
 from atwood.study.sweeps.result import Sweep
 
 if TYPE_CHECKING:
@@ -69,9 +69,7 @@ def plot_sweep(sweep: Sweep, paths: Iterable[str] | None = None, file: str | os.
             _draw_curves(axes, sweep, path, numbers[0])
     title = f"{sweep.scene}, {len(sweep)} runs at t = {sweep.time[-1]:g} s"
     panels[0, 0].set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK)
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)
 
 
 def _label(sweep: Sweep, path: str) -> str:

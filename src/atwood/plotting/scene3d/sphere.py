@@ -10,7 +10,7 @@ import numpy as np
 
 from atwood.errors import UsageError
 from atwood.plotting.camera import Camera, View, as_camera
-from atwood.plotting.canvas import COLOURS, INK, new_figure, save_figure
+from atwood.plotting.canvas import COLOURS, INK, finished, new_figure
 from atwood.plotting.scene3d.painter import lighter
 from atwood.plotting.scene3d.picture import Trail
 from atwood.plotting.scene3d.scenery import draw_corner_axes, draw_sphere
@@ -81,9 +81,7 @@ def plot_on_sphere(
         axes.set_axis_off()
         axes.set_title(name, fontsize=10, color=INK)
     draw_corner_axes(panels[0], camera, bounds)
-    if file is not None:
-        save_figure(figure, file)
-    return figure
+    return finished(figure, file)
 
 
 def _panels(count: int, wide: float, lines: int) -> tuple[Figure, list[Axes]]:
