@@ -13,6 +13,7 @@ from atwood import (
     UnsupportedError,
     UsageError,
     equations,
+    point_transformation,
     reduced,
     routhian,
     simulate,
@@ -163,6 +164,23 @@ def test_a_circle_and_a_hyperbola() -> None:
     assert away.period == math.inf
     with pytest.raises(UnsupportedError, match="does not come back"):
         away.at(1.0)
+
+
+def test_kepler_in_polar_coordinates_and_two_bodies_in_relative_ones() -> None:
+    r, phi = sympy.symbols("r phi", positive=True)
+    scene = SCENES["kepler"](eccentricity=0.6, mass=1.3, strength=0.9)
+    polar = {"body.position.x": r * sympy.cos(phi), "body.position.z": r * sympy.sin(phi)}
+    found = reduced(point_transformation(scene, polar, [r, phi]))
+    assert (found.coordinate, found.ignorable) == ("r", ("phi",))
+    assert found.turning_points == pytest.approx((0.4, 1.6), rel=1e-10)
+    assert found.period == pytest.approx(2.0 * math.pi * math.sqrt(1.3 / 0.9), rel=1e-10)
+    assert found.advance["phi"] == pytest.approx(2.0 * math.pi, rel=1e-10)
+    result = simulate(scene, t_end=2.0, rtol=1e-13, solver="taylor", outputs=9)
+    along = found.at(result.time)
+    assert along["r"] * np.cos(along["phi"]) == pytest.approx(result["body.position.x"], abs=1e-10)
+    assert found.expression.has(r)
+    with pytest.raises(UnsupportedError, match="not ignorable"):
+        reduced(point_transformation(scene, {"body.position.x": r + phi, "body.position.z": phi}, [r, phi]))
 
 
 # -- in symbols -------------------------------------------------------------------------------------------------------

@@ -35,6 +35,8 @@ class PointTransformation:
         The new momenta ``dL/dQ'`` in terms of velocities.
     hamiltonian
         The new Hamiltonian: ``K = H + dF/dt`` with ``F = P . Q(q, t)``.
+    source
+        The Hamiltonian in the old coordinates.
     """
 
     coordinates: tuple[Sympy, ...]
@@ -44,6 +46,7 @@ class PointTransformation:
     lagrangian: Sympy
     definitions: tuple[Sympy, ...]
     hamiltonian: Sympy
+    source: Hamiltonian
 
     @property
     def ignorable(self) -> tuple[Sympy, ...]:
@@ -117,5 +120,5 @@ def point_transformation(
     lagrangian = collected(lagrangian, rates)
     definitions = tuple(short(lagrangian.diff(one)) for one in rates)
     return PointTransformation(
-        new, rates, momenta, dict(zip(h.coordinates, values, strict=True)), lagrangian, definitions, k
+        new, rates, momenta, dict(zip(h.coordinates, values, strict=True)), lagrangian, definitions, k, h
     )

@@ -12,7 +12,7 @@ from atwood.analysis.conservation.quantities import Quantities
 from atwood.analysis.reduction.parts import parts_of
 from atwood.analysis.reduction.quadrature import Path, find_path
 from atwood.analysis.reduction.radial import Radial
-from atwood.arguments import TEXT, optional, takes
+from atwood.arguments import TEXT, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.expr import OutputGroup, Program, depends_on
@@ -22,10 +22,11 @@ from atwood.forms.program import state_groups
 from atwood.forms.quantities import observer
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
+from atwood.theory.canonical.points import PointTransformation
 from atwood.theory.reduction.routhian import Routhian, ignorable_of, routhian_of
+from atwood.theory.reduction.transformed import start_in, transformed_parts
 
 __all__ = ["ReducedMotion", "reduced"]
 
@@ -49,11 +50,13 @@ class ReducedMotion:
     path
         Turning points and quadratures.
     routhian
-        The same in symbols.
+        The same in symbols; None of a scene in other coordinates.
     start
         Values of all coordinates at the start, by path.
     t_start
         Time of the start, s.
+    potential
+        The effective potential in symbols, of a scene in other coordinates.
     """
 
     coordinate: str
@@ -62,9 +65,10 @@ class ReducedMotion:
     energy: float
     radial: Radial
     path: Path
-    routhian: Routhian
+    routhian: Routhian | None
     start: Mapping[str, float]
     t_start: float
+    potential: Any = None
 
     @property
     def kind(self) -> str:
@@ -98,7 +102,7 @@ class ReducedMotion:
     @cached_property
     def expression(self) -> Any:
         """The effective potential as a sympy expression of the coordinate, the momenta and parameters."""
-        return self.routhian.effective_potential
+        return self.potential if self.routhian is None else self.routhian.effective_potential
 
     def effective_potential(self, values: Any) -> FloatArray:
         """Return the effective potential at values of the coordinate, J."""
@@ -136,6 +140,8 @@ class ReducedMotion:
             Positions, angles and axes by path; of those that depend on velocities or forces, and of angles that are
             not counted, none are returned.
         """
+        if self.routhian is None:
+            return {}
         assembly, found = self.routhian.formulas.assembly, self.at(times)
         e = assembly.reduced
         late = [*e.speeds, *e.accelerations, *(one.symbol for one in assembly.reactions)]
@@ -159,8 +165,13 @@ class ReducedMotion:
         return f"<ReducedMotion of {self.coordinate}: {told}, period {self.period:.6g} s>"
 
 
-@takes(scene=SCENE, coordinate=optional(TEXT), orientation=optional(TEXT))
-def reduced(scene: Model | Assembly, coordinate: str | None = None, *, orientation: str | None = None) -> ReducedMotion:
+_GIVEN = instance("a scene, an assembly, or what `point_transformation` returns", Model, Assembly, PointTransformation)
+
+
+@takes(scene=_GIVEN, coordinate=optional(TEXT), orientation=optional(TEXT))
+def reduced(
+    scene: Model | Assembly | PointTransformation, coordinate: str | None = None, *, orientation: str | None = None
+) -> ReducedMotion:
     """Return the motion of a scene from its start, reduced to one coordinate and done by quadrature.
 
     All coordinates but one must be ignorable, and the energy function conserved: pendulums, orbits in polar
@@ -171,7 +182,8 @@ def reduced(scene: Model | Assembly, coordinate: str | None = None, *, orientati
     Parameters
     ----------
     scene
-        The scene, or an assembly of it.
+        The scene, or an assembly of it; or the scene in other coordinates, as `atwood.point_transformation` returns it,
+        whose names then stand in place of paths: an orbit in polar coordinates.
     coordinate
         Path of the coordinate that is left; the one that is not ignorable if not given.
     orientation
@@ -185,6 +197,8 @@ def reduced(scene: Model | Assembly, coordinate: str | None = None, *, orientati
     SolveError
         If the motion is too near to a separatrix.
     """
+    if isinstance(scene, PointTransformation):
+        return _transformed(scene)
     assembly, found, names = ignorable_of(scene, orientation)
     paths = [one.name for one in found.names]
     left = [path for path in paths if path not in names]
@@ -227,6 +241,49 @@ def reduced(scene: Model | Assembly, coordinate: str | None = None, *, orientati
         routhian_of(assembly, found, ignorable),
         dict(zip(paths, map(float, q), strict=True)),
         start.time,
+    )
+
+
+def _transformed(given: PointTransformation) -> ReducedMotion:
+    """Return the motion of a scene in other coordinates, of which all but one are ignorable."""
+    import sympy
+
+    h, gone = given.source, given.ignorable
+    left = [k for k, one in enumerate(given.coordinates) if one not in gone]
+    if len(left) != 1 or h.other_forces or given.hamiltonian.has(sympy.Symbol("t")):
+        told = "forces act that do not follow from H" if h.other_forces else "H depends on time"
+        if len(left) != 1:
+            told = (
+                f"{', '.join(str(given.coordinates[k]) for k in left) or 'none'} of its coordinates are not ignorable"
+            )
+        raise UnsupportedError(f"its motion is not reduced to one coordinate: {told}", where=h.name)
+    number, others = left[0], tuple(k for k in range(len(given.coordinates)) if k != left[0])
+    t, q, v = start_in(given)
+    parts = transformed_parts(given, number)
+    now = parts(q[:, None])
+    momenta = now.mass[:, :, 0] @ v + now.linear[:, 0]
+    radial = Radial(parts, number, others, momenta[list(others)], q)
+    here, names = radial.at([q[number]]), [str(one) for one in given.coordinates]
+    # What turns as an angle does is known by its sines and cosines alone: then a whole turn changes nothing.
+    turned = parts(q[:, None] + 2.0 * np.pi * np.eye(len(q))[:, [number]])
+    is_angle = (
+        bool(np.allclose(turned.potential, now.potential, rtol=1e-12, atol=0.0))
+        and not given.coordinates[number].is_positive
+    )
+    scale = 1.0 if is_angle else find_start(h.assembly).length
+    path = find_path(radial, float(q[number]), float(v[number]), is_angle, scale, f"{h.name}: {names[number]}")
+    ignorable = tuple(names[k] for k in others)
+    return ReducedMotion(
+        names[number],
+        ignorable,
+        dict(zip(ignorable, map(float, radial.momenta), strict=True)),
+        float(here.potential[0] + 0.5 * here.inertia[0] * v[number] ** 2),
+        radial,
+        path,
+        None,
+        dict(zip(names, map(float, q), strict=True)),
+        t,
+        given.hamiltonian.xreplace({given.momenta[number]: sympy.Integer(0)}),
     )
 
 
