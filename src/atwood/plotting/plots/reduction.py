@@ -69,12 +69,11 @@ def _label(axes: Axes, x: float, y: float) -> None:
 
 
 def _scene(motion: ReducedMotion) -> str:
-    return motion.routhian.formulas.assembly.flat.name
+    return motion.scene
 
 
 def _unit(motion: ReducedMotion) -> str:
-    names = motion.routhian.formulas.expressions.names
-    return next(one.unit for one in names if one.name == motion.coordinate)
+    return motion.unit
 
 
 def _range(motion: ReducedMotion) -> tuple[float, float]:

@@ -57,6 +57,8 @@ class ReducedMotion:
         Time of the start, s.
     potential
         The effective potential in symbols, of a scene in other coordinates.
+    scene, unit
+        What the scene is called, and the unit of the coordinate that is left.
     """
 
     coordinate: str
@@ -69,6 +71,8 @@ class ReducedMotion:
     start: Mapping[str, float]
     t_start: float
     potential: Any = None
+    scene: str = ""
+    unit: str = ""
 
     @property
     def kind(self) -> str:
@@ -241,6 +245,8 @@ def reduced(
         routhian_of(assembly, found, ignorable),
         dict(zip(paths, map(float, q), strict=True)),
         start.time,
+        scene=assembly.flat.name,
+        unit=found.names[number].unit,
     )
 
 
@@ -284,6 +290,8 @@ def _transformed(given: PointTransformation) -> ReducedMotion:
         dict(zip(names, map(float, q), strict=True)),
         t,
         given.hamiltonian.xreplace({given.momenta[number]: sympy.Integer(0)}),
+        h.name,
+        "rad" if is_angle else "m",
     )
 
 
