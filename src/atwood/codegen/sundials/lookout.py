@@ -78,7 +78,7 @@ class LookoutCode:
         allowed, data)``: sends IDA on to a time from look to look, with the addresses of ``IDASolve`` and
         ``IDAGetNumSteps``. It returns `NOTICED`, or IDA's flag.
     fill
-        See `~atwood.integrators.protocol.Lookout`. It returns the same, or `PAUSED` or `UNREADABLE`.
+        See `~atwood.integrators.compiled_functions.Lookout`. It returns the same, or `PAUSED` or `UNREADABLE`.
     """
 
     def __init__(self, program: Program, shape: Shape, built: Built) -> None:

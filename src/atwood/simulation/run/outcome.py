@@ -65,7 +65,7 @@ class Outcome:
     t
         When.
     status, message
-        Why: ``"finished"``, ``"event"``, or as in `atwood.simulation.run.run.Run`.
+        Why: ``"finished"``, ``"event"``, or as in `atwood.simulation.run.made.Run`.
     statistics
         What it cost.
     event
