@@ -97,9 +97,15 @@ def test_the_pendulum_that_swings(amplitude):
     found = action_angle(SimplePendulum(release_angle=amplitude))
     w, square = np.sqrt(9.81), np.sin(amplitude / 2.0) ** 2
     assert found.kind == "libration"
-    assert found.period == pytest.approx(4.0 * ellipk(square) / w, rel=1e-9)
+    assert found.period == pytest.approx(4.0 * ellipk(square) / w, rel=1e-10)
     assert found.action == pytest.approx(16.0 * w * (ellipe(square) - (1.0 - square) * ellipk(square)), rel=1e-12)
     np.testing.assert_allclose(found.turning_points, [-amplitude, amplitude], rtol=1e-12)
+
+
+def test_small_amplitudes_lose_digits_and_say_so():
+    found = action_angle(SimplePendulum(release_angle=1e-4))
+    assert found.period == pytest.approx(2.0 * np.pi / np.sqrt(9.81), rel=1e-6)
+    assert 1e-13 < found.error < 1e-6
 
 
 def test_the_pendulum_that_goes_round():

@@ -14,6 +14,7 @@ from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
+from atwood.simulation.initialization.start import find_start
 from atwood.theory.action.quadrature import Level, level_through
 from atwood.theory.hamiltonian import hamiltonian
 
@@ -65,6 +66,11 @@ class ActionAngle:
     def frequency(self) -> float:
         """``dH/dJ``, Hz."""
         return 1.0 / self.level.period
+
+    @property
+    def error(self) -> float:
+        """Relative error of period and action, as estimated: at amplitudes far below the scene's size digits are lost."""
+        return self.level.error
 
     @property
     def turning_points(self) -> tuple[float, float] | None:
@@ -164,7 +170,7 @@ def action_angle(scene: Model | Assembly | Hamiltonian) -> ActionAngle:
         raise UsageError(f"it has no level of H that it stays on: {h.sentence}", where=h.name)
     q, p = h.start()
     angle = h.assembly.reduced.names[0].unit == "rad"
-    size = 1.0 if angle else max(abs(float(q[0])), 1e-3)
+    size = 1.0 if angle else find_start(h.assembly).length
 
     def energy(places: FloatArray, momenta: FloatArray) -> FloatArray:
         return h(places[:, None], momenta[:, None])

@@ -30,6 +30,9 @@ Where the coordinate has a period, no step is longer than the last share of it.
 _POINTS, _MOST, _SAME, _NOISE = 16, 2**15, 3e-14, 2e-14
 """Points at first and at most; the share that halved steps may change, and its part that goes with cancellation."""
 
+_ENOUGH, _KNOWN = 128, 1e-6
+"""Points from which on it is looked whether more make it worse, and the least accuracy of what is given."""
+
 _QUADRATIC = 1e-9
 
 
@@ -49,6 +52,8 @@ class Level:
         The integral of p dq over one turn, J s.
     period
         The derivative of that by E, s.
+    error
+        Of both, as a share of them: what halving the steps changed at last.
     """
 
     kind: str
@@ -56,6 +61,7 @@ class Level:
     ends: tuple[float, float]
     action: float
     period: float
+    error: float
     _coefficients: Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 
     def momentum(self, q: FloatArray, sign: float = 1.0) -> FloatArray:
@@ -139,8 +145,8 @@ def level_through(
         kind, low, high = "rotation", q, q + turn
     else:
         raise SolveError(f"{name} comes back to no turning point: its motion has no period", where=name)
-    action, period = _integrals(coefficients, total, kind, low, high, name)
-    return Level(kind, total, (low, high), action, period, coefficients)
+    action, period, error = _integrals(coefficients, total, kind, low, high, name)
+    return Level(kind, total, (low, high), action, period, error, coefficients)
 
 
 def _unit(energy: Energy, q: float, p: float, total: float) -> float:
@@ -209,10 +215,10 @@ def _integrals(
     low: float,
     high: float,
     name: str,
-) -> tuple[float, float]:
-    """Return the integral of p over one turn, and of dp/dE, by equal steps that are halved until nothing changes."""
+) -> tuple[float, float, float]:
+    """Return the integral of p over one turn, that of dp/dE, and the share that the last halving of steps changed."""
     before: tuple[float, float] | None = None
-    count = _POINTS
+    best, count = ((0.0, 0.0), np.inf), _POINTS
     while count <= _MOST:
         x = np.pi * (np.arange(count) + 0.5) / count
         if kind == "libration":
@@ -228,13 +234,16 @@ def _integrals(
             found = float(np.sum(weights * (root - b) / (2.0 * np.abs(a)))), float(np.sum(weights / root))
         # Where H is far larger than what the motion exchanges, less is known of the difference.
         lost = float(np.max(np.abs(c)) + abs(total)) / max(float(np.max(np.abs(c - total))), 1e-300)
-        same = _SAME + _NOISE * lost
-        if before is not None and all(abs(n - o) <= same * abs(n) for n, o in zip(found, before, strict=True)):
-            return found
+        if before is not None:
+            change = max(abs(n - o) / abs(n) for n, o in zip(found, before, strict=True))
+            if change < best[1]:
+                best = found, change
+            # Beyond some number of points all that is added is rounding close to the turning points.
+            if change <= _SAME + _NOISE * lost or (count > _ENOUGH and change > 4.0 * best[1]):
+                break
         before, count = found, 2 * count
-    assert before is not None
-    if all(abs(now - then) <= 1e-9 * abs(now) for now, then in zip(found, before, strict=True)):
-        return found
+    if best[1] <= _KNOWN:
+        return *best[0], best[1]
     raise SolveError(
         f"{name} takes for ever to come back: its energy is that of a separatrix",
         where=name,
