@@ -69,7 +69,7 @@ class ActionAngle:
 
     @property
     def error(self) -> float:
-        """Relative error of period and action, as estimated: at amplitudes far below the scene's size digits are lost."""
+        """The relative error of period and action, as estimated: amplitudes far below the scene's size lose digits."""
         return self.level.error
 
     @property
