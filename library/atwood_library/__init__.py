@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from atwood_library.forces.torque import Torque as Torque
     from atwood_library.forces.torsion_damper import TorsionDamper as TorsionDamper
     from atwood_library.forces.torsion_spring import TorsionSpring as TorsionSpring
+    from atwood_library.interfaces.reparametrized import reparametrized as reparametrized
     from atwood_library.joints.blade import Blade as Blade
     from atwood_library.joints.constant_velocity import ConstantVelocity as ConstantVelocity
     from atwood_library.joints.cylindrical import Cylindrical as Cylindrical
@@ -75,7 +76,6 @@ if TYPE_CHECKING:
     from atwood_library.joints.point_on_plane import PointOnPlane as PointOnPlane
     from atwood_library.joints.point_on_surface import PointOnSurface as PointOnSurface
     from atwood_library.joints.rack_and_pinion import RackAndPinion as RackAndPinion
-    from atwood_library.joints.reparametrized import reparametrized as reparametrized
     from atwood_library.joints.rolling_disc import RollingDisc as RollingDisc
     from atwood_library.joints.rolling_ellipsoid import RollingEllipsoid as RollingEllipsoid
     from atwood_library.joints.rolling_on_round import RollingOnRound as RollingOnRound
@@ -242,7 +242,7 @@ _MODULES = {
     "Weld": "joints.weld",
     "Wheel": "parts.wheel",
     "WoundRope": "ropes.wound_rope",
-    "reparametrized": "joints.reparametrized",
+    "reparametrized": "interfaces.reparametrized",
 }
 """The module of each part, below this package."""
 
