@@ -26,7 +26,7 @@ from ..references.modelica.rotational import compare_braking_torque
 from ..references.modelica.translational import compare_braking_force
 
 ROOT = Path(__file__).parents[2]
-DOMAINS = ("elementary", "constraints", "loops", "rotors", "rotational", "translational")
+DOMAINS = ("elementary", "springs", "constraints", "loops", "rotors", "rotational", "translational")
 EXAMPLES: dict[str, Example] = {}
 REFERENCE: dict[str, Any] = {}
 for domain in DOMAINS:

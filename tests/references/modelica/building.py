@@ -20,11 +20,14 @@ __all__ = [
     "bar",
     "box",
     "cylinder",
+    "guides",
+    "hinges",
     "made",
     "moments",
     "orientation",
     "overlong",
     "rotation",
+    "vector",
 ]
 
 Way = tuple[float, float, float]
@@ -186,3 +189,20 @@ def made(parts: Mapping[str, Component], joined: str, start: Mapping[str, Any] |
                 scene.connect(connector(first), connector(other))
     scene.start.update(start or {})
     return scene
+
+
+def vector(theirs: str, ours: str) -> dict[str, str]:
+    """Return the three components of a vector."""
+    return {f"{theirs}[{i}]": f"{ours}.{axis}" for i, axis in enumerate("xyz", 1)}
+
+
+def hinges(*names: str) -> dict[str, str]:
+    """Return the signals of hinges that have the same names here."""
+    return {
+        f"{name}.{m}": f"{name}.{ours}" for name in names for m, ours in (("phi", "angle"), ("w", "angular_velocity"))
+    }
+
+
+def guides(*names: str) -> dict[str, str]:
+    """Return the signals of guides that have the same names here."""
+    return {f"{name}.{m}": f"{name}.{ours}" for name in names for m, ours in (("s", "displacement"), ("v", "speed"))}
