@@ -80,6 +80,11 @@ def test_trajectories_meet_those_of_modelica(name: str, form: str) -> None:
         assert max(off[early]) < SAME or path in EXACT, path
 
 
+def test_loops_whose_formulas_would_divide_by_an_exact_zero_run() -> None:
+    """A loop in space of a ball, a guide and a universal joint, beside a hinge that is parallel to one of its axes."""
+    test_trajectories_meet_those_of_modelica("springs.LineForceWithTwoMasses", "reduced")
+
+
 @pytest.mark.sample(0)
 @pytest.mark.parametrize("name", [name for name, example in EXAMPLES.items() if example.long])
 def test_long_trajectories_meet_those_of_modelica(name: str) -> None:

@@ -9,6 +9,7 @@ from atwood.expr.core.analysis import (
     live,
     substitute,
 )
+from atwood.expr.core.arithmetic import DivisionByExactZeroError
 from atwood.expr.core.derivatives import SparseMatrix, jacobian, jvp, sweeps_exceed, vjp
 from atwood.expr.core.functions import (
     Scalar,
@@ -42,6 +43,7 @@ from atwood.expr.core.program import InputGroup, OutputGroup, Program
 from atwood.expr.simplify.collect import collect
 
 __all__ = [
+    "DivisionByExactZeroError",
     "Expression",
     "ExternalFunction",
     "Graph",

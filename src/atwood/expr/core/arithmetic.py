@@ -10,7 +10,7 @@ from atwood.errors import AtwoodError
 if TYPE_CHECKING:
     from atwood.expr.core.graph import Expression
 
-__all__ = ["add", "divide", "multiply", "negate", "plainer_opposite", "subtract"]
+__all__ = ["DivisionByExactZeroError", "add", "divide", "multiply", "negate", "plainer_opposite", "subtract"]
 
 
 def add(a: Expression, b: Expression) -> Expression:
@@ -242,13 +242,17 @@ def _is_safe(factor: float) -> bool:
     return 1e-290 < abs(factor) < 1e290
 
 
+class DivisionByExactZeroError(AtwoodError):
+    """A quotient whose divisor is zero by the structure of a scene, whatever its coordinates are."""
+
+
 def divide(a: Expression, b: Expression) -> Expression:
     """Return ``a / b``; dividing by the constant 0 is an error."""
     graph = a.graph
     if b.operation == "constant":
         divisor = b.payload
         if divisor == 0.0:
-            raise AtwoodError(
+            raise DivisionByExactZeroError(
                 f"{a!r} is divided by the constant 0",
                 advice="A quantity that is exactly zero shapes the equations: leave the part out, or give it a size.",
             )

@@ -20,7 +20,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import check_time
 from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError
-from atwood.expr import Expression, Program, depends_on
+from atwood.expr import DivisionByExactZeroError, Expression, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.loops.assur_groups import Loops
@@ -151,16 +151,21 @@ class _Choices:
         self._forms: dict[tuple[int, ...], ClosedForm | None] = {}
 
     def form(self, assembly: Assembly, independent: tuple[int, ...]) -> ClosedForm | None:
-        """Return the programs for one choice; None where the loops are not of such a form."""
+        """Return the programs for one choice; None where the loops are not of such a form.
+
+        Formulas whose divisor is zero by structure, as between axes that are always parallel, are none.
+        """
         if independent not in self._forms:
             with assembly.shared.lock:
                 found = self.loops.solve(independent)
-                name = assembly.flat.name
-                self._forms[independent] = (
-                    None
-                    if found is None
-                    else closed_form(name, self.equations, assembly.parameters, found, assembly.rows)
-                )
+                try:
+                    self._forms[independent] = (
+                        None
+                        if found is None
+                        else closed_form(assembly.flat.name, self.equations, assembly.parameters, found, assembly.rows)
+                    )
+                except DivisionByExactZeroError:
+                    self._forms[independent] = None
         return self._forms[independent]
 
 
