@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import time
 from collections import Counter
 
@@ -29,6 +30,7 @@ def main(
     kinds: tuple[str, ...], count: int, seed: int | None, only: int | None, workers: int, limit: float, as_json: bool
 ) -> None:
     """Make random trials and say what was found; the exit status is 1 if anything was."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     chosen = kinds or tuple(kind for kind in KINDS if kind != "memory")  # which takes long by itself
     console = Console(stderr=True)
     if only is not None:
