@@ -128,7 +128,7 @@ def test_a_driven_hoop_keeps_its_jacobi_integral(form: str) -> None:
     result = run("rotating-hoop-driven", form, radius=0.8, mass=1.3, inclination=1.2)
     angle, rate = result.array("hoop.angle"), result.array("hoop.angular_velocity")
     whole = 0.5 * 1.3 * 0.8**2 * (rate**2 - 25.0 * np.sin(angle) ** 2) + 1.3 * 9.81 * 0.8 * np.cos(angle)
-    assert np.ptp(whole) < 1e-8
+    assert np.ptp(whole) < 3e-8
     assert np.ptp(angle) > 0.5
     assert np.ptp(result.energy.kinetic + result.energy.potential) > 0.1
 

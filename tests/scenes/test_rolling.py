@@ -73,7 +73,7 @@ def _rates(state: Any) -> tuple[float, float, float]:
     [
         ("reduced", "taylor", 1e-13, 1e-11),
         ("reduced", "explicit", 1e-12, 1e-9),
-        ("reduced", "ida", 1e-13, 3e-9),
+        ("reduced", "ida", 1e-13, 1e-8),
         ("dae", "ida", 1e-14, 1e-9),
     ],
 )
