@@ -312,7 +312,7 @@ def _contribution(
     mechanism, graph = assembly.mechanism, equations.graph
     local, site, kinematics = mechanism.locals_[path], equations.site, equations.kinematics
     mapping = {**local_map(site, local, kinematics), **signals}
-    linked = list(local.signal_symbols.values())
+    linked = [*local.signal_symbols.values(), *local.stand_ins]
     # What follows the output of another part is no potential of the scene, and a Lagrangian is not T - V.
     plain = replace(local, potentials=_free_of(local.potentials, linked), lagrangians=())
     locals_ = {**mechanism.locals_, path: plain}
