@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +13,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from atwood import Model, Result, SolveError, simulate
-from atwood.integrators.ida import native
+from atwood.integrators.ida import memory, native
 from atwood.integrators.ida.memory import IdaMemory
 from atwood.integrators.ida.native import NativeSession
 from atwood.integrators.protocol import StepResult
@@ -108,3 +111,25 @@ def test_where_it_fails_what_came_before_is_kept(monkeypatch: pytest.MonkeyPatch
     count = len(before.time)
     assert before.time[-1] == pytest.approx(0.5, abs=0.006)
     assert_array_equal(before["crank.angle"], expected["crank.angle"][:count])
+
+
+def test_what_machine_code_writes_to_lives_as_long_as_the_session(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An address alone keeps nothing: what was freed would be written to, and whatever stands there then."""
+    taken: list[weakref.ref[Any]] = []
+    open_fill, address = IdaMemory.fill, ctypes.addressof
+
+    def watched(self: IdaMemory, lookout: Any) -> Any:
+        def noted(one: Any) -> int:
+            taken.append(weakref.ref(one))
+            return address(one)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(memory.ctypes, "addressof", noted)
+            go = open_fill(self, lookout)
+        gc.collect()
+        assert all(one() is not None for one in taken)
+        return go
+
+    monkeypatch.setattr(IdaMemory, "fill", watched)
+    simulate(FourBar(), solver="ida", t_end=0.2)
+    assert len(taken) >= 3

@@ -239,6 +239,7 @@ class IdaMemory:
         reached, y, yp = ctypes.addressof(self._time), self.y.ctypes.data, self.yp.ctypes.data
         places = reached, self._y, self._yp, y, yp
         data, filled_at, end_at = c_void_p(lookout.data), ctypes.addressof(count), ctypes.addressof(end)
+        self.keep(lookout, count, end)  # machine code writes to them as long as the session lives
 
         def go(times: FloatArray, table: FloatArray, filled: int, allowed: int) -> tuple[int, float, int]:
             count.value = filled
