@@ -98,8 +98,8 @@ def calls() -> Iterator[Call]:
 
 _RUN = {
     "scene": "object",
-    "form": "word",
-    "level": "word",
+    "form": "optional word",
+    "level": "optional word",
     "t_end": "time",
     "rtol": "share",
     "solver": "word",
@@ -123,12 +123,16 @@ def _runs() -> Iterator[Call]:
         {"scene": scene, "t_end": 0.01},
         {
             **_RUN,
-            "orientation": "word",
+            "orientation": "optional word",
             "outputs": "times",
             "max_step": "optional positive",
             "samples": "whole",
             "structure": "flag",
             "atol": "optional positive",
+            "accuracy": "optional error",
+            "order": "optional order",
+            "step": "optional positive",
+            "monitor": "optional object",
             "until": "stop condition",
             "record": "stop condition",
         },
