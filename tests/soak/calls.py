@@ -214,7 +214,7 @@ def _reading() -> Iterator[Call]:
 
 _SAVE = {"result": "object", "file": "file", "paths": "texts"}
 _SAVED = {"file": "file", "paths": "texts"}
-_SUFFIX = {"file": ("name-without-suffix", "x.mat")}
+_SUFFIX = {"file": ("name-without-suffix", "x.xyz")}
 _SAID = {
     "file": ("director", "no such file", "suffix", "name"),
     "path": ("director", "no such file"),

@@ -70,6 +70,6 @@ def too_tight(request: SolverRequest, solver: str, failed: StepResult) -> SolveE
             return SolveError(
                 f"the relative tolerance, {asked:g}, is below what rounding allows here: {failed.message}",
                 where=request.plan.assembly.flat.name,
-                advice=f"The run continues with rtol={factor * asked:g}.",
+                advice=f"Give rtol={factor * asked:g}, with which it goes on from there.",
             )
     return None
