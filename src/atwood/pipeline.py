@@ -70,6 +70,9 @@ from atwood.topology.orientation_coordinates import Orientation, check_orientati
 
 __all__ = ["Assembly", "assemble", "assemble_flat", "assembly_of", "simulate"]
 
+_SIGNS_TRIED = 4
+"""So many starts are found with signs of their own, one after the other: more than two are hardly ever needed."""
+
 SCENE = instance("a scene, or an assembly of one", Model, Assembly)
 
 
@@ -323,9 +326,10 @@ def simulate(
                 ),
             )
             made, second = _solve_to(accuracy, assembly, options, clock)
-    result = Result(replace(made, timings=stopwatch.in_order()), second=second)
+    made = replace(made, timings=stopwatch.in_order())
+    result = Result(made, second=second)
     if monitor is not None and made.segments:
-        result.conserved = monitor.along(result)
+        result = Result(made, monitor.along(result), second)
     return result
 
 
@@ -367,9 +371,9 @@ def _refuse_contradictions(assembly: Assembly, given: Mapping[str, str]) -> None
     has = {"form": assembly.form, "level": assembly.level, "orientation": assembly.orientation.kind}
     for name, value in given.items():
         if value != has[name]:
-            told = f"has {name} {has[name]!r}" if has[name] else "is in the reduced form, which has no level"
+            own = f"has {name} {has[name]!r}" if has[name] else "is in the reduced form, which has no level"
             raise UsageError(
-                f"{name}={value!r} contradicts the assembly, which {told}",
+                f"{name}={value!r} contradicts the assembly, which {own}",
                 where=assembly.flat.name,
                 advice=f"Leave {name} out, or assemble the scene with it.",
             )
@@ -378,15 +382,15 @@ def _refuse_contradictions(assembly: Assembly, given: Mapping[str, str]) -> None
 def _with_line_signs(assembly: Assembly) -> tuple[Assembly, Start]:
     """Return an assembly whose lengths on a line are signed as at the start, and the start.
 
-    Signs are assumed from the values that were given. A start that contradicts them is found again with its own.
+    Signs are assumed from the values that were given. A start that contradicts them is found again with its own, in
+    generalized coordinates, as all starts are.
     """
-    start = find_start(assembly)
-    for _ in range(3):
+    for _ in range(_SIGNS_TRIED):
+        start = find_start(assembly)
         actual = actual_line_signs(assembly, start.time, start.coordinates, start.speeds, "reduced")
         if not line_signs_differ(assembly, actual):
             return assembly, start
-        assembly = assembly.other_mode(assembly.modes, actual)
-        start = find_start(assembly)
+        assembly = assembly.other_mode(assembly.modes, actual)  # the same modes with other signs
     raise StartError(
         "it depends on the signs of lengths where things start, and on where they start, which signs these are",
         where=assembly.flat.name,
