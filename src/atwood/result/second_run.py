@@ -18,6 +18,7 @@ from atwood.simulation.events.sampling import find_sampler
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.run import run
+from atwood.simulation.run.tolerances import LEAST
 
 __all__ = ["TIGHTER", "second_run"]
 
@@ -25,9 +26,7 @@ TIGHTER = 30.0
 """The tolerance of the second solution is so many times less: two steps of ten cost too much, one tells too little."""
 
 _LEAST = {"ida": 1e-13, "ida-sundae": 1e-13}
-"""Tolerances below this a method cannot be asked for; else a few units of rounding."""
-
-_ROUNDING = 1e-15
+"""Tolerances below this a method cannot be asked for; else the least that there is."""
 
 _PATIENCE, _SECONDS = 20.0, 30.0
 """The second run may take so many times as long as the first, and so many seconds at least."""
@@ -90,7 +89,7 @@ def _attempts(first: Run, times: FloatArray) -> list[tuple[Assembly, RunOptions]
         max_seconds=seconds if options.max_seconds is None else max(options.max_seconds, seconds),
     )
     rtol = 1e-11 if solver == "gauss" else options.relative_tolerance
-    tighter = replace(base, relative_tolerance=max(rtol / TIGHTER, _LEAST.get(solver, _ROUNDING)))
+    tighter = replace(base, relative_tolerance=max(rtol / TIGHTER, _LEAST.get(solver, LEAST)))
     found = []
     if first.assembly.form == "dae":
         found.append((_reduced(first.assembly), tighter))

@@ -8,9 +8,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.polynomial import legendre
 
 from atwood.arrays import FloatArray
+from atwood.integrators.gauss.tableau import tableau
 
 __all__ = ["POINTS", "node_times", "propagators"]
 
@@ -22,12 +22,11 @@ _ENTRIES = 4_000_000
 
 
 @cache
-def _tableau() -> tuple[FloatArray, FloatArray, FloatArray]:
+def _method() -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the points c in a step from 0 to 1, the matrix a and the weights b of the method."""
-    x, weights = legendre.leggauss(POINTS)
-    inverse = np.linalg.inv(legendre.legvander(x, POINTS - 1))
-    integrals = legendre.legint(np.eye(POINTS), lbnd=-1)
-    return (x + 1.0) / 2.0, legendre.legval(x, integrals).T @ inverse / 2.0, weights / 2.0
+    found = tableau(2 * POINTS)
+    weights = np.array(found.weights)
+    return np.array(found.nodes), np.array(found.shares) * weights, weights
 
 
 def node_times(edges: FloatArray) -> FloatArray:
@@ -38,7 +37,7 @@ def node_times(edges: FloatArray) -> FloatArray:
     edges
         Starts and ends of the steps: step k goes from ``edges[k, 0]`` to ``edges[k, 1]``; s.
     """
-    points, _, _ = _tableau()
+    points, _, _ = _method()
     return edges[:, :1] + np.diff(edges, axis=1) * points
 
 
@@ -52,7 +51,7 @@ def propagators(matrices: FloatArray, steps: FloatArray) -> FloatArray:
     steps
         Their lengths, s.
     """
-    _, a, b = _tableau()
+    _, a, b = _method()
     count, points, size, _ = matrices.shape
     found = np.empty((count, size, size))
     block = max(1, _ENTRIES // (points * size) ** 2)

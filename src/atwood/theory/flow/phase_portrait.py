@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.optimize import brentq
 
 from atwood.analysis.dynamics import Dynamics
 from atwood.analysis.flow.plane_field import Field, Window, separatrices, spaced_curves
+from atwood.analysis.linear.variations import LinearScene
 from atwood.arguments import Kind, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
@@ -114,6 +115,9 @@ class PhasePortrait:
         return fitted(f"<PhasePortrait of {self.scene}, {self.speed} over {self.coordinate}: {points}; {curves}>")
 
 
+Linear: TypeAlias = Callable[[float], FloatArray]
+"""Gives the matrix of the linear equations at a state of rest."""
+
 Bounds = tuple[float | str, float | str]
 """From low to high: numbers in SI units, or text with a unit."""
 
@@ -165,20 +169,25 @@ def phase_portrait(
         accelerations = functions.forward_dynamics(points[:, :1], points[:, 1:])
         return np.stack([points[:, 1], accelerations[:, 0]], axis=1)
 
+    equations, t = LinearScene(assembly, "reduced"), assembly.flat.t_start
+
+    def linear(place: float) -> FloatArray:
+        return equations.flow(t, np.array([place]), np.zeros(1), ()).matrix[:, :2]
+
     q, u = (float(one[0]) for one in functions.start())
     unit, name = functions.equations.names[0].unit, functions.coordinates[0]
     length = 1.0 if unit == "rad" else scene_length(assembly)
-    across = _coordinates(field, q, unit, length) if coordinates is None else _range(coordinates, unit, "coordinates")
+    across = (
+        _coordinates(field, linear, q, unit, length)
+        if coordinates is None
+        else _range(coordinates, unit, "coordinates")
+    )
     places, everywhere = _places_of_rest(field, across)
-    rest_points = tuple(_rest_point(field, place, across) for place in places)
+    rest_points = tuple(_rest_point(linear(place), place) for place in places)
     rest = np.array([[place, 0.0] for place in places]).reshape(-1, 2)
-    up = _speeds(field, across, rest_points, u) if speeds is None else _range(speeds, f"{unit}/s", "speeds")
+    up = _speeds(field, linear, across, rest_points, u) if speeds is None else _range(speeds, f"{unit}/s", "speeds")
     window = Window(across, up)
-    saddles = [
-        (np.array([one.coordinate, 0.0]), _matrix(field, one.coordinate, across))
-        for one in rest_points
-        if one.kind == "saddle"
-    ]
+    saddles = [(np.array([one.coordinate, 0.0]), linear(one.coordinate)) for one in rest_points if one.kind == "saddle"]
     special = separatrices(field, saddles, window, rest)
     return PhasePortrait(
         coordinate=name,
@@ -234,14 +243,14 @@ def _depends_on_time(functions: Dynamics) -> bool:
     return not all(np.allclose(one, found[0], rtol=1e-7, atol=1e-9 * float(np.max(np.abs(found[0])))) for one in found)
 
 
-def _coordinates(field: Field, start: float, unit: str, length: float) -> tuple[float, float]:
+def _coordinates(field: Field, linear: Linear, start: float, unit: str, length: float) -> tuple[float, float]:
     """Return the range in which a scene is looked at: three half turns about a stable state, or what lies about it."""
     if unit == "rad":
         some = np.array([[0.1, 0.3], [1.3, -0.4], [2.9, 0.2]])
         here, there = field(some)[:, 1], field(some + np.array([2.0 * np.pi, 0.0]))[:, 1]
         if np.any(here) and np.allclose(here, there, rtol=1e-7, atol=1e-7 * (1e-300 + float(np.max(np.abs(here))))):
             places, everywhere = _places_of_rest(field, (start - np.pi, start + np.pi * (1.0 + 1e-9)))
-            stable = [one for one in places if not everywhere and _rest_point(field, one, (0.0, 1.0)).kind != "saddle"]
+            stable = [one for one in places if not everywhere and _rest_point(linear(one), one).kind != "saddle"]
             middle = min(stable, key=lambda one: abs(one - start)) if stable else start
             return middle - 1.5 * np.pi, middle + 1.5 * np.pi
     reach = 4.0 * max(length, abs(start))
@@ -282,20 +291,9 @@ _ROUNDING = 1e-13
 """Relative to the window: coordinates below are zero."""
 
 
-def _matrix(field: Field, place: float, across: tuple[float, float]) -> FloatArray:
-    """Return the derivative of the field at a point of rest, by central differences of sixth order."""
-    shifts, weights = np.array([-3, -2, -1, 1, 2, 3]), np.array([-1, 9, -45, 45, -9, 1]) / 60.0
-    step = 2e-3 * (across[1] - across[0])
-    pace = np.sqrt(
-        max(abs(float(weights @ field(np.stack([place + step * shifts, 0 * shifts], 1))[:, 1]) / step), 1e-30)
-    )
-    by_q = weights @ field(np.stack([place + step * shifts, 0.0 * shifts], axis=1)) / step
-    by_u = weights @ field(np.stack([place + 0.0 * shifts, step * pace * shifts], axis=1)) / (step * pace)
-    return np.stack([by_q, by_u], axis=1)
-
-
-def _rest_point(field: Field, place: float, across: tuple[float, float]) -> RestPoint:
-    first, second = (complex(one) for one in np.linalg.eigvals(_matrix(field, place, across)))
+def _rest_point(matrix: FloatArray, place: float) -> RestPoint:
+    """Return what kind of state a state of rest is, by the matrix of the linear equations there."""
+    first, second = (complex(one) for one in np.linalg.eigvals(matrix))
     size = max(abs(first), abs(second))
     tiny = 1e-7 * size
     if size == 0.0 or min(abs(first), abs(second)) <= tiny:
@@ -310,7 +308,7 @@ def _rest_point(field: Field, place: float, across: tuple[float, float]) -> Rest
 
 
 def _speeds(
-    field: Field, across: tuple[float, float], rest_points: Sequence[RestPoint], start: float
+    field: Field, linear: Linear, across: tuple[float, float], rest_points: Sequence[RestPoint], start: float
 ) -> tuple[float, float]:
     """Return the range of speeds: that of the separatrices and half as much again, or that of the slowest swing."""
     width = across[1] - across[0]
@@ -324,9 +322,7 @@ def _speeds(
     if saddles:
         tall = Window(across, (-20.0 * high, 20.0 * high))
         rest = np.array([[one.coordinate, 0.0] for one in rest_points])
-        found = separatrices(
-            field, [(np.array([one, 0.0]), _matrix(field, one, across)) for one in saddles], tall, rest
-        )
+        found = separatrices(field, [(np.array([one, 0.0]), linear(one)) for one in saddles], tall, rest)
         if len(rest_points) > 1:
             high = 1.6 * max(float(np.max(np.abs(curve[:, 1]))) for curve in found)
     return -high, high
