@@ -71,7 +71,6 @@ MOST_FILES = 20
 LONG_FILES = {
     "analysis/dynamics.py",
     "forms/accelerations.py",
-    "forms/lagrangian.py",
     "forms/program.py",
     "integrators/explicit_session.py",
     "integrators/ida/native.py",

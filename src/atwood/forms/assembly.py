@@ -395,5 +395,5 @@ class Assembly:
 
     def _observe(self, equations: Equations) -> Mapping[str, Observable]:
         # The Lagrangian is made of assemblies, and looked up when a momentum is wanted.
-        momenta = lambda: import_module("atwood.forms.lagrangian").momenta_of(self, equations)  # noqa: E731
+        momenta = lambda: import_module("atwood.forms.lagrangian.momenta").momenta_of(self, equations)  # noqa: E731
         return observe(self.mechanism, equations, self.reactions, self.shared.lock, momenta)
