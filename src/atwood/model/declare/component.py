@@ -5,15 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
-from atwood.arguments import NAME, check, show
-from atwood.errors import DeclarationError, MissingNameError, ParameterError, UsageError, near_matches, suggestion
+from atwood.arguments import NAME, check
+from atwood.errors import DeclarationError, MissingNameError, ParameterError, UsageError, suggestion
 from atwood.expr import Scalar
 from atwood.model.declare.binding import Binding
 from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
-from atwood.model.declare.declaring import ComponentType, check_field_name, merge_inherited, with_checked_default
+from atwood.model.declare.declaring import ComponentType, collect_declarations
 from atwood.model.declare.fields import MISSING, Field, ParameterExpression, ParameterSpec, SignalSpec
-from atwood.model.declare.law import Kind, Law, ObservableOptions
+from atwood.model.declare.law import Kind, Law
 from atwood.model.declare.quantities import Quantity
+from atwood.model.declare.refusals import (
+    given_without_name,
+    must_be_given,
+    no_such_name,
+    no_such_parameter,
+    no_such_reaction,
+)
 from atwood.model.declare.states import StateSpec, discrete_state, state
 from atwood.model.values.outline import Outline
 from atwood.model.values.vector import Vector, dot, norm
@@ -67,52 +74,19 @@ class Component(metaclass=ComponentType):
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        merge_inherited(cls)
-        for name, value in list(vars(cls).items()):
-            law = getattr(value, "_atwood_law", None)
-            if isinstance(value, (Field, ConnectorSpec)) or isinstance(law, Law):
-                check_field_name(cls, name, value)
-            if isinstance(value, ParameterSpec):
-                cls._parameters[name] = with_checked_default(value, cls)
-            elif isinstance(value, SignalSpec):
-                cls._signals[name] = with_checked_default(value, cls)
-            elif isinstance(value, StateSpec):
-                cls._states[name] = with_checked_default(value, cls)
-                options = ObservableOptions(value.unit.text, value.doc, False, "", ("line", "plane", "space"))
-                cls._laws[name] = Law("observable", name, options)
-            elif isinstance(value, ConnectorSpec):
-                cls._connectors[name] = value
-            elif isinstance(law, Law):
-                cls._laws[name] = law
-            elif name in cls._parameters:
-                changed = with_checked_default(cls._parameters[name].with_default(value), cls)
-                cls._parameters[name] = changed
-                setattr(cls, name, changed)
-            elif name in cls._signals:
-                replaced = with_checked_default(cls._signals[name].with_default(value), cls)
-                cls._signals[name] = replaced
-                setattr(cls, name, replaced)
+        collect_declarations(cls)
 
     def __init__(self, *unnamed: Any, **values: Any) -> None:
         self._start_as({}, None, "")
         if unnamed:
-            first = next(iter(self._parameters), "")
-            raise ParameterError(
-                "its parameters are given by name",
-                where=type(self).__name__,
-                advice=f"Write {type(self).__name__}({f'{first}={show(unnamed[0])}' if first else ''}).",
-            )
+            raise given_without_name(type(self).__name__, self._parameters, unnamed[0])
         for name in values:
             if name not in self._parameters and name not in self._signals:
                 raise self._unknown(name)
         object.__setattr__(self, "_settings", {name: self._checked(name, value) for name, value in values.items()})
         for name, spec in self._parameters.items():
             if spec.default is MISSING and name not in self._settings:
-                raise ParameterError(
-                    "it has no default and must be given",
-                    where=f"{type(self).__name__}.{name}",
-                    advice=f"{name} is: {spec.doc}" + ("" if spec.unit.text == "1" else f" Unit {spec.unit.text}."),
-                )
+                raise must_be_given(type(self).__name__, spec)
 
     def _start_as(self, settings: dict[str, Any], parent: Component | None, name: str) -> None:
         """Give the object its bare state."""
@@ -145,15 +119,9 @@ class Component(metaclass=ComponentType):
         raise self._missing(name)
 
     def _missing(self, name: str) -> MissingNameError:
-        """Return the error that says what there is instead of a name: something alike, and the connectors."""
-        kind = type(self).__name__
         there = [*self._connectors, *self._children(), *self._parameters, *self._signals]
         there += [law.name for law in self.laws("observable")]
-        close = near_matches(name, there)
-        advice = suggestion(name, close) if close else ""
-        if self._connectors:
-            advice += f"{' ' if advice else ''}Its connectors are {', '.join(self._connectors)}."
-        return MissingNameError(f"a {kind} has no {name!r}", where=self.path or kind, advice=advice)
+        return no_such_name(type(self).__name__, self.path, name, there, self._connectors)
 
     def __delattr__(self, name: str) -> None:
         raise UsageError(f"{name!r} cannot be taken away", where=self.path or type(self).__name__)
@@ -281,13 +249,8 @@ class Component(metaclass=ComponentType):
         """Return a reaction of this component; only within a force, a dissipation, an observable or an event."""
         reactions = self._binding().reactions
         if name not in reactions:
-            advice = suggestion(name, reactions)
-            if any(law.options.rigid and law.options.reaction_doc for law in self.laws("joint")):
-                advice = (
-                    "What passes through a rigid connection is worked out after the motion: hold the parts by a "
-                    "@constraint, whose reaction a force may read."
-                )
-            raise DeclarationError(f"this law may not read the reaction {name!r}", where=self.path, advice=advice)
+            is_rigid = any(law.options.rigid and law.options.reaction_doc for law in self.laws("joint"))
+            raise no_such_reaction(self.path, name, reactions, is_rigid)
         return reactions[name]
 
     def energy_around(self, kind: str) -> Scalar:
@@ -355,11 +318,7 @@ class Component(metaclass=ComponentType):
         return self._field(name).check(value, f"{self.path or type(self).__name__}.{name}")
 
     def _unknown(self, name: str) -> ParameterError:
-        known = [*self._parameters, *self._signals]
-        kind = type(self).__name__
-        return ParameterError(
-            f"a {kind} has no parameter {name!r}", where=self.path or kind, advice=suggestion(name, known)
-        )
+        return no_such_parameter(type(self).__name__, self.path, name, [*self._parameters, *self._signals])
 
     # -- what models change -------------------------------------------------------------------------------------
 

@@ -6,9 +6,11 @@ from typing import Any
 
 from atwood.errors import DeclarationError
 from atwood.model.declare.connectors import ConnectorSpec
-from atwood.model.declare.fields import MISSING, Field
+from atwood.model.declare.fields import MISSING, Field, ParameterSpec, SignalSpec
+from atwood.model.declare.law import Law, ObservableOptions
+from atwood.model.declare.states import StateSpec
 
-__all__ = ["ComponentType", "check_field_name", "check_reserved", "merge_inherited", "with_checked_default"]
+__all__ = ["ComponentType", "check_reserved", "collect_declarations"]
 
 
 class _Body(dict[str, Any]):
@@ -39,7 +41,36 @@ class ComponentType(type):
         return _Body(name)
 
 
-def merge_inherited(cls: type) -> None:
+def collect_declarations(cls: Any) -> None:
+    """Give a class of components the tables of its fields, connectors and laws: those of its bases and its own."""
+    _merge_inherited(cls)
+    for name, value in list(vars(cls).items()):
+        law = getattr(value, "_atwood_law", None)
+        if isinstance(value, (Field, ConnectorSpec)) or isinstance(law, Law):
+            _check_field_name(cls, name, value)
+        if isinstance(value, ParameterSpec):
+            cls._parameters[name] = _with_checked_default(value, cls)
+        elif isinstance(value, SignalSpec):
+            cls._signals[name] = _with_checked_default(value, cls)
+        elif isinstance(value, StateSpec):
+            cls._states[name] = _with_checked_default(value, cls)
+            options = ObservableOptions(value.unit.text, value.doc, False, "", ("line", "plane", "space"))
+            cls._laws[name] = Law("observable", name, options)
+        elif isinstance(value, ConnectorSpec):
+            cls._connectors[name] = value
+        elif isinstance(law, Law):
+            cls._laws[name] = law
+        elif name in cls._parameters:
+            changed = _with_checked_default(cls._parameters[name].with_default(value), cls)
+            cls._parameters[name] = changed
+            setattr(cls, name, changed)
+        elif name in cls._signals:
+            replaced = _with_checked_default(cls._signals[name].with_default(value), cls)
+            cls._signals[name] = replaced
+            setattr(cls, name, replaced)
+
+
+def _merge_inherited(cls: type) -> None:
     """Give a class what all its bases declare, in the order in which Python looks names up."""
     for table in ("_parameters", "_signals", "_connectors", "_states", "_laws"):
         merged: dict[str, Any] = {}
@@ -48,14 +79,14 @@ def merge_inherited(cls: type) -> None:
         setattr(cls, table, merged)
 
 
-def with_checked_default(spec: Any, cls: type) -> Any:
+def _with_checked_default(spec: Any, cls: type) -> Any:
     """Return a field whose default has been checked as a value that is given is."""
     if spec.default is not MISSING:
         spec.default = spec.check(spec.default, f"{cls.__name__}.{spec.name}")
     return spec
 
 
-def check_field_name(cls: type, name: str, value: Any) -> None:
+def _check_field_name(cls: type, name: str, value: Any) -> None:
     """Refuse a field that is declared elsewhere under another name, or that has the name of something else."""
     if getattr(value, "name", name) != name:
         raise DeclarationError(
