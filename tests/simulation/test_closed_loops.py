@@ -365,6 +365,38 @@ def test_other_values_and_starts_use_the_same_programs() -> None:
     assert_allclose(states(again), states(simulate(scene, t_end=0.2)), atol=1e-9)
 
 
+def test_branches_of_many_values_are_worked_out_together() -> None:
+    assembly = assemble(FourBar())
+    lengths, angles = (2.4, 2.5, 2.7, 2.9), (0.4, 1.0, 2.0, 5.0)
+    single, values, places = [], [], []
+    for length, angle in zip(lengths, angles, strict=True):
+        other = assembly.with_values({"coupler_length": length}, start={"crank.angle": angle})
+        assert not other.why_new
+        start = find_start(other)
+        q, u = own_state(other, start)
+        found = solve_at(make_plan(other, start.time, q, u, start.length, 1.0), start.time, q, u)
+        assert found is not None
+        single.append(found)
+        values.append(other.parameter_values)
+        places.append(q)
+    assert all(one.form is single[0].form for one in single)
+    kernel = assembly.with_rows(np.array(values).T).kernel(single[0].form.branches, vectorized=True)
+    found_values, conditions = kernel([0.0], np.array(places).T)
+    expected = [[one.branches[symbol] for one in single] for symbol in single[0].form.loops.branches]
+    assert_allclose(found_values, expected, atol=1e-14)
+    assert np.all(conditions > 0.0)
+
+
+def test_states_from_formulas_need_no_projection(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        raise AssertionError("a state was projected")
+
+    monkeypatch.setattr("atwood.simulation.problem.projection._least_norm", refuse)
+    result = simulate(FourBar(), t_end=0.5)
+    assert by_formulas(result)
+    assert max(float(np.max(one.held)) for one in result.run.segments) < 1e-13
+
+
 def test_comparisons_show_both_ways_to_close_the_loop() -> None:
     found = compare(SliderCrank(t_end=0.3), rtols=(1e-5, 1e-7), forms=("reduced",))
     assert {row.label for row in found.rows} == {"reduced", "reduced, explicit"}

@@ -21,13 +21,14 @@ constraint at other places: what is left must be rounding (`atwood.mechanics.con
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from atwood.errors import AtwoodError
-from atwood.expr import Expression, atan2, cos, depends_on, evaluate, jacobian, jvp, sin, sqrt, substitute
-from atwood.forms.loops.branches import ClosedLoops, Group, Heading, Place, is_ahead, spectrum
+from atwood.expr import Expression, atan2, cos, depends_on, evaluate, hypot, jacobian, jvp, sin, sqrt, substitute
+from atwood.forms.loops.branches import ClosedLoops, Group, Heading, Place
+from atwood.forms.loops.harmonics import at, harmonics, sum_of_waves, waves_of
 from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.dynamics.equations import Equations
 
@@ -40,6 +41,9 @@ _LEAST = 1e-9
 
 _MOST_ANGLES = 4
 """Directions that depend on more angles are not looked into."""
+
+_AHEAD = 1.0 + 1e-6
+"""One wave of a direction must be so many times as large as all others together."""
 
 _PLACES = 2
 """At so many other places forms are compared with constraints."""
@@ -148,11 +152,11 @@ class Loops:
     def _one(self, k: int, number: int) -> Group | None:
         g, x, along = self.values[k], self.q[number], ((self.graph.one,),)
         if not self.is_angle[number]:
-            (constant,), (rate,) = _at([g], {x: 0.0}), _at(jvp([g], {x: 1.0}), {x: 0.0})
+            (constant,), (rate,) = at([g], {x: 0.0}), at(jvp([g], {x: 1.0}), {x: 0.0})
             places = {x: -(constant / rate)} if not rate.is_zero else {}
             is_linear = bool(places) and self._agree([g], [constant + rate * x])
             return Group((number,), (k,), along, places) if is_linear else None
-        (e,), (p,), (q,) = _harmonics([g], x)
+        (e,), (p,), (q,) = harmonics([g], x)
         if not self._agree([g], [e + p * cos(x) + q * sin(x)]):
             return None
         root = _Root(self, number, p, q, -e, x)
@@ -179,8 +183,8 @@ class Loops:
         x, y = self.q[i], self.q[j]
         g = [self.values[k] for k in ks]
         g = substitute(g, {x: x - nested * y}) if nested else g  # from here on x is the angle of a link
-        e, p, q = _harmonics(g, x)
-        e, r, s = _harmonics(e, y)
+        e, p, q = harmonics(g, x)
+        e, r, s = harmonics(e, y)
         if not self._agree(g, _sum(e, (p, cos(x)), (q, sin(x)), (r, cos(y)), (s, sin(y)))):
             return None
         own, other = _dot(p, p), _dot(r, r)
@@ -209,8 +213,8 @@ class Loops:
         """Solve for an angle and a length."""
         x, y = self.q[i], self.q[j]
         g = [self.values[k] for k in ks]
-        k = _at(jvp(g, {y: 1.0}), {y: 0.0, x: 0.0})
-        e, p, q = _harmonics(_at(g, {y: 0.0}), x)
+        k = at(jvp(g, {y: 1.0}), {y: 0.0, x: 0.0})
+        e, p, q = harmonics(at(g, {y: 0.0}), x)
         if not self._agree(g, _sum(e, (p, cos(x)), (q, sin(x)), (k, y))):
             return None
         own, size = _dot(p, p), _dot(k, k)
@@ -229,8 +233,8 @@ class Loops:
         """Solve for two lengths in the plane in which they are."""
         x, y = self.q[i], self.q[j]
         g = [self.values[k] for k in ks]
-        e = _at(g, {x: 0.0, y: 0.0})
-        k, m = (_at(jvp(g, {one: 1.0}), {x: 0.0, y: 0.0}) for one in (x, y))
+        e = at(g, {x: 0.0, y: 0.0})
+        k, m = (at(jvp(g, {one: 1.0}), {x: 0.0, y: 0.0}) for one in (x, y))
         if not self._agree(g, _sum(e, (k, x), (m, y))):
             return None
         kk, mm, km, ke, me = _dot(k, k), _dot(m, m), _dot(k, m), _dot(k, e), _dot(m, e)
@@ -253,20 +257,39 @@ class Loops:
         name = f"{self.equations.names[number].name}:{self._number}"
         self._number += 1
         phase = self.graph.parameter(f"phase:{name}")
+        followed = self._followed(phase, p, q)
+        if followed is not None:
+            return followed
+        c, s = cos(phase), sin(phase)
+        ahead, beside = p * c + q * s, q * c - p * s
+        flip, offset = self.graph.parameter(f"flip:{name}"), self.graph.parameter(f"offset:{name}")
+        direction = phase + offset + atan2(flip * beside, flip * ahead)
+        values = {phase: atan2(q, p), flip: self.graph.one, offset: self.graph.zero}
+        return direction, Heading(phase, flip, offset, ahead, beside, values)
+
+    def _followed(self, phase: Expression, p: Expression, q: Expression) -> tuple[Expression, Heading] | None:
+        """Return the direction of (p, q) as counted from a sum of known angles that it never turns away from."""
         angles = self._angles_read(p, q)
-        found = None if angles is None or len(angles) > _MOST_ANGLES else spectrum((p, q), angles, self.place)
-        orders = None if found is None else max(found, key=lambda n: abs(found[n]))
-        if found is None or orders is None or angles is None or not is_ahead(found, orders):
-            c, s = cos(phase), sin(phase)
-            ahead, beside = p * c + q * s, q * c - p * s
-            flip, offset = self.graph.parameter(f"flip:{name}"), self.graph.parameter(f"offset:{name}")
-            direction = phase + offset + atan2(flip * beside, flip * ahead)
-            return direction, Heading(phase, (p, q), flip=flip, offset=offset, ahead=ahead, beside=beside)
+        if angles is None or len(angles) > _MOST_ANGLES:
+            return None
+        waves = waves_of(p, q, angles)
+        if not waves or not self._agree((p, q), sum_of_waves(waves, angles, self.graph.zero)):
+            return None
+        sizes = {orders: hypot(*z) for orders, z in waves.items()}
+        known = {**self.place.parameters, **self.place.here}
+        orders = max(waves, key=lambda n: evaluate([sizes[n]], known)[0])
+        lead = sizes[orders]
+        for other, size in sizes.items():
+            lead = lead if other == orders else lead - _AHEAD * size
+        if not evaluate([lead], known)[0] > 0.0:
+            return None
         total = phase
         for angle, order in zip(angles, orders, strict=True):
             total = total + float(order) * angle
         c, s = cos(total), sin(total)
-        return total + atan2(q * c - p * s, p * c + q * s), Heading(phase, (p, q), tuple(angles), orders)
+        re, im = waves[orders]
+        direction = total + atan2(q * c - p * s, p * c + q * s)
+        return direction, Heading(phase, values={phase: atan2(im, re)}, lead=lead)
 
     def _angles_read(self, p: Expression, q: Expression) -> list[Expression] | None:
         """Return the angles that a direction depends on; None if it depends on anything else that moves."""
@@ -295,18 +318,6 @@ class _Root:
         """Return the angle, from the direction of (p, q)."""
         beside: Expression = atan2(self.root, self.w)
         return direction + beside
-
-
-def _harmonics(values: Vector, x: Expression) -> tuple[list[Expression], list[Expression], list[Expression]]:
-    """Return e, p and q of values that are ``e + p cos x + q sin x``."""
-    first = jvp(values, {x: 1.0})
-    second = _at(jvp(first, {x: 1.0}), {x: 0.0})
-    start = _at(values, {x: 0.0})
-    return [a + b for a, b in zip(start, second, strict=True)], [-b for b in second], _at(first, {x: 0.0})
-
-
-def _at(values: Vector, place: Mapping[Expression, float]) -> list[Expression]:
-    return substitute(list(values), place)
 
 
 def _dot(a: Vector, b: Vector) -> Expression:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import field
 
-import numpy as np
-
-from atwood.expr import Expression, evaluate, substitute
+from atwood.expr import Expression, absolute, floor, sign, substitute
 from atwood.late import dataclass
 
-__all__ = ["ClosedLoops", "Group", "Heading", "Place", "is_ahead", "spectrum"]
+__all__ = ["ClosedLoops", "Group", "Heading", "Place"]
 
-_AHEAD = 1.0 + 1e-6
-"""One term of a direction must be so many times as large as all others together."""
+_WHOLE = 1e-3
+"""An angle that is not so near to the formula's but for whole turns is not on its branch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,44 +47,29 @@ class Heading:
     ----------
     phase
         The symbol of the phase.
-    components
-        Both components.
-    angles, orders
-        The angles that they depend on, and how often each is counted.
     flip, offset
         Symbols of the side, 1 or -1, and of the half turns since the start; None where none are counted.
     ahead, beside
         Then the components along the phase and across it.
+    values
+        What its symbols are at a position, in terms of parameters, time and coordinates.
+    lead
+        By how much one wave is larger than all others together: positive where the direction cannot turn away. None
+        where that is counted.
     """
 
     phase: Expression
-    components: tuple[Expression, Expression]
-    angles: tuple[Expression, ...] = ()
-    orders: tuple[int, ...] = ()
     flip: Expression | None = None
     offset: Expression | None = None
     ahead: Expression | None = None
     beside: Expression | None = None
+    values: Mapping[Expression, Expression] = field(default_factory=dict)
+    lead: Expression | None = None
 
     @property
     def symbols(self) -> tuple[Expression, ...]:
         """Its symbols."""
         return tuple(one for one in (self.phase, self.flip, self.offset) if one is not None)
-
-    def values(self, place: Place) -> dict[Expression, float] | None:
-        """Return the values of its symbols at a position; None where the direction can turn away unseen."""
-        if self.flip is None or self.offset is None:
-            phase = self._phase(place)
-            return None if phase is None else {self.phase: phase}
-        p, q = evaluate(self.components, {**place.parameters, **place.here})
-        return {self.phase: math.atan2(q, p), self.flip: 1.0, self.offset: 0.0}
-
-    def _phase(self, place: Place) -> float | None:
-        found = spectrum(self.components, self.angles, place)
-        best = None if found is None else found[self.orders]
-        if found is None or best is None or not is_ahead(found, self.orders):
-            return None
-        return math.atan2(best.imag, best.real)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,51 +149,22 @@ class ClosedLoops:
         """The directions whose half turns are counted."""
         return [one for group in self.groups for one in group.headings if one.flip is not None]
 
-    def branch_values(self, place: Place) -> dict[Expression, float] | None:
-        """Return the values of the branches at an admissible position; None where formulas do not lead to it."""
-        known = {**place.parameters, **place.here}
-        found: dict[Expression, float] = {}
+    def values(self) -> tuple[list[Expression], list[Expression]]:
+        """Return the values of the branches at an admissible position, and what must be positive there.
+
+        All in terms of parameters, time and coordinates. Where something is not positive, formulas do not lead there.
+        """
+        found: dict[Expression, Expression] = {}
+        conditions: list[Expression] = []
         for group in self.groups:
-            for symbol, value in (group.signs or {}).items():
-                found[symbol] = math.copysign(1.0, evaluate([value], known)[0])
+            found.update((symbol, sign(value)) for symbol, value in (group.signs or {}).items())
             for heading in group.headings:
-                values = heading.values(place)
-                if values is None:
-                    return None
-                found.update(values)
+                found.update(heading.values)
+                conditions += () if heading.lead is None else (heading.lead,)
+        for group in self.groups:
             for symbol, value in (group.turns or {}).items():
-                turns = evaluate([value], {**known, **found})[0] / math.tau
-                if not abs(turns - round(turns)) <= 1e-3:
-                    return None
-                found[symbol] = math.tau * round(turns)
-        return found
-
-
-def spectrum(
-    components: tuple[Expression, Expression], angles: Sequence[Expression], place: Place
-) -> dict[tuple[int, ...], complex] | None:
-    """Return the terms ``z exp(i (n . angles))`` of ``p + i q``; None if it has others than with n of -1, 0 and 1."""
-    size = 4
-    quarter = [0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi]
-    table = np.zeros((size,) * len(angles), dtype=complex)
-    known = {**place.parameters, **place.here}
-    for index in itertools.product(range(size), repeat=len(angles)):
-        p, q = evaluate(components, {**known, **{a: quarter[k] for a, k in zip(angles, index, strict=True)}})
-        table[index] = complex(p, q)
-    table = np.fft.fftn(table) / table.size
-    found = {}
-    largest = float(np.max(np.abs(table)))
-    for index in itertools.product(range(size), repeat=len(angles)):
-        value = complex(table[index])
-        if 2 in index:
-            if abs(value) > 1e-9 * largest:
-                return None
-            continue
-        found[tuple(n - size if n > 2 else n for n in index)] = value
-    return found if largest > 0.0 else None
-
-
-def is_ahead(found: Mapping[tuple[int, ...], complex], orders: tuple[int, ...]) -> bool:
-    """Return whether one term is larger than all others together."""
-    sizes = {n: abs(z) for n, z in found.items()}
-    return sizes[orders] > _AHEAD * (sum(sizes.values()) - sizes[orders])
+                turns = substitute([value], found)[0] / math.tau
+                whole = floor(turns + 0.5)
+                conditions.append(_WHOLE - absolute(turns - whole))
+                found[symbol] = math.tau * whole
+        return [found[symbol] for symbol in self.branches], conditions

@@ -50,6 +50,9 @@ class ClosedForm:
     watched
         Program of (t, q_i, u_i) with the distances from dead centres and then the components of counted directions
         ahead, which must not pass zero; and with the components of the latter across.
+    branches
+        Program of (t, q) with the values of the branches at an admissible position, and with conditions that must be
+        positive there.
     """
 
     loops: ClosedLoops
@@ -57,6 +60,7 @@ class ClosedForm:
     states: Program
     known: Mapping[Expression, Expression]
     watched: Program
+    branches: Program
 
 
 def closed_form(
@@ -111,6 +115,13 @@ def closed_form(
     if any(depends_on(one, dependent) for one in (*found, *places.values(), *speeds.values(), *looked_at)):
         return None
     title = f"{name} (closed form)"
+    values, conditions = loops.values()
+    branches = Program(
+        f"{title} branches",
+        (inputs[0], InputGroup("q", q)),
+        tuple(parameters),
+        (OutputGroup("branches", tuple(values)), OutputGroup("conditions", tuple(conditions))),
+    )
     accelerations = Program(f"{title} accelerations", inputs, known, (OutputGroup("accelerations", tuple(found)),))
     return ClosedForm(
         loops,
@@ -118,6 +129,7 @@ def closed_form(
         Program(f"{title} states", inputs, known, states),
         {**places, **speeds},
         Program(f"{title} dead centres", inputs, known, watched),
+        branches,
     )
 
 

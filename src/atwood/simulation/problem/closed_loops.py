@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import field
 from functools import cached_property
 
@@ -260,7 +261,7 @@ def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArr
     t, q, u
         An admissible state.
     """
-    branches = form.loops.branch_values(_place(plan, t, q))
+    branches = _branches(plan.assembly, form, t, q)
     if branches is None:
         return None
     solved = Solved(form, plan.assembly, branches)
@@ -280,6 +281,15 @@ def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArr
     return replace(solved, margin=margin, least=least, is_clear=rests and least > steepest)
 
 
+def _branches(assembly: Assembly, form: ClosedForm, t: float, q: FloatArray) -> dict[Expression, float] | None:
+    """Return the values of the branches at an admissible position; None where formulas do not lead to it."""
+    try:
+        values, conditions = assembly.kernel(form.branches)([t], q)
+    except KernelEvaluationError:
+        return None
+    return dict(zip(form.loops.branches, values, strict=True)) if all(one > 0.0 for one in conditions) else None
+
+
 def _margins(solved: Solved, t: float, y: FloatArray) -> Sequence[float]:
     n, form = len(solved.form.loops.independent), solved.form
     found: Sequence[float] = solved.kernel(form.watched)([t], y[:n], y[n:])[0][: len(form.loops.margins)]
@@ -288,17 +298,16 @@ def _margins(solved: Solved, t: float, y: FloatArray) -> Sequence[float]:
 
 def _holds(plan: Plan, solved: Solved, t: float, y: FloatArray) -> bool:
     """Return whether all constraints hold wherever formulas lead to near by, with these parameters."""
-    n = len(y) // 2
-    moved = np.tile(y, (2 * n, 1))
-    sizes = plan.coordinate_sizes[solved.independent]
-    for i in range(n):
-        moved[2 * i, i] += _ASIDE * sizes[i]
-        moved[2 * i + 1, i] -= _ASIDE * sizes[i]
-    times = np.full(2 * n, t)
-    with np.errstate(all="ignore"):
-        states = solved.states(times, moved)
-    states = states[np.isfinite(states).all(axis=1)].T
-    misses = misses_of(plan, times[: states.shape[1]], *np.split(states, 2)) if states.size else np.zeros((2, 1))
+    n, sizes = len(y) // 2, plan.coordinate_sizes[solved.independent]
+    states = []
+    for i, step in itertools.product(range(n), (_ASIDE, -_ASIDE)):
+        moved = y.copy()
+        moved[i] += step * sizes[i]
+        with suppress(KernelEvaluationError):  # where the loop does not close
+            states.append(solved.state(t, moved))
+    if not states:
+        return False
+    misses = misses_of(plan, np.full(len(states), t), *np.split(np.array(states).T, 2))
     return bool(np.all(misses[0] <= _AGREES) and np.all(misses[1] * plan.scales.time <= _AGREES))
 
 
