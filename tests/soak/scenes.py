@@ -72,6 +72,7 @@ def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
         if result.status != "finished":
             tried.append(f"{result.status}: {stem(result.message)}")
             continue
+        read_at_once(result, mechanism)
         started = oracle_of(mechanism, result)
         missed = started.missed()
         if not missed < 1e-7:
@@ -94,6 +95,14 @@ def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
             numbers = ", ".join(f"{what} {gap:.1e}" for what, gap in wrong)
             findings.append(Finding("wrong", f"{way.form}: {wrong[0][0]}", f"{words}: {numbers}\n{outline(mechanism)}"))
     return Trial(tuple(tried), tuple(findings))
+
+
+def read_at_once(result: Result, mechanism: Mechanism) -> None:
+    """Work out all that is compared in one pass: a program for each quantity would take longer than the run."""
+    names = {body.name for body in mechanism.bodies} | {tie.name for tie in mechanism.ties}
+    ends = ("position", "velocity", "angular_velocity", "x_axis", "y_axis", "z_axis", "angle", "angular_speed")
+    parts = (path.split(".") for path in result.paths)
+    result.table([".".join(part) for part in parts if part[0] in names and part[1] in ends])
 
 
 def _has_no_way_on(mechanism: Mechanism) -> bool:

@@ -23,6 +23,9 @@ _MAGIC = b"atwood cache 1\n"
 _SUFFIX = ".kernel"
 _CHECKSUM = 32
 _LARGEST = 512 * 2**20
+_LOOKED_AFTER = "0"
+"""Room is made when an entry is written whose name begins so, one of sixteen: all entries are looked at for that, which
+takes .16 s where there are 40,000."""
 
 
 def make_key(parts: Iterable[object]) -> str:
@@ -67,7 +70,8 @@ class Cache:
     directory
         Where they lie; it is made when the first is written.
     limit
-        The number of bytes that all entries together may take.  What was not used for longest goes first.
+        The number of bytes that all entries together may take, but for some sixteen that were written last.  What was
+        not used for longest goes first.
     """
 
     directory: Path
@@ -109,7 +113,8 @@ class Cache:
             with contextlib.suppress(OSError):
                 os.unlink(name)
             return False
-        self._make_room()
+        if key.startswith(_LOOKED_AFTER):
+            self._make_room()
         return True
 
     def _path(self, key: str) -> Path:
