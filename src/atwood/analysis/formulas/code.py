@@ -6,6 +6,7 @@ import keyword
 from fractions import Fraction
 from math import isqrt
 
+from atwood.analysis.formulas.lines import quotient, signed_sum
 from atwood.analysis.formulas.tree import Call, Name, Node, Number, Symbol, Term
 
 __all__ = ["KNOWN", "MATH", "formula", "identifier"]
@@ -58,21 +59,11 @@ def formula(node: Node) -> str:
         return identifier(node.symbol, node.dots)
     if isinstance(node, Call):
         return _call(node)
-    text = ""
-    for term in node.terms:
-        sign = "-" if term.number < 0 else "+"
-        text += f" {sign} {_term(term)}" if text else (f"-{_term(term)}" if sign == "-" else _term(term))
-    return text or "0.0"
+    return signed_sum(node.terms, _term) or "0.0"
 
 
 def _term(term: Term) -> str:
-    above = [_power(node, power) for node, power in term.factors if power > 0]
-    below = [_power(node, -power) for node, power in term.factors if power < 0]
-    head = [] if abs(term.number) == 1 and above else [_number(term.number)]
-    text = " * ".join((*head, *above))
-    if not below:
-        return text
-    return f"{text} / {below[0]}" if len(below) == 1 else f"{text} / ({' * '.join(below)})"
+    return quotient(term, _number, _power, times=" * ")
 
 
 def _number(value: Number) -> str:

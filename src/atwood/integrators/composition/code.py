@@ -7,6 +7,7 @@ velocities; half steps that follow each other are one. Increments are added with
 from __future__ import annotations
 
 from atwood.integrators.gauss.code import interpolate_code, samples_code
+from atwood.integrators.gauss.fixed_steps import Step, run_code
 from atwood.integrators.gauss.layout import COUNTS, NUMBERS, POINTERS, Layout
 from atwood.integrators.gauss.writer import Code
 from atwood.integrators.machine_text import exact
@@ -98,36 +99,17 @@ def _begin(layout: Layout) -> str:
 
 
 def _run(layout: Layout) -> str:
-    """Return the function that takes steps: 0 at the stop time, 1 at the limit of steps, 2 where a step fails."""
-    c, n, places = Code("i32 @run(ptr %mem)"), layout.size, layout.places
-    numbers = {name: c.at("%mem", places["numbers"] + k) for k, name in enumerate(NUMBERS)}
-    counts = {name: c.at("%mem", places["counts"] + k) for k, name in enumerate(COUNTS)}
-    y, old, rest = (c.at("%mem", places[name]) for name in ("y", "y_old", "rest"))
-    stop, h, origin = (c.put(f"load double, ptr {numbers[name]}") for name in ("stop", "step", "origin"))
-    limit = c.put(f"load i64, ptr {counts['limit']}")
-    c.do("br label %next")
-    c.block("next")
-    t = c.put(f"load double, ptr {numbers['t']}")
-    c.leave_if(c.put(f"fcmp oge double {t}, {stop}"), 0)
-    steps = c.put(f"load i64, ptr {counts['steps']}")
-    c.leave_if(c.put(f"icmp sge i64 {steps}, {limit}"), 1)
-    since = c.put(f"load i64, ptr {counts['since']}")
-    c.loop(n, lambda i: c.store(c.load(y, i), old, i))
-    code = c.put(f"call i32 @compose(ptr %mem, ptr {y}, ptr {rest}, double {t}, double {h})")
-    c.do(f"br i1 {c.put(f'icmp eq i32 {code}, 0')}, label %good, label %failed")
-    c.block("failed")
-    c.loop(n, lambda i: c.store(c.load(old, i), y, i))
-    c.count_up(places["counts"] + COUNTS.index("failures"))
-    c.do("ret i32 2")
-    c.block("good")
-    following = c.put(f"add i64 {since}, 1")
-    number = c.put(f"sitofp i64 {following} to double")
-    later = c.put(f"fadd double {origin}, {c.put(f'fmul double {h}, {number}')}")
-    c.do(f"store i64 {following}, ptr {counts['since']}")
-    c.do(f"store i64 {c.put(f'add i64 {steps}, 1')}, ptr {counts['steps']}")
-    c.do(f"store double {t}, ptr {numbers['t_old']}")
-    c.do(f"store double {later}, ptr {numbers['t']}")
-    return c.text("br label %next")
+    n = layout.size
+
+    def attempt(c: Code, step: Step) -> None:
+        c.loop(n, lambda i: c.store(c.load(step.y, i), step.old, i))
+        code = c.put(f"call i32 @compose(ptr %mem, ptr {step.y}, ptr {step.rest}, double {step.t}, double {step.h})")
+        c.do(f"br i1 {c.put(f'icmp eq i32 {code}, 0')}, label %good, label %failed")
+
+    def failed(c: Code, step: Step) -> None:
+        c.loop(n, lambda i: c.store(c.load(step.old, i), step.y, i))
+
+    return run_code(layout, attempt, failed=failed)
 
 
 def _trial(layout: Layout) -> str:

@@ -8,6 +8,7 @@ VIII.5 and VIII.6).
 
 from __future__ import annotations
 
+from atwood.integrators.gauss.fixed_steps import Step, run_code
 from atwood.integrators.gauss.layout import COUNTS, NUMBERS, Layout
 from atwood.integrators.gauss.tableau import Tableau
 from atwood.integrators.gauss.writer import Code
@@ -218,49 +219,30 @@ def _begin(layout: Layout, method: Tableau) -> str:
 
 
 def _run(layout: Layout) -> str:
-    """Return the function that takes steps: 0 at the stop time, 1 at the limit of steps, 2 where a step fails."""
-    c, n, places = Code("i32 @run(ptr %mem)"), layout.size, layout.places
-    numbers = {name: c.at("%mem", places["numbers"] + k) for k, name in enumerate(NUMBERS)}
-    counts = {name: c.at("%mem", places["counts"] + k) for k, name in enumerate(COUNTS)}
-    y, old, rest = (c.at("%mem", places[name]) for name in ("y", "y_old", "rest"))
-    w = c.at("%mem", places["main.L"])
-    stop, h, origin = (c.put(f"load double, ptr {numbers[name]}") for name in ("stop", "step", "origin"))
-    limit = c.put(f"load i64, ptr {counts['limit']}")
-    c.do("br label %next")
-    c.block("next")
-    t = c.put(f"load double, ptr {numbers['t']}")
-    c.leave_if(c.put(f"fcmp oge double {t}, {stop}"), 0)
-    steps = c.put(f"load i64, ptr {counts['steps']}")
-    c.leave_if(c.put(f"icmp sge i64 {steps}, {limit}"), 1)
-    since = c.put(f"load i64, ptr {counts['since']}")
-    c.do(f"br i1 {c.put(f'icmp eq i64 {since}, 0')}, label %first, label %later")
-    c.block("first")
-    c.do("br label %found")
-    c.block("later")
-    c.do(f"call void @ahead(ptr {w})")
-    c.do("br label %found")
-    c.block("found")
-    code = c.put(f"call i32 @solve(ptr %mem, ptr {w}, ptr {y}, double {t}, double {h})")
-    c.do(f"br i1 {c.put(f'icmp eq i32 {code}, 0')}, label %good, label %retry")
-    c.block("retry")  # from a poor guess the iteration may lead where the equations have no value
-    flat = c.put(f"call i32 @flat(ptr %mem, ptr {w}, ptr {y}, double {t}, double {h})")
-    c.leave_if(c.put(f"icmp ne i32 {flat}, 0"), 2)
-    again = c.put(f"call i32 @solve(ptr %mem, ptr {w}, ptr {y}, double {t}, double {h})")
-    c.do(f"br i1 {c.put(f'icmp eq i32 {again}, 0')}, label %good, label %failed")
-    c.block("failed")
-    c.count_up(places["counts"] + COUNTS.index("failures"))
-    c.do("ret i32 2")
-    c.block("good")
-    c.loop(n, lambda i: c.store(c.load(y, i), old, i))
-    c.do(f"call void @advance(ptr {w}, ptr {y}, ptr {rest})")
-    following = c.put(f"add i64 {since}, 1")
-    number = c.put(f"sitofp i64 {following} to double")
-    later = c.put(f"fadd double {origin}, {c.put(f'fmul double {h}, {number}')}")
-    c.do(f"store i64 {following}, ptr {counts['since']}")
-    c.do(f"store i64 {c.put(f'add i64 {steps}, 1')}, ptr {counts['steps']}")
-    c.do(f"store double {t}, ptr {numbers['t_old']}")
-    c.do(f"store double {later}, ptr {numbers['t']}")
-    return c.text("br label %next")
+    n = layout.size
+
+    def attempt(c: Code, step: Step) -> None:
+        w = c.at("%mem", layout.places["main.L"])
+        arguments = f"ptr %mem, ptr {w}, ptr {step.y}, double {step.t}, double {step.h}"
+        c.do(f"br i1 {c.put(f'icmp eq i64 {step.since}, 0')}, label %first, label %later")
+        c.block("first")
+        c.do("br label %found")
+        c.block("later")
+        c.do(f"call void @ahead(ptr {w})")
+        c.do("br label %found")
+        c.block("found")
+        code = c.put(f"call i32 @solve({arguments})")
+        c.do(f"br i1 {c.put(f'icmp eq i32 {code}, 0')}, label %good, label %retry")
+        c.block("retry")  # from a poor guess the iteration may lead where the equations have no value
+        c.leave_if(c.put(f"icmp ne i32 {c.put(f'call i32 @flat({arguments})')}, 0"), 2)
+        again = c.put(f"call i32 @solve({arguments})")
+        c.do(f"br i1 {c.put(f'icmp eq i32 {again}, 0')}, label %good, label %failed")
+
+    def good(c: Code, step: Step) -> None:
+        c.loop(n, lambda i: c.store(c.load(step.y, i), step.old, i))
+        c.do(f"call void @advance(ptr {c.at('%mem', layout.places['main.L'])}, ptr {step.y}, ptr {step.rest})")
+
+    return run_code(layout, attempt, good=good)
 
 
 def _trial(layout: Layout) -> str:
