@@ -175,7 +175,8 @@ class CompiledStepper:
         begin, sample = (_code().code.addresses[name] for name in ("begin", "sample"))
         limit, steps, filled = (self._counts[k:].ctypes.data for k in (_LIMIT, _STEPS, _FILLED))
         tolerance = self._arrays[ROWS["absolute"]].ctypes.data
-        return BatchPlaces(begin, sample, self._session.value or 0, limit, steps, filled, tolerance, _COUNTED, self)
+        places = begin, sample, self._session.value or 0, limit, steps, filled, tolerance, _COUNTED
+        return BatchPlaces(*places, keep=self)
 
     @property
     def counts(self) -> Counts:

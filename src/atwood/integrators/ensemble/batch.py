@@ -17,7 +17,7 @@ from atwood.integrators.ensemble.code import FIELDS, batch_code
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 
-__all__ = ["ENDS", "Batch", "BatchParameters", "BatchPlaces"]
+__all__ = ["ENDS", "Batch", "BatchPlaces"]
 
 ENDS = {0: "reached", 1: "step limit", 2: "too small", 3: "no value between", 4: "no rates"}
 """How a run can end."""
@@ -42,6 +42,11 @@ class BatchPlaces:
         Where the session keeps these.
     counts
         How many counts follow each other from `steps` on.
+    parameters
+        The function that computes what depends on parameters alone, and its two arrays (derived values and scratch);
+        zeros where parameters cannot change from run to run.
+    tolerance_factor
+        By what absolute tolerances are multiplied where the session keeps them.
     keep
         Whatever must live as long as the addresses are used.
     """
@@ -54,27 +59,8 @@ class BatchPlaces:
     filled: int
     tolerance: int
     counts: int
-    keep: object = None
-
-
-@dataclass(frozen=True, eq=False)
-class BatchParameters:
-    """Parameters that change from run to run.
-
-    Attributes
-    ----------
-    values
-        Shape (runs, parameters).
-    prologue, derived, scratch
-        Addresses of the function that computes what depends on parameters alone, and of its arrays.
-    keep
-        Whatever must live as long as the addresses are used.
-    """
-
-    values: FloatArray
-    prologue: int
-    derived: int
-    scratch: int
+    parameters: tuple[int, int, int] = (0, 0, 0)
+    tolerance_factor: float = 1.0
     keep: object = None
 
 
@@ -96,7 +82,7 @@ class Batch:
     max_steps
         The steps that each run may take; None for no limit.
     parameters
-        Where they change from run to run.
+        Where they change from run to run, shape (runs, parameters).
 
     Attributes
     ----------
@@ -118,11 +104,12 @@ class Batch:
         starts: FloatArray,
         tolerances: FloatArray,
         max_steps: int | None = None,
-        parameters: BatchParameters | None = None,
+        parameters: FloatArray | None = None,
     ) -> None:
         runs, size = starts.shape
         self._starts, self._times = np.ascontiguousarray(starts), np.ascontiguousarray(times)
-        self._tolerances = np.ascontiguousarray(np.maximum(tolerances, np.finfo(float).tiny))
+        at_least = np.maximum(tolerances, np.finfo(float).tiny)
+        self._tolerances = np.ascontiguousarray(places.tolerance_factor * at_least)
         self.values = np.full((runs, len(times), size), np.nan)
         self.codes = np.full(runs, -1, dtype=np.int64)
         self._counted = np.zeros((runs, places.counts), dtype=np.int64)
@@ -151,15 +138,10 @@ class Batch:
             "tolerances": self._tolerances.ctypes.data,
         }
         if parameters is not None:
-            rows = np.ascontiguousarray(parameters.values)
-            given |= {
-                "prologue": parameters.prologue,
-                "parameters": rows.ctypes.data,
-                "width": rows.shape[1],
-                "derived": parameters.derived,
-                "scratch": parameters.scratch,
-            }
-            self._kept: object = (places, parameters, rows)
+            rows = np.ascontiguousarray(parameters)
+            given |= dict(zip(("prologue", "derived", "scratch"), places.parameters, strict=True))
+            given |= {"parameters": rows.ctypes.data, "width": rows.shape[1]}
+            self._kept: object = (places, rows)
         else:
             self._kept = places
         self._job = np.array([given.get(name, 0) for name in FIELDS], dtype=np.int64)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from atwood.integrators.machine_text import exact, sample_code, unpack
 from atwood.integrators.taylor.problem import HIGHEST, LOWEST, RETREAT, RETRIES, SMALLER, WATCHED
+from atwood.integrators.taylor.start_code import begin_code
 from atwood.integrators.taylor.stepping_code import LANES, ROWS, STRIDE, loop_code
 
 __all__ = ["COUNTS", "FUNCTIONS", "NUMBERS", "POINTERS", "step_code"]
@@ -15,7 +16,7 @@ __all__ = ["COUNTS", "FUNCTIONS", "NUMBERS", "POINTERS", "step_code"]
 NUMBERS = (
     *("order_number", "order_inverse", "order_step", "order_tick"),  # what the program of an order is told
     *("t", "t_old", "t_new", "time"),
-    *("unit", "last", "first", "stop", "stop_time", "share", "allowed", "longest", "reach"),
+    *("unit", "last", "first", "stop", "stop_time", "share", "allowed", "longest", "horizon", "reach"),
 )
 COUNTS = (
     *("size", "padded", "order", "pair_blocks", "square_blocks", "limit"),
@@ -27,7 +28,7 @@ POINTERS = (
     *("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out"),  # tables of pointers
     *("arrays", "table", "pair_sums", "square_sums", "numbers", "counts"),
 )
-FUNCTIONS = ("run", "interpolate", "sample", "evaluate")
+FUNCTIONS = ("run", "interpolate", "sample", "begin")
 
 
 def _prologue() -> str:
@@ -47,7 +48,7 @@ def _evaluate() -> str:
 
     Where they are found and where they go are the pointers of `from` and `to`.
     """
-    return f"""define i32 @evaluate(ptr %session, ptr %from, ptr %to) #0 {{
+    return f"""define internal i32 @evaluate(ptr %session, ptr %from, ptr %to) #0 {{
 {_prologue()}
   %code = call i32 %start(ptr %from, ptr %start_derived, ptr %scratch, ptr %to)
   %count = load i64, ptr %evaluations.at
@@ -86,7 +87,7 @@ attempt:
   %unit = phi double [ %wanted, %entry ], [ %smaller, %again ]
   %tries = phi i64 [ 0, %entry ], [ %tried, %again ]
   store double %unit, ptr %unit.at
-  call void @begin(ptr %arrays, i64 %m, double %unit)
+  call void @unfold(ptr %arrays, i64 %m, double %unit)
   br label %order1
 {chr(10).join(_order(k) for k in range(1, HIGHEST))}
 failed:
@@ -352,7 +353,7 @@ def step_code() -> str:
     They take a pointer to the pointers of a session, in the order of `POINTERS`; numbers and counts are in the order of
     `NUMBERS` and `COUNTS`.
     """
-    parts = [loop_code(), _evaluate(), _expand(), _choose(), _run(), _interpolate()]
+    parts = [loop_code(), _evaluate(), begin_code(_prologue()), _expand(), _choose(), _run(), _interpolate()]
     parts += [sample_code("%session", _prologue(), "%n")]
     parts += ["declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)", "declare double @llvm.floor.f64(double)"]
     return "\n".join(parts)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
 from itertools import accumulate
 from math import inf, log2
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +28,10 @@ from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.integrators.taylor.code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
 from atwood.integrators.taylor.problem import DEFECT, FLOOR, TaylorProblem, choose_order, share_of_radius
 from atwood.integrators.taylor.stepping_code import LANES, ROWS, STRIDE, positions
-from atwood.late import replace
+from atwood.late import names_of, replace
+
+if TYPE_CHECKING:
+    from atwood.integrators.ensemble.batch import BatchPlaces
 
 __all__ = ["CompiledRecurrences", "CompiledStepper"]
 
@@ -102,10 +106,11 @@ class CompiledStepper:
         self._set("share", log2(share_of_radius(chosen, options.relative_tolerance)))
         self._set("allowed", DEFECT * options.relative_tolerance + FLOOR)
         self._set("longest", options.max_step or inf)
+        self._set("horizon", options.horizon)
         self._set("stop_time", problem.stop_time)
         self._set("reach", problem.reach)
         self._set("first", options.first_step or 0.0)
-        self._evaluate, self._run, self._interpolate, self._sample = _functions()
+        self._run, self._interpolate, self._sample, self._begin = _functions()
 
     def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray) -> None:
         """Find a place for everything, in one piece of memory, and write down where it is."""
@@ -158,34 +163,32 @@ class CompiledStepper:
         places |= {"start": code["start"], "prologue": code["order_prologue"], "recurrence": code["order"]}
         places["start_derived"] = derived.ctypes.data
         pieces["pointers"].view(np.uint64)[:] = [places[name] for name in POINTERS]
-        self._session, self._new = c_void_p(places["pointers"]), (places["new_in"], places["new_out"])
+        self._session = c_void_p(places["pointers"])
+        self._parameters = code["start_prologue"], derived.ctypes.data, places["scratch"]
         self._outputs = c_void_p(places["values"]), c_void_p(places["values"] + 8 * n)
+
+    def batch_places(self) -> BatchPlaces:
+        """Return the addresses with which many runs can be made in one call.
+
+        What this session knows of parameters is written over by a run that has others.
+        """
+        from atwood.integrators.ensemble.batch import BatchPlaces
+
+        begin, sample = (_code().code.addresses[name] for name in ("begin", "sample"))
+        limit, steps, filled = (self._counts[COUNTS.index(name) :].ctypes.data for name in ("limit", "steps", "filled"))
+        floors = self._arrays[ROWS["floors"]].ctypes.data
+        places = begin, sample, self._session.value or 0, limit, steps, filled, floors, _COUNTED
+        return BatchPlaces(*places, self._parameters, 1.0 / self._options.relative_tolerance, self)
 
     @property
     def counts(self) -> Counts:
         """What it has done so far, over all starts."""
-        return Counts(*self._counts[_STEPS : _STEPS + 5].tolist())
+        return Counts(*self._counts[_STEPS : _STEPS + _COUNTED].tolist())
 
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
-        n, arrays = self._size, self._arrays
-        for name in ("t", "t_old", "t_new"):
-            self._set(name, t)
-        self._set("last", 0.0)
-        arrays[: ROWS["y"]] = 0.0
-        self._table[:] = 0.0  # nothing that is not finite must be left
-        for name in ("y", "new"):
-            arrays[ROWS[name], :n] = y
-        arrays[0, :n] = y
-        arrays[ROWS["y_low"]] = 0.0
-        if self._evaluate(self._session, *self._new):
-            return False
-        arrays[ROWS["rates"]] = rates = arrays[ROWS["new_rates"]]
-        with np.errstate(all="ignore"):
-            steepest = float(np.max(np.abs(rates[:n]) / (arrays[ROWS["floors"], :n] + np.abs(y))))
-        longest = min(self._options.horizon, self._options.max_step or inf)
-        self._set("unit", min(longest, 1.0 / steepest if steepest > 0.0 else inf))
-        return True
+        self._values[0] = y
+        return bool(self._begin(self._session, t, self._outputs[0]) == 0)
 
     def state(self) -> State:
         """Return time, values and rates at the end of the last step."""
@@ -223,6 +226,7 @@ class CompiledStepper:
         self._counts[COUNTS.index(name)] = value
 
 
+_COUNTED = len(names_of(Counts))
 _T, _STEPS = NUMBERS.index("t"), COUNTS.index("steps")
 
 
@@ -234,12 +238,12 @@ def _code() -> Built:
 
 @once
 def _functions() -> tuple[Callable[..., int], ...]:
-    """Return the functions `evaluate`, `run`, `interpolate` and `sample`."""
+    """Return the functions `run`, `interpolate`, `sample` and `begin`."""
     addresses = _code().code.addresses
     shapes = {
-        "evaluate": (c_void_p, c_void_p, c_void_p),
         "run": (c_void_p,),
         "interpolate": (c_void_p, c_double, c_void_p, c_void_p),
         "sample": (c_void_p, c_void_p, c_int64, c_void_p, c_void_p),
+        "begin": (c_void_p, c_double, c_void_p),
     }
     return tuple(ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items())

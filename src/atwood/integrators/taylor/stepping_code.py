@@ -206,12 +206,12 @@ done:
 }}"""
 
 
-def _begin() -> str:
+def _unfold() -> str:
     """Return the function that writes the coefficients of order zero and one."""
     loop = _Columns()
     loop.keep(loop.row("y"), 0)
     loop.keep(loop.each("fmul", loop.row("rates"), "%unit.all"), 1)
-    return loop.function("begin", ", double %unit", ("unit",))
+    return loop.function("unfold", ", double %unit", ("unit",))
 
 
 def _sizes() -> str:
@@ -308,7 +308,7 @@ def _accept() -> str:
 def loop_code() -> str:
     """Return the functions."""
     parts = [_pairs(order) for order in range(1, HIGHEST)] + [_squares(order) for order in range(1, HIGHEST)]
-    parts += [_begin(), _sizes(), _largest(), _move(), _look(), _misses(), _accept()]
+    parts += [_unfold(), _sizes(), _largest(), _move(), _look(), _misses(), _accept()]
     parts += [
         f"declare {_BLOCK} @llvm.fmuladd.v{LANES}f64({_BLOCK}, {_BLOCK}, {_BLOCK})",
         f"declare {_PART} @llvm.fmuladd.v{WIDTH}f64({_PART}, {_PART}, {_PART})",

@@ -1,4 +1,4 @@
-"""Speeds at the start of many runs at once, one row each."""
+"""Places and speeds at the start of many runs at once, one row each."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.initialization.system import Conditions
 from atwood.tolerances import tolerances
 
-__all__ = ["meet_speeds", "size_rows"]
+__all__ = ["meet_positions", "meet_speeds", "size_rows"]
+
+
+_ITERATIONS = 60
+"""So many steps are tried."""
 
 
 def size_rows(equations: Equations, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -21,6 +25,96 @@ def size_rows(equations: Equations, lengths: FloatArray) -> tuple[FloatArray, Fl
     for unit in (coordinate_scales(equations, 0.0), motion_scales(equations, 0.0)):  # zero for lengths, else one
         found.append(np.where(unit[None, :] == 0.0, lengths[:, None], unit[None, :]))
     return found[0], found[1]
+
+
+def meet_positions(
+    assembly: Assembly,
+    conditions: Conditions,
+    parameters: FloatArray,
+    t: float,
+    q: FloatArray,
+    sizes: FloatArray,
+    wanted: FloatArray,
+) -> NDArray[np.bool_]:
+    """Move coordinates to the nearest place that meets constraints and what is fixed, as `find_start` does.
+
+    The steps are those of `atwood.simulation.initialization.system.newton`; runs for which one of them does not lessen
+    what is missing are left to it.
+
+    Parameters
+    ----------
+    assembly
+        The scene, in the reduced form, whose rates are speeds.
+    conditions
+        What is to be met.
+    parameters
+        Values of the parameters, shape (parameters,) or (parameters, runs).
+    t
+        Time of the start, s.
+    q
+        Coordinates, shape (runs, number); changed in place.
+    sizes
+        Size of a displacement along each speed, shape (runs, number).
+    wanted
+        What each condition is to be, shape (conditions, runs).
+
+    Returns
+    -------
+    array
+        Which runs meet their conditions.
+    """
+    runs, (count, n) = len(q), conditions.shape
+    if not count:
+        return np.ones(runs, dtype=bool)
+    code = assembly.compiled(conditions.program, vectorized=True)
+    still = np.zeros((n, runs))
+
+    def look(places: FloatArray, which: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+        own = parameters if parameters.ndim == 1 else parameters[:, which]
+        values, jacobian = code.bind(own)(np.array([[t]]), places.T, still[:, : len(which)])
+        matrix = np.zeros((len(which), count, n))
+        matrix[:, conditions.rows, conditions.columns] = jacobian.T
+        return (values - wanted[:, which]).T, matrix * sizes[which, None, :]
+
+    def rows_of(matrix: FloatArray) -> FloatArray:
+        found = np.max(np.abs(matrix), axis=2)
+        return np.where(found > 0.0, found, 1.0)
+
+    met, active = np.zeros(runs, dtype=bool), np.arange(runs)
+    residual, matrix = look(q, active)
+    for _ in range(_ITERATIONS):
+        rows = rows_of(matrix)
+        size = np.max(np.abs(residual / rows), axis=1)
+        met[active[size < tolerances.MET]] = True
+        going = (size >= 1e-15) & np.isfinite(size) & np.all(np.isfinite(matrix), axis=(1, 2))
+        active, residual, matrix, rows, size = (one[going] for one in (active, residual, matrix, rows, size))
+        if not len(active):
+            break
+        step, is_known = _least_steps(matrix / rows[:, :, None], residual / rows)
+        longest = np.max(np.abs(step), axis=1)
+        step *= np.minimum(1.0, 0.5 / np.maximum(longest, 1e-300))[:, None]
+        trial = q[active] - sizes[active] * step
+        residual, matrix = look(trial, active)
+        better = np.max(np.abs(residual / rows), axis=1) < size
+        better &= is_known
+        q[active[better]] = trial[better]
+        active, residual, matrix = active[better], residual[better], matrix[better]
+    return met
+
+
+def _least_steps(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the shortest solutions of ``matrix x = right``, and which are known: those of independent rows."""
+    known: NDArray[np.bool_] = np.ones(len(matrix), dtype=np.bool_)
+    across = np.swapaxes(matrix, 1, 2)
+    try:
+        if matrix.shape[1] == matrix.shape[2]:
+            found: FloatArray = np.asarray(np.linalg.solve(matrix, right[:, :, None]), dtype=np.float64)
+        else:
+            found = np.asarray(across @ np.linalg.solve(matrix @ across, right[:, :, None]), dtype=np.float64)
+    except np.linalg.LinAlgError:  # rows of one run depend on each other
+        found = np.asarray(np.linalg.pinv(matrix, rcond=tolerances.RANK) @ right[:, :, None], dtype=np.float64)
+        known[:] = np.linalg.matrix_rank(matrix) == matrix.shape[1]
+    return found[:, :, 0], known
 
 
 def meet_speeds(
@@ -38,7 +132,7 @@ def meet_speeds(
     Parameters
     ----------
     assembly
-        The scene, in the reduced form and without constraints.
+        The scene, in the reduced form.
     conditions
         What is to be met.
     parameters

@@ -32,7 +32,7 @@ from atwood.late import dataclass, replace
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
 
-__all__ = ["Solved", "can_be_solved", "levels", "on_branch", "solve_at"]
+__all__ = ["AGREES", "ASIDE", "CLEAR", "TURN", "Solved", "can_be_solved", "levels", "on_branch", "solve_at"]
 
 _NEAR = 0.1
 """Nearer to a dead centre of every choice, as the square of a sine, the numeric loop takes over.
@@ -47,19 +47,19 @@ _START = 0.15
 _LEAVE = 0.25
 """Where this is left of the distance from a dead centre, another choice is looked for."""
 
-_CLEAR = 0.003
+CLEAR = 0.003
 """A choice of which so much is left in a whole turn meets no dead centre."""
 
 _MOST = 60
 """More choices of independent coordinates are not tried."""
 
-_TURN = 144
+TURN = 144
 """In so many positions of a whole turn it is seen whether there is a dead centre."""
 
-_AGREES = 1e-7
+AGREES = 1e-7
 """Formulas that miss a position by more, in units of the scene's sizes, are not those of its branch."""
 
-_ASIDE = 0.05
+ASIDE = 0.05
 """By so many of their sizes independent coordinates are moved to see whether formulas are right near by, too."""
 
 
@@ -272,7 +272,7 @@ def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArr
     except KernelEvaluationError:
         return None
     misses = np.abs(made[: len(q)] - q) / plan.coordinate_sizes
-    if not (np.all(misses <= _AGREES) and _holds(plan, solved, t, y)):
+    if not (np.all(misses <= AGREES) and _holds(plan, solved, t, y)):
         return None
     least, steepest = _least(solved, t, y)
     if not (margin > _START or least):
@@ -300,7 +300,7 @@ def _holds(plan: Plan, solved: Solved, t: float, y: FloatArray) -> bool:
     """Return whether all constraints hold wherever formulas lead to near by, with these parameters."""
     n, sizes = len(y) // 2, plan.coordinate_sizes[solved.independent]
     states = []
-    for i, step in itertools.product(range(n), (_ASIDE, -_ASIDE)):
+    for i, step in itertools.product(range(n), (ASIDE, -ASIDE)):
         moved = y.copy()
         moved[i] += step * sizes[i]
         with suppress(KernelEvaluationError):  # where the loop does not close
@@ -308,7 +308,7 @@ def _holds(plan: Plan, solved: Solved, t: float, y: FloatArray) -> bool:
     if not states:
         return False
     misses = misses_of(plan, np.full(len(states), t), *np.split(np.array(states).T, 2))
-    return bool(np.all(misses[0] <= _AGREES) and np.all(misses[1] * plan.scales.time <= _AGREES))
+    return bool(np.all(misses[0] <= AGREES) and np.all(misses[1] * plan.scales.time <= AGREES))
 
 
 def _least(solved: Solved, t: float, y: FloatArray) -> tuple[float, float]:
@@ -320,12 +320,12 @@ def _least(solved: Solved, t: float, y: FloatArray) -> tuple[float, float]:
     names = solved.assembly.reduced.names
     if not loops.margins or len(loops.independent) > 1 or names[loops.independent[0]].unit != "rad":
         return 0.0, 0.0
-    angles = y[0] + np.linspace(0.0, math.tau, _TURN + 1)
+    angles = y[0] + np.linspace(0.0, math.tau, TURN + 1)
     with np.errstate(all="ignore"):
         found = solved.kernel(solved.form.watched, vectorized=True)([[t]], angles[None, :], np.array([[y[1]]]))[0]
     margins = found[: len(loops.margins)]
     least = float(np.min(margins))  # not a number where the loop does not close
-    return (least, float(np.max(np.abs(np.diff(margins))))) if least > _CLEAR else (0.0, 0.0)
+    return (least, float(np.max(np.abs(np.diff(margins))))) if least > CLEAR else (0.0, 0.0)
 
 
 def levels(solved: Solved) -> tuple[float, float]:

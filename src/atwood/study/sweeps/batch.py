@@ -15,24 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.errors import AtwoodError
 from atwood.expr import depends_on
-from atwood.forms.accelerations import accelerations_of
 from atwood.forms.quantities import find_observables, observer
+from atwood.integrators.ensemble.batch import BatchPlaces
 from atwood.integrators.explicit_problem import LOOSEST
-from atwood.integrators.protocol import SolverOptions
-from atwood.late import dataclass, replace
-from atwood.simulation.dynamics.columns import masses_at
+from atwood.late import dataclass
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.initialization.many import size_rows
-from atwood.simulation.initialization.start import find_start
-from atwood.simulation.problem.explicit_scene import compiled_rates, explicit_problem
-from atwood.simulation.problem.preparation import make_plan
-from atwood.simulation.run.choice import choose
 from atwood.simulation.run.stiffness import can_be_stiff
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows
+from atwood.study.sweeps.motions import METHODS, Way, find_way, open_places
 from atwood.study.sweeps.runs import Records, SweepRequest, shared_work
 
 __all__ = ["run_batches", "why_not_batched"]
@@ -45,14 +39,13 @@ _PIECE, _NUMBERS = 2_000, 2_000_000
 def why_not_batched(request: SweepRequest) -> str:
     """Return why a sweep's runs must be made one by one, in words; empty if they can be made many at a time."""
     assembly, options = request.assembly, request.options
-    if options.solver not in ("auto", "explicit"):
+    if options.solver not in ("auto", *METHODS):
         return f"the solver {options.solver!r} was asked for"
     if assembly.form != "reduced":
         return "the dae form keeps constraints"
     equations = assembly.reduced
-    if equations.constraints or not equations.coordinates:
-        is_free = not equations.constraints
-        return "nothing is free to move" if is_free else "constraints are left among its coordinates"
+    if not equations.coordinates:
+        return "nothing is free to move"
     if equations.states or assembly.discrete_states:
         return "parts of it have states of their own"
     if find_event_functions(assembly):
@@ -67,22 +60,7 @@ def why_not_batched(request: SweepRequest) -> str:
         return "each run has a limit of time"
     if request.has_turns:
         return "a quantity counts turns on the way"
-    return _why_not_compiled(request)
-
-
-def _why_not_compiled(request: SweepRequest) -> str:
-    assembly, options = request.assembly, request.options
-    problem = explicit_problem(assembly)
-    if problem is None or problem.compiled is None:
-        return "it calls functions in Python"
-    try:
-        start = find_start(assembly)
-        q, u = start.coordinates, start.speeds
-        plan = make_plan(assembly, start.time, q, u, start.length, options.t_end - start.time)
-        chosen = choose(plan, options, start.time, q, u).solver
-    except AtwoodError:
-        return "the first run cannot start"
-    return "" if chosen == "explicit" else f"the solver is {chosen!r}"
+    return find_way(request)[1]
 
 
 def run_batches(
@@ -108,14 +86,16 @@ def run_batches(
     count, shown = request.cases.count, len(request.times) * (len(equations.coordinates) + len(equations.speeds))
     length = max(1, min(_PIECE, -(-count // (4 * threads)), _NUMBERS // max(1, shown)))
     pieces = [np.arange(first, min(first + length, count)) for first in range(0, count, length)]
-    batches = _Batches(request, records)
+    way, _ = find_way(request)
+    assert way is not None
+    batches = _Batches(request, records, way)
     shared_work(batches.work, pieces, threads, watch)
     return np.flatnonzero([not status for status in records.status])
 
 
 @dataclass(frozen=True, eq=False)
 class _Prepared:
-    """Runs that are ready for their first step."""
+    """Runs that are ready for their first step; parameters are None where all have the same."""
 
     runs: NDArray[np.intp]
     state: FloatArray
@@ -126,35 +106,25 @@ class _Prepared:
 class _Batches:
     """Pieces of a sweep, each prepared, run and read out as arrays."""
 
-    def __init__(self, request: SweepRequest, records: Records) -> None:
+    def __init__(self, request: SweepRequest, records: Records, way: Way) -> None:
         self.request, self.records = request, records
-        assembly = request.assembly
+        self.motion, self.solver, self.values = way.motion, way.solver, way.values
         self.starts, self.rows = StartRows(request), ParameterRows(request)
-        self.needs_reactions = _reads(request, [one.symbol for one in assembly.reactions])
+        self.needs_reactions = _reads(request, [one.symbol for one in request.assembly.reactions])
         self._own = threading.local()
-        # What threads share is made before they begin.
-        found = accelerations_of(assembly)
-        assert found is not None
-        self.rates = compiled_rates(assembly, found)
-        self.watched = assembly.compiled(found.program, vectorized=True)
-        self.balance = assembly.balance("reduced")
+        self._places()  # what threads share is made before they begin
 
     def work(self, runs: NDArray[np.intp], stop: threading.Event) -> int:
         """Make the runs of one piece; return how many are done."""
-        from atwood.integrators.ensemble.batch import Batch, BatchParameters
+        from atwood.integrators.ensemble.batch import Batch
 
         ready = self._prepare(runs)
         if not len(ready.runs):
             return 0
-        stepper, own = self._stepper()
         request, options = self.request, self.request.options
-        parameters = None
-        if ready.parameters is not None:
-            parameters = BatchParameters(ready.parameters, own.prologue, own.derived, own.scratch, own)
         begin = request.assembly.flat.t_start
-        batch = Batch(
-            stepper.batch_places(), begin, request.times, ready.state, ready.tolerances, options.max_steps, parameters
-        )
+        limits = ready.tolerances, options.max_steps
+        batch = Batch(self._places(), begin, request.times, ready.state, *limits, ready.parameters)
         while not batch.advance():
             if stop.is_set():
                 return 0
@@ -164,21 +134,11 @@ class _Batches:
             good &= counts[:, 4] == 0  # what has turned out stiff is made by itself, and may change its solver
         return self._record(ready, batch.values, counts[:, 0], good, batch.seconds)
 
-    def _stepper(self) -> tuple[Any, Any]:
-        """Return this thread's session."""
-        if not hasattr(self._own, "made"):
-            from atwood.integrators.dop853.native import CompiledStepper
-
-            assembly, options = self.request.assembly, self.request.options
-            own = self.rates.open()
-            self.rates.fill(own, assembly.parameter_values)
-            problem = explicit_problem(assembly)
-            assert problem is not None
-            span = options.t_end - assembly.flat.t_start
-            relative = min(options.relative_tolerance, LOOSEST)
-            settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=span)
-            self._own.made = CompiledStepper(replace(problem, compiled=lambda: own.rates), settings), own
-        found: tuple[Any, Any] = self._own.made
+    def _places(self) -> BatchPlaces:
+        """Return where this thread's session is."""
+        if not hasattr(self._own, "places"):
+            self._own.places = open_places(self.motion, self.solver, self.request.options, self.values)
+        found: BatchPlaces = self._own.places
         return found
 
     # -- before the first step ------------------------------------------------------------------------------------
@@ -186,52 +146,61 @@ class _Batches:
     def _prepare(self, runs: NDArray[np.intp]) -> _Prepared:
         parameters, usable = self.rows.read(runs)
         q, u, lengths, found = self.starts.read(runs, parameters)
-        usable &= found
-        state = np.concatenate([q, u], axis=1)
-        usable &= np.all(np.isfinite(state), axis=1)
-        t = np.array([[self.request.assembly.flat.t_start]])
-        values = self.request.assembly.parameter_values if parameters is None else parameters.T
+        usable &= found & np.all(np.isfinite(q), axis=1) & np.all(np.isfinite(u), axis=1)
+        runs, q, u, lengths = runs[usable], q[usable], u[usable], lengths[usable]
+        parameters = None if parameters is None else parameters[usable]
+        t = np.full(len(runs), self.request.assembly.flat.t_start)
         with np.errstate(all="ignore"):
-            a = self.watched.bind(values)(t, q.T, u.T)[-1].T
-            usable &= np.all(np.isfinite(a), axis=1) & self._has_inertia(t, q, u, values, lengths)
-            tolerances = self._tolerances(u, a, lengths, values)
+            time = self._time(t, q, u, lengths, parameters)
+            state, values, usable = self.motion.begin(float(t[0]) if len(t) else 0.0, q, u, parameters, lengths, time)
+            usable &= np.isfinite(time) & self._has_inertia(t, q, u, values, lengths)
+            tolerances = self._tolerances(lengths, time)[:, self.motion.columns()]
         usable &= np.all(np.isfinite(tolerances), axis=1)
-        kept = None if parameters is None else parameters[usable]
-        return _Prepared(runs[usable], state[usable], kept, tolerances[usable].reshape(-1, state.shape[1]))
+        kept = None if values is None else values[usable]
+        return _Prepared(runs[usable], state[usable], kept, tolerances[usable])
 
     def _has_inertia(
-        self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray, lengths: FloatArray
+        self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray
     ) -> NDArray[np.bool_]:
         """Return where nothing can move without inertia, by the measure of `make_plan`."""
-        program = self.balance
-        n = program.speeds
-        if program.mass_product is not None:
-            mass = masses_at(self.request.assembly, t, q, u, values)
+        mass = self.motion.masses(t, q.T, u.T, values)
+        directions = self.motion.open_directions(t, q.T, u.T, values)
+        if directions is None:
+            _, sizes = size_rows(self.request.assembly.reduced, lengths)
         else:
-            entries = self.request.assembly.compiled(program.program, vectorized=True).bind(values)(t, q.T, u.T)[0]
-            mass = np.zeros((len(q), n, n))
-            mass[:, program.mass_rows, program.mass_columns] = entries.T
-        _, sizes = size_rows(self.request.assembly.reduced, lengths)
-        mass *= sizes[:, :, None] * sizes[:, None, :]
+            mass = np.swapaxes(directions, 1, 2) @ mass @ directions
+            sizes = 1.0 / np.sqrt(np.abs(np.diagonal(mass, axis1=1, axis2=2)))
+        mass = mass * sizes[:, :, None] * sizes[:, None, :]
         usable = np.all(np.isfinite(mass), axis=(1, 2))
-        mass[~usable] = np.eye(n)
+        mass[~usable] = np.eye(mass.shape[1])
         found = np.linalg.eigvalsh(mass)
         good: NDArray[np.bool_] = usable & (found[:, 0] > 1e-14 * np.maximum(found[:, -1], 1e-300))
         return good
 
-    def _tolerances(self, u: FloatArray, a: FloatArray, lengths: FloatArray, values: FloatArray) -> FloatArray:
-        """Return the absolute tolerances of each run, as `Plan.tolerances` has them."""
+    def _time(
+        self, t: FloatArray, q: FloatArray, u: FloatArray, lengths: FloatArray, parameters: FloatArray | None
+    ) -> FloatArray:
+        """Return in what time something happens in each run, as `find_scales` has it; nan where that has no value."""
         request, assembly = self.request, self.request.assembly
-        coordinate_sizes, sizes = size_rows(assembly.reduced, lengths)
+        if not len(t):
+            return np.zeros(0)
+        a = self.motion.accelerations(t, q.T, u.T, parameters).T
+        _, sizes = size_rows(assembly.reduced, lengths)
         span = request.options.t_end - assembly.flat.t_start
         times = [np.full_like(u, span), sizes / np.abs(u), np.sqrt(sizes / np.abs(a))]
         symbols = [one.name for one in assembly.parameters]
         if "gravity" in symbols:
-            gravity = np.abs(values[symbols.index("gravity")])
+            given = assembly.parameter_values if parameters is None else parameters.T
+            gravity = np.abs(given[symbols.index("gravity")])
             times.append(np.broadcast_to(np.sqrt(lengths / gravity)[:, None], u.shape))
         every = np.concatenate(times, axis=1)
-        time = np.min(np.where(every > 0.0, every, np.inf), axis=1)
-        relative = min(request.options.relative_tolerance, LOOSEST)
+        time: FloatArray = np.min(np.where(every > 0.0, every, np.inf), axis=1)
+        return np.where(np.all(np.isfinite(a), axis=1), time, np.nan)
+
+    def _tolerances(self, lengths: FloatArray, time: FloatArray) -> FloatArray:
+        """Return the absolute tolerances of all coordinates and speeds of each run, as `Plan.tolerances` has them."""
+        coordinate_sizes, sizes = size_rows(self.request.assembly.reduced, lengths)
+        relative = min(self.request.options.relative_tolerance, LOOSEST)
         return np.concatenate([relative * coordinate_sizes, relative * (sizes / time[:, None])], axis=1)
 
     # -- after the last step --------------------------------------------------------------------------------------
@@ -259,19 +228,17 @@ class _Batches:
         """Return the quantities of the runs that came to their end, shape (quantities, runs, times)."""
         request, assembly = self.request, self.request.assembly
         count, moments = int(np.sum(good)), len(request.times)
-        n = len(assembly.reduced.coordinates)
-        flat = states[good].reshape(count * moments, states.shape[2]).T
-        q, u = kinematic_map_of(assembly, "reduced").normalized(flat[:n]), flat[n:]
-        t = np.tile(request.times, count)
-        values = assembly.parameter_values
-        if ready.parameters is not None:
-            values = np.repeat(ready.parameters[good], moments, axis=0).T
-        a = np.zeros_like(u)
-        reactions = np.zeros((len(assembly.reactions), len(t)))
         if not count:
             return np.zeros((len(request.paths), 0, moments))
+        t, known = np.tile(request.times, count), len(assembly.parameters)
+        rows = None if ready.parameters is None else np.repeat(ready.parameters[good], moments, axis=0)
+        values = assembly.parameter_values if rows is None else rows[:, :known].T
+        q, u = self.motion.states(t, states[good].reshape(count * moments, states.shape[2]), rows)
+        q = kinematic_map_of(assembly, "reduced").normalized(q)
+        a = np.zeros_like(u)
+        reactions = np.zeros((len(assembly.reactions), len(t)))
         if _reads(request, list(assembly.reduced.accelerations)):
-            a = self.watched.bind(values)(t[None, :], q, u)[-1]
+            a = self.motion.accelerations(t, q, u, rows)
         if self.needs_reactions:
             reactions = self._reactions(ready.runs[good], t, q, u, moments, values, ready.parameters is not None)
         kernel = assembly.compiled(observer(assembly, request.paths), vectorized=True).bind(values)

@@ -14,14 +14,15 @@ from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Slot, decisions_of, find_slots
 from atwood.forms.starting import starting
-from atwood.late import replace
+from atwood.late import dataclass, replace
+from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.local.flatten import flatten
-from atwood.simulation.initialization.many import meet_speeds, size_rows
+from atwood.simulation.initialization.many import meet_positions, meet_speeds, size_rows
 from atwood.simulation.initialization.start import find_start
-from atwood.simulation.initialization.system import start_conditions
+from atwood.simulation.initialization.system import Conditions, start_conditions
 from atwood.simulation.initialization.targets import Level, sort_targets
 from atwood.study.sweeps.cases import Axis
 from atwood.study.sweeps.runs import SweepRequest
@@ -202,16 +203,26 @@ class StartRows:
             and not speeds.guessed
             and not equations.orientation_coordinates
             and starting(assembly) is assembly
+            and not (equations.constraints and assembly.mechanism.space.is_spatial)  # turns, and ways to assemble it
         )
         self.is_direct = is_simple and not self._start_is_bound()
-        self._wanted = [columns.get(one.path, one.value) for one in speeds.fixed]
-        self._conditions = start_conditions(assembly, equations, speeds.fixed, True, True) if self.is_direct else None
+        self._conditions: tuple[_Conditions, _Conditions | None] | None = None
+        if self.is_direct:
+            has_loops = bool(equations.constraints)
+            places = self._found(equations, positions, False) if has_loops else None
+            self._conditions = self._found(equations, speeds, True), places
         flat = assembly.flat
         self._lengths = [
             columns.get(path, value)
             for path, value in flat.start.items()
             if assembly.start_observables[path].unit == "m"
         ]
+
+    def _found(self, equations: Equations, level: Level, of_speeds: bool) -> _Conditions:
+        """Return the conditions on places or on speeds, and what each is to be."""
+        made = start_conditions(self._request.assembly, equations, level.fixed, True, of_speeds)
+        held: list[FloatArray | float] = [0.0] * (made.shape[0] - len(level.fixed))
+        return _Conditions(made, (*held, *(self._columns.get(one.path, one.value) for one in level.fixed)))
 
     def _said(self, level: Level, unknowns: Sequence[Expression]) -> list[tuple[int, FloatArray | float]]:
         """Return what is said of unknowns themselves: their numbers and values."""
@@ -257,11 +268,14 @@ class StartRows:
             for rows, said in ((q, self._positions), (u, self._speeds)):
                 for place, given in said:
                     rows[:, place] = _of(given, runs)
-            wanted = np.array([np.broadcast_to(_of(one, runs), len(runs)) for one in self._wanted])
             values = assembly.parameter_values if parameters is None else parameters.T
             _, sizes = size_rows(assembly.reduced, lengths)
-            found = meet_speeds(assembly, self._conditions, values, assembly.flat.t_start, q, u, sizes, wanted)
-            return q, u, lengths, found
+            of_speeds, of_places = self._conditions
+            t, met = assembly.flat.t_start, np.ones(len(runs), dtype=bool)
+            if of_places is not None:
+                met = meet_positions(assembly, of_places.conditions, values, t, q, sizes, of_places.rows(runs))
+            met &= meet_speeds(assembly, of_speeds.conditions, values, t, q, u, sizes, of_speeds.rows(runs))
+            return q, u, lengths, met
         found = np.ones(len(runs), dtype=bool)
         for place, run in enumerate(runs.tolist()):
             try:
@@ -289,6 +303,18 @@ class StartRows:
         for given in self._lengths:
             lengths = np.maximum(lengths, np.abs(_of(given, runs)))
         return np.where(lengths > 0.0, lengths, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Conditions:
+    """Conditions of a start, and what each is to be: constraints zero."""
+
+    conditions: Conditions
+    wanted: tuple[FloatArray | float, ...]
+
+    def rows(self, runs: NDArray[np.intp]) -> FloatArray:
+        """Return what each condition is to be in some runs, shape (conditions, runs)."""
+        return np.array([np.broadcast_to(_of(one, runs), len(runs)) for one in self.wanted])
 
 
 def _of(given: FloatArray | float, runs: NDArray[np.intp]) -> FloatArray | float:

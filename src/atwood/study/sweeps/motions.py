@@ -1,0 +1,298 @@
+"""What the runs of a sweep integrate: all coordinates and speeds, or the independent ones of closed loops.
+
+Everything here is worked out for many runs at once, one row each. What a run by itself does is in
+`atwood.simulation.problem.preparation` and `atwood.simulation.problem.closed_loops`.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.errors import AtwoodError
+from atwood.forms.accelerations import AccelerationProgram, accelerations_of
+from atwood.forms.assembly import Assembly
+from atwood.integrators.ensemble.batch import BatchPlaces
+from atwood.integrators.explicit_problem import LOOSEST
+from atwood.integrators.protocol import SolverOptions
+from atwood.late import dataclass, replace
+from atwood.simulation.dynamics.columns import masses_at
+from atwood.simulation.dynamics.reactions import accelerations_at
+from atwood.simulation.initialization.start import find_start
+from atwood.simulation.problem.closed_loops import Solved, solve_at
+from atwood.simulation.problem.closed_loops_many import ManyBranches
+from atwood.simulation.problem.explicit_scene import compiled_rates, explicit_problem, explicit_problem_of
+from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.run.choice import choose
+from atwood.study.sweeps.runs import SweepRequest
+
+__all__ = ["METHODS", "ClosedLoops", "Motion", "OpenTree", "Way", "find_way", "open_places"]
+
+METHODS = ("explicit", "taylor")
+"""Methods with a session that many runs can be made with in one call."""
+
+
+class Motion(Protocol):
+    """How states of a scene become those of a method, and back."""
+
+    @property
+    def assembly(self) -> Assembly:
+        """The scene."""
+        ...
+
+    @property
+    def program(self) -> AccelerationProgram:
+        """What is integrated."""
+        ...
+
+    def begin(
+        self, t: float, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray, time: FloatArray
+    ) -> tuple[FloatArray, FloatArray | None, NDArray[np.bool_]]:
+        """Return what is integrated, the values of its parameters, and which runs can be made so.
+
+        Parameters
+        ----------
+        t, q, u
+            The start: coordinates and speeds, of shape (runs, number).
+        values
+            Parameters of the scene, shape (runs, number); None where they are the same for all.
+        lengths, time
+            Sizes of each run, m and s.
+        """
+        ...
+
+    def columns(self) -> list[int]:
+        """Return which coordinates and speeds are integrated, by their places in (q, u)."""
+        ...
+
+    def states(self, t: FloatArray, y: FloatArray, values: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+        """Return coordinates and speeds, of shape (number, samples), from what was integrated, one row each."""
+        ...
+
+    def accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
+        """Return the accelerations of all speeds, shape (number, samples), at states of the same shape."""
+        ...
+
+    def masses(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
+        """Return the mass matrices of all speeds, shape (runs, number, number), at states of shape (number, runs)."""
+        ...
+
+    def open_directions(
+        self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None
+    ) -> FloatArray | None:
+        """Return how all speeds move with integrated ones, shape (runs, number, few); None if they are all."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class OpenTree:
+    """All coordinates and speeds are integrated."""
+
+    assembly: Assembly
+
+    @property
+    def program(self) -> AccelerationProgram:
+        """What is integrated."""
+        found = accelerations_of(self.assembly)
+        assert found is not None
+        return found
+
+    def begin(
+        self, t: float, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray, time: FloatArray
+    ) -> tuple[FloatArray, FloatArray | None, NDArray[np.bool_]]:
+        """Return coordinates and speeds."""
+        return np.concatenate([q, u], axis=1), values, np.ones(len(q), dtype=bool)
+
+    def columns(self) -> list[int]:
+        """Return all places in (q, u)."""
+        equations = self.assembly.reduced
+        return list(range(len(equations.coordinates) + len(equations.speeds)))
+
+    def states(self, t: FloatArray, y: FloatArray, values: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+        """Return coordinates and speeds."""
+        n = len(self.assembly.reduced.coordinates)
+        return y[:, :n].T, y[:, n:].T
+
+    def accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
+        """Return the accelerations."""
+        kernel = self.assembly.compiled(self.program.program, vectorized=True)
+        found: FloatArray = kernel.bind(_bound(self.assembly, values))(t[None, :], q, u)[-1]
+        return found
+
+    def masses(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
+        """Return the mass matrices."""
+        return _masses(self.assembly, t, q, u, values)
+
+    def open_directions(
+        self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None
+    ) -> FloatArray | None:
+        """Return None: all directions are open."""
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoops:
+    """The independent coordinates of loops that formulas solve are integrated; branches are further parameters.
+
+    Attributes
+    ----------
+    assembly
+        The scene.
+    solved
+        The loops of the first run.
+    kept
+        Numbers of the constraints, which are all independent.
+    """
+
+    assembly: Assembly
+    solved: Solved
+    kept: NDArray[np.intp]
+
+    @property
+    def program(self) -> AccelerationProgram:
+        """What is integrated."""
+        return self.solved.form.accelerations
+
+    @property
+    def _branches(self) -> ManyBranches:
+        return ManyBranches(self.solved.form, self.assembly)
+
+    def begin(
+        self, t: float, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray, time: FloatArray
+    ) -> tuple[FloatArray, FloatArray | None, NDArray[np.bool_]]:
+        """Return independent coordinates and speeds, and the branches of each run."""
+        parameters = np.tile(self.assembly.parameter_values, (len(q), 1)) if values is None else values
+        found, usable = self._branches.values(t, q, u, parameters, lengths, time)
+        return np.concatenate([q, u], axis=1)[:, self.columns()], found, usable
+
+    def columns(self) -> list[int]:
+        """Return the places of independent coordinates and their speeds in (q, u)."""
+        free, n = self.solved.independent, len(self.assembly.reduced.coordinates)
+        return [*free, *(n + i for i in free)]
+
+    def states(self, t: FloatArray, y: FloatArray, values: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+        """Return all coordinates and speeds."""
+        assert values is not None
+        return self._branches.states(t, y, values)
+
+    def accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
+        """Return the accelerations of all speeds, from the balance of forces with the constraints."""
+        assembly = self.assembly
+        if values is not None:
+            assembly = assembly.with_rows(values[:, : len(assembly.parameters)].T)
+        return accelerations_at(assembly, "reduced", t, q, u, self.kept)
+
+    def masses(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
+        """Return the mass matrices of all speeds."""
+        return _masses(self.assembly, t, q, u, values)
+
+    def open_directions(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
+        """Return how all speeds move with the independent ones."""
+        assert values is not None
+        free = self.solved.independent
+        y, few = np.concatenate([q[free], np.zeros((len(free), q.shape[1]))]).T, len(free)
+        at_rest = self._branches.states(t, y, values)[1]
+        found = np.empty((q.shape[1], len(u), few))
+        for k in range(few):
+            y[:, few:] = np.eye(few)[k]
+            found[:, :, k] = (self._branches.states(t, y, values)[1] - at_rest).T
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """How the runs of a sweep are made in machine code.
+
+    Attributes
+    ----------
+    motion
+        What is integrated.
+    solver
+        The method, one of `METHODS`.
+    values
+        Parameters of the first run.
+    """
+
+    motion: Motion
+    solver: str
+    values: FloatArray
+
+
+def find_way(request: SweepRequest) -> tuple[Way | None, str]:
+    """Return how runs are made in machine code, by what the first of them is; None, and why not, where none is."""
+    assembly, options = request.assembly, request.options
+    try:
+        start = find_start(assembly)
+        q, u = start.coordinates, start.speeds
+        plan = make_plan(assembly, start.time, q, u, start.length, options.t_end - start.time)
+        chosen = choose(plan, options, start.time, q, u).solver
+    except AtwoodError:
+        return None, "the first run cannot start"
+    if chosen not in METHODS:
+        is_closed = bool(plan.balance.constraints)
+        return None, "no formulas solve its closed loops" if is_closed else f"the solver is {chosen!r}"
+    motion: Motion = OpenTree(assembly)
+    if plan.balance.constraints:
+        solved = solve_at(plan, start.time, q, u)
+        if solved is None or not solved.is_clear or solved.form.loops.counted or plan.finding.redundant:
+            return None, "formulas for its closed loops have dead centres on the way"
+        motion = ClosedLoops(assembly, solved, np.asarray(plan.finding.kept, dtype=np.intp))
+        values = solved.values
+    else:
+        problem, values = explicit_problem(assembly), assembly.parameter_values
+        if problem is None or problem.compiled is None:
+            return None, "it calls functions in Python"
+    return Way(motion, chosen, values), ""
+
+
+def open_places(motion: Motion, solver: str, options: RunOptions, values: FloatArray) -> BatchPlaces:
+    """Open a session of a method, for one thread, and return where a batch finds what it needs of it.
+
+    Parameters
+    ----------
+    motion
+        What is integrated.
+    solver
+        ``"explicit"`` or ``"taylor"``.
+    options
+        What was asked for.
+    values
+        Parameters of one run.
+    """
+    assembly = motion.assembly
+    relative = min(options.relative_tolerance, LOOSEST)
+    span = options.t_end - assembly.flat.t_start
+    settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=span)
+    if solver == "taylor":
+        from atwood.integrators.taylor.native import CompiledStepper as CompiledSeries
+        from atwood.simulation.problem.taylor_scene import taylor_problem
+
+        series = taylor_problem(assembly, options.t_end, False, motion.program, values)
+        return CompiledSeries(series, settings).batch_places()
+    from atwood.integrators.dop853.native import CompiledStepper
+
+    code = compiled_rates(assembly, motion.program)
+    own = code.open()
+    code.fill(own, values)
+    problem = replace(explicit_problem_of(assembly, motion.program, values), compiled=lambda: own.rates)
+    places = CompiledStepper(problem, settings).batch_places()
+    return replace(places, parameters=(own.prologue, own.derived, own.scratch))
+
+
+def _bound(assembly: Assembly, values: FloatArray | None) -> FloatArray:
+    """Return the scene's parameters for kernels, one column for each state where they differ."""
+    return assembly.parameter_values if values is None else values[:, : len(assembly.parameters)].T
+
+
+def _masses(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
+    program, bound = assembly.balance("reduced"), _bound(assembly, values)
+    if program.mass_product is not None:
+        return masses_at(assembly, t, q.T, u.T, bound)
+    entries = assembly.compiled(program.program, vectorized=True).bind(bound)(t[None, :], q, u)[0]
+    found = np.zeros((len(t), program.speeds, program.speeds))
+    found[:, program.mass_rows, program.mass_columns] = np.broadcast_to(entries.T, (len(t), entries.shape[0]))
+    return found
