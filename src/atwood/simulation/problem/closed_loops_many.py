@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.errors import AtwoodError
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
-from atwood.forms.loops.branches import Place
 from atwood.forms.loops.closed_form import ClosedForm
 from atwood.late import dataclass
 from atwood.simulation.initialization.many import size_rows
@@ -64,7 +62,7 @@ class ManyBranches:
         lengths, time
             Extent of the scene, m, and time in which something happens, s, of each run.
         """
-        values, found = self._branches(t, q, parameters, lengths)
+        values, found = self._branches(t, q, parameters)
         if not np.any(found):
             return values, found
         free = list(self.form.loops.independent)
@@ -76,22 +74,15 @@ class ManyBranches:
             found &= self._hold(t, y, values, sizes, moving_sizes, time) & self._are_clear(t, y, values)
         return values, found
 
-    def _branches(
-        self, t: float, q: FloatArray, parameters: FloatArray, lengths: FloatArray
-    ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        equations, symbols, loops = self.assembly.reduced, self.assembly.parameters, self.form.loops
-        known = len(symbols)
-        values, found = np.zeros((len(q), known + len(loops.branches))), np.ones(len(q), dtype=bool)
-        values[:, :known] = parameters
-        for run, (place, own, length) in enumerate(zip(q.tolist(), parameters.tolist(), lengths.tolist(), strict=True)):
-            here = {equations.time: t, **dict(zip(equations.coordinates, place, strict=True))}
-            try:
-                branches = loops.branch_values(Place(dict(zip(symbols, own, strict=True)), here, length))
-            except (AtwoodError, ArithmeticError, ValueError):  # no value there
-                branches = None
-            found[run] = branches is not None
-            if branches is not None:
-                values[run, known:] = [branches[one] for one in loops.branches]
+    def _branches(self, t: float, q: FloatArray, parameters: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Return parameters and branches, and where conditions for these hold."""
+        with np.errstate(all="ignore"):
+            branches, conditions = self._call(self.form.branches, parameters, np.full(len(q), t), q.T)
+        known, found = len(self.assembly.parameters), np.ones(len(q), dtype=bool)
+        values = np.empty((len(q), known + len(self.form.loops.branches)))
+        values[:, :known], values[:, known:] = parameters, branches.T
+        if len(conditions):
+            found &= np.all(conditions > 0.0, axis=0)
         return values, found
 
     def _hold(
