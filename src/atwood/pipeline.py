@@ -257,7 +257,8 @@ def simulate(
         (four-bars, slider-cranks, and what is made of such groups, in any plane). ``"auto"``: IDA for what is
         constrained or stiff, or turns out so; else an explicit method. `Result.solver` says which, and why.
         ``"gauss"``: a symplectic method with equal steps, whose energy error does not grow, for scenes that have a
-        Hamiltonian. ``"composition"``: the same where that is T(p) + V(q, t), by explicit steps.
+        Hamiltonian, closed loops that formulas solve included. ``"composition"``: the same where that is
+        T(p) + V(q, t), by explicit steps.
     order, step
         Of ``"gauss"`` the order, 2, 4, 6, 8, 10 or 12, and of ``"composition"``, up to 8 (8 if not given), and the
         step, s. A step that is not given is chosen so that the first steps are within the tolerances.

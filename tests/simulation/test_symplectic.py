@@ -22,6 +22,7 @@ from atwood import (
 )
 from atwood_library import PointMass
 from atwood_library.scenes import (
+    Bricard,
     Chain,
     ChargedParticle,
     DoublePendulum,
@@ -35,6 +36,7 @@ from atwood_library.scenes import (
     RollingDisc,
     RotatingHoopDriven,
     SimplePendulum,
+    SliderCrank,
     SphericalPendulum,
 )
 
@@ -186,11 +188,56 @@ def test_backwards_in_time_it_comes_to_its_start():
     assert back["rod.angle"][-1] == pytest.approx(1.0, abs=1e-13)
 
 
+@pytest.mark.parametrize("order", [2, 4, 6])
+@pytest.mark.parametrize(
+    "scene", [FourBar(), FourBar(space="space"), SliderCrank()], ids=["four-bar", "in space", "slider-crank"]
+)
+def test_loops_that_formulas_solve_have_their_order(scene, order):
+    exact = simulate(scene, t_end=0.6, solver="taylor", rtol=1e-13, outputs=[0.0, 0.6])
+    steps = (0.02, 0.01) if order < 6 else (0.03, 0.02)
+    errors = []
+    for step in steps:
+        run = simulate(scene, t_end=0.6, solver="gauss", order=order, step=step, outputs=[0.0, 0.6])
+        errors.append(np.max(np.abs(run["crank.angle"] - exact["crank.angle"])))
+    assert np.log(errors[0] / errors[1]) / np.log(steps[0] / steps[1]) == pytest.approx(order, abs=0.6)
+
+
+def test_the_energy_of_a_linkage_does_not_drift():
+    """A crank that turns over and over: samples at whole steps, a period some fifty."""
+    step, count = 0.02, 50_000
+    outputs = step * np.unique(np.r_[np.arange(0, 5000), np.arange(count - 5000, count + 1)])
+    run = simulate(FourBar(), t_end=step * count, outputs=outputs, solver="gauss", order=4, step=step, samples=1)
+    errors = run.energy.total - run.energy.total[0]
+    first, last = errors[:5000], errors[-5000:]
+    assert np.max(np.abs(first)) > 1e-9
+    assert np.max(np.abs(last)) < 3.0 * np.max(np.abs(first))
+    assert abs(np.mean(last) - np.mean(first)) < 0.2 * np.max(np.abs(first))
+
+
+def test_dead_centres_are_passed():
+    """A linkage none of whose links turns fully: other coordinates take over at each end of a swing."""
+    scene = FourBar(crank_length=2.0, coupler_length=1.5, rocker_length=1.8, frame_length=3.0)
+    scene.start, scene.guess = {"crank.angle": 1.0, "crank.angular_velocity": 0.5}, {"rocker.angle": 2.0}
+    ours = simulate(scene, t_end=4.0, solver="gauss", step=0.0025)
+    theirs = simulate(scene, t_end=4.0, solver="taylor", rtol=1e-12)
+    assert ours.statistics.reinitializations > 0
+    for link in ("crank", "coupler", "rocker"):
+        np.testing.assert_allclose(ours[f"{link}.angle"], theirs[f"{link}.angle"], atol=2e-8)
+
+
+def damped_four_bar():
+    """Return a linkage that loses energy."""
+    scene = FourBar()
+    scene.pivot1.damping = 0.1
+    return scene
+
+
 @pytest.mark.parametrize(
     ("make", "error", "said"),
     [
         (RollingDisc, UnsupportedError, "it rolls"),
-        (FourBar, UsageError, "without closed loops"),
+        (Bricard, UsageError, "without closed loops"),
+        (damped_four_bar, UnsupportedError, "pivot1: its forces do not follow from a Hamiltonian"),
         (FallingWithDrag, UnsupportedError, "air: its forces do not follow from a Hamiltonian"),
     ],
 )

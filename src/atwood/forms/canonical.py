@@ -21,12 +21,22 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.by_hand import as_by_hand
 from atwood.forms.kept import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_along_speeds
+from atwood.forms.loops.closed_form import ClosedForm, in_terms_of_independent
 from atwood.forms.program import rates_are_speeds
 from atwood.late import dataclass
+from atwood.topology.spanning_forest import Coordinate
 
-__all__ = ["CanonicalPrograms", "SeparablePrograms", "canonical_programs", "is_canonical", "separable_programs"]
+__all__ = [
+    "CanonicalPrograms",
+    "SeparablePrograms",
+    "canonical_programs",
+    "closed_canonical_programs",
+    "is_canonical",
+    "separable_programs",
+]
 
 _CANONICAL: Key[CanonicalPrograms] = Key("canonical equations")
+_CLOSED: Key[CanonicalPrograms] = Key("canonical equations with solved loops")
 _SEPARABLE: Key[SeparablePrograms | None] = Key("separable equations")
 
 
@@ -67,6 +77,27 @@ def canonical_programs(assembly: Assembly) -> CanonicalPrograms:
         If it has no Hamiltonian, or forces act that do not follow from it.
     """
     return assembly.shared.get(_CANONICAL, lambda: _make(assembly))
+
+
+def closed_canonical_programs(assembly: Assembly, form: ClosedForm) -> CanonicalPrograms:
+    """Return Hamilton's equations of a mechanism whose loops are solved by formulas.
+
+    L is that of all coordinates with the formulas put in: holonomic constraints leave Lagrange's equations of the
+    independent coordinates as they are (Goldstein, section 1.4). Branches are parameters after all others.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    form
+        Its loops solved.
+
+    Raises
+    ------
+    UnsupportedError
+        If it has no Hamiltonian, or forces act that do not follow from it.
+    """
+    return assembly.shared.get(_CLOSED, lambda: _make_closed(assembly, form), form)
 
 
 def is_canonical(assembly: Assembly) -> bool:
@@ -126,13 +157,13 @@ def _separate(assembly: Assembly) -> SeparablePrograms | None:
     return SeparablePrograms(forces, along)
 
 
-def _refuse(assembly: Assembly, found: Lagrangian) -> None:
+def _refuse(assembly: Assembly, found: Lagrangian, loops_are_solved: bool = False) -> None:
     """Refuse a scene that is no Hamiltonian system."""
     equations, name = assembly.reduced, assembly.flat.name
     advice = "Use the solver 'explicit' or 'ida'."
     if equations.solved_speeds or any(not one.holonomic for one in equations.constraints):
         raise UnsupportedError("it rolls, and its flow is not canonical", where=name, advice=advice)
-    if equations.constraints:
+    if equations.constraints and not loops_are_solved:
         what = "closed loops leave constraints among its coordinates, whose momenta are not free"
         raise UnsupportedError(what, where=equations.constraints[0].key[0], advice=advice)
     if equations.states:
@@ -146,14 +177,65 @@ def _refuse(assembly: Assembly, found: Lagrangian) -> None:
             )
 
 
+@dataclass(frozen=True, eq=False)
+class _Terms:
+    """What Hamilton's equations are made of: L and the rates in terms of coordinates and velocities."""
+
+    time: Expression
+    coordinates: tuple[Expression, ...]
+    names: tuple[Coordinate, ...]
+    velocities: tuple[Expression, ...]
+    velocity_names: tuple[Coordinate, ...]
+    rates: tuple[Expression, ...]
+    lagrangian: Expression
+    plain: bool
+
+
 def _make(assembly: Assembly) -> CanonicalPrograms:
     equations = assembly.reduced
     found = lagrangian_along_speeds(assembly, equations)
     _refuse(assembly, found)
-    graph, q, u = found.graph, list(found.coordinates), list(found.velocities)
-    plain = rates_are_speeds(equations)
+    (lagrangian,) = as_by_hand(equations, assembly.parameters, [found.lagrangian])
+    terms = _Terms(
+        found.time,
+        found.coordinates,
+        found.names,
+        found.velocities,
+        found.velocity_names,
+        found.rates,
+        lagrangian,
+        rates_are_speeds(equations),
+    )
+    return _hamilton(terms, assembly.flat.name, assembly.parameters)
+
+
+def _make_closed(assembly: Assembly, form: ClosedForm) -> CanonicalPrograms:
+    found, free = lagrangian_along_speeds(assembly, assembly.reduced), form.loops.independent
+    _refuse(assembly, found, loops_are_solved=True)
+    q, u = found.coordinates, found.velocities
+    dependent = [one for values in (q, u) for i, one in enumerate(values) if i not in free]
+    (lagrangian,) = in_terms_of_independent(form, [found.lagrangian])
+    if depends_on(lagrangian, dependent):
+        what = "an energy reads an angle of its loops otherwise than by sine and cosine"
+        raise UnsupportedError(what, where=assembly.flat.name, advice="Use the solver 'explicit' or 'ida'.")
+    own = tuple(u[i] for i in free)
+    terms = _Terms(
+        found.time,
+        tuple(q[i] for i in free),
+        tuple(found.names[i] for i in free),
+        own,
+        tuple(found.velocity_names[i] for i in free),
+        own,
+        lagrangian,
+        plain=True,
+    )
+    return _hamilton(terms, f"{assembly.flat.name} (closed form)", (*assembly.parameters, *form.loops.branches))
+
+
+def _hamilton(found: _Terms, name: str, parameters: tuple[Expression, ...]) -> CanonicalPrograms:
+    lagrangian, plain = found.lagrangian, found.plain
+    graph, q, u, rates = lagrangian.graph, list(found.coordinates), list(found.velocities), list(found.rates)
     p = [graph.symbol(f"P:{one.name}") for one in found.names]
-    rates, (lagrangian,) = list(found.rates), as_by_hand(equations, assembly.parameters, [found.lagrangian])
     momenta = vjp([lagrangian], [graph.one], u)
     mass = jacobian(momenta, u)
     entries = {(i, j): one for i, j, one in zip(mass.rows, mass.columns, mass.entries, strict=True)}
@@ -179,30 +261,29 @@ def _make(assembly: Assembly) -> CanonicalPrograms:
         pushes = [one - other for one, other in zip(pushes, vjp(rates, p, q), strict=True)]
     there = dict(zip(u, solution, strict=True))
     outputs = substitute([*rates, *pushes], there)
-    n, name = len(q), assembly.flat.name
+    n = len(q)
     groups = [InputGroup("t", (found.time,)), InputGroup("q", tuple(q)), InputGroup("p", tuple(p))]
     given = [OutputGroup("rates", tuple(outputs[:n])), OutputGroup("pushes", tuple(outputs[n:]))]
     if moving:
         groups.append(InputGroup("u", tuple(u)))
     if moving or not plain:
         given.append(OutputGroup("speeds", tuple(solution)))
-    parameters = assembly.parameters
     return CanonicalPrograms(
         Program(f"{name} (Hamilton's equations)", tuple(groups), parameters, tuple(given)),
-        _momenta_program(found, momenta, f"{name} (momenta)", parameters, plain),
+        _momenta_program(found, momenta, f"{name} (momenta)", parameters),
         moving,
         plain,
     )
 
 
 def _momenta_program(
-    found: Lagrangian, momenta: list[Expression], name: str, parameters: tuple[Expression, ...], plain: bool
+    found: _Terms, momenta: list[Expression], name: str, parameters: tuple[Expression, ...]
 ) -> Program:
     """Return the program of (t, q, u) with the momenta along the speeds, and how rates follow from speeds."""
     u, n = list(found.velocities), len(found.coordinates)
     outputs = [OutputGroup("momenta", tuple(momenta))]
-    if not plain:
-        entries = [found.graph.zero] * (n * len(u))
+    if not found.plain:
+        entries = [found.lagrangian.graph.zero] * (n * len(u))
         slopes = jacobian(list(found.rates), u)
         for row, column, entry in zip(slopes.rows, slopes.columns, slopes.entries, strict=True):
             entries[row * len(u) + column] = entry

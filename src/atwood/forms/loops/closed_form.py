@@ -28,7 +28,7 @@ from atwood.forms.loops.branches import ClosedLoops, Group
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["ClosedForm", "closed_form"]
+__all__ = ["ClosedForm", "closed_form", "in_terms_of_independent"]
 
 Matrix = dict[tuple[int, int], Expression]
 
@@ -94,7 +94,7 @@ def closed_form(
     places = loops.places
     speeds = {u[d]: moved.speed(d) for d in moved.order}
     found = _accelerations(equations, _with_single_angles(list(equations.rows if rows is None else rows)), moved)
-    found, speeds = _in_terms_of_independent(found, speeds, places)
+    found, speeds = _with_formulas(found, speeds, places)
     inputs = (
         InputGroup("t", (equations.time,)),
         InputGroup("q", tuple(q[i] for i in free)),
@@ -133,7 +133,20 @@ def closed_form(
     )
 
 
-def _in_terms_of_independent(
+def in_terms_of_independent(form: ClosedForm, values: Sequence[Expression]) -> list[Expression]:
+    """Return functions of all coordinates and speeds as functions of the independent ones.
+
+    Parameters
+    ----------
+    form
+        The mechanism with its loops solved.
+    values
+        What reads dependent angles by their sines and cosines.
+    """
+    return substitute(_with_single_angles(list(values)), form.known)
+
+
+def _with_formulas(
     found: Sequence[Expression], speeds: Mapping[Expression, Expression], places: Mapping[Expression, Expression]
 ) -> tuple[list[Expression], dict[Expression, Expression]]:
     """Replace dependent speeds, and then dependent coordinates with their sines and cosines."""

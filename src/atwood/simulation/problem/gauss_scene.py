@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 
+from atwood.codegen import BoundKernel
 from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
-from atwood.forms.canonical import CanonicalPrograms, canonical_programs, separable_programs
+from atwood.forms.canonical import CanonicalPrograms, canonical_programs, closed_canonical_programs, separable_programs
 from atwood.forms.kept import Key
 from atwood.integrators.composition.coefficients import ORDERS as COMPOSITIONS
 from atwood.integrators.composition.native import CompiledComposition
@@ -17,6 +19,7 @@ from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.gauss.native import CompiledGauss, CompiledMethod, GaussStepper
 from atwood.integrators.protocol import Budget, FloatArray, SolverOptions
 from atwood.late import dataclass
+from atwood.simulation.problem.closed_loops import Solved
 
 __all__ = ["ORDER", "GaussSettings", "open_gauss"]
 
@@ -26,13 +29,22 @@ ORDER = 8
 _COMPILED: Key[CompiledMethod] = Key("compiled symplectic method")
 
 
-def momenta_of(assembly: Assembly, found: CanonicalPrograms) -> Callable[[float, FloatArray, FloatArray], FloatArray]:
+Momenta: TypeAlias = Callable[[float, FloatArray, FloatArray], FloatArray]
+
+
+def momenta_of(found: CanonicalPrograms, kernel: BoundKernel) -> Momenta:
     """Return the function that gives the momenta of the coordinates at (t, q, u).
 
     Where there are more coordinates than speeds, they are those of least size: the others are constants of the motion
     that nothing depends on.
+
+    Parameters
+    ----------
+    found
+        Hamilton's equations.
+    kernel
+        Its program of the momenta, with values of the parameters.
     """
-    kernel = assembly.kernel(found.momenta)
 
     def momenta(t: float, q: FloatArray, u: FloatArray) -> FloatArray:
         given = kernel([t], q, u)
@@ -45,9 +57,7 @@ def momenta_of(assembly: Assembly, found: CanonicalPrograms) -> Callable[[float,
     return momenta
 
 
-def _canonical_sizes(
-    momenta: Callable[[float, FloatArray, FloatArray], FloatArray], t: float, y: FloatArray, n: int, sizes: FloatArray
-) -> FloatArray:
+def _canonical_sizes(momenta: Momenta, t: float, y: FloatArray, n: int, sizes: FloatArray) -> FloatArray:
     """Return the sizes of coordinates and momenta; momenta are as large as speeds of their sizes make them."""
     q, u = y[:n], y[n:]
     here = momenta(t, q, u)
@@ -56,18 +66,18 @@ def _canonical_sizes(
     return np.concatenate([sizes[:n], np.where(found > 0.0, found, np.max(found))])
 
 
-def _compile(assembly: Assembly, solver: str, order: int) -> CompiledMethod:
+def _compile(assembly: Assembly, programs: CanonicalPrograms, speeds: int, solver: str, order: int) -> CompiledMethod:
     """Return a method as machine code."""
     name = assembly.flat.name
     if solver == "gauss":
-        return CompiledGauss(canonical_programs(assembly).equations, len(assembly.reduced.speeds), order)
+        return CompiledGauss(programs.equations, speeds, order)
     if order not in COMPOSITIONS:
         raise UsageError(
             f"there is no composition of order {order}",
             where=name,
             advice=f"Give one of {', '.join(map(str, COMPOSITIONS))}, or the solver 'gauss'.",
         )
-    found = separable_programs(assembly)
+    found = None if assembly.reduced.constraints else separable_programs(assembly)
     if found is None:
         raise UnsupportedError(
             "its H is no sum of a function of momenta and one of coordinates, so that its steps cannot be split",
@@ -110,6 +120,7 @@ def open_gauss(
     t: float,
     y: FloatArray,
     budget: Budget | None = None,
+    solved: Solved | None = None,
 ) -> ExplicitSession:
     """Start a run with a method of Gauss, or a composition.
 
@@ -127,20 +138,26 @@ def open_gauss(
         Start values, (q, u).
     budget
         Limits of the session.
+    solved
+        Its closed loops, solved by formulas; (q, u) are then the independent ones.
 
     Raises
     ------
     UnsupportedError
         If the scene is no Hamiltonian system, or for a composition one that is not separable.
     """
-    programs = canonical_programs(assembly)
+    programs = canonical_programs(assembly) if solved is None else closed_canonical_programs(assembly, solved.form)
     if problem.compiled is None:
         what = "its laws call functions in Python, which symplectic methods cannot"
         raise UsageError(what, where=assembly.flat.name, advice="Use the solver 'ida'.")
-    order, speeds = settings.order or ORDER, len(assembly.reduced.speeds)
-    solver = settings.solver
-    compiled = assembly.shared.get(_COMPILED, lambda: _compile(assembly, solver, order), solver, order)
-    values, momenta = np.asarray(assembly.parameter_values, dtype=float), momenta_of(assembly, programs)
+    order, solver = settings.order or ORDER, settings.solver
+    speeds = len(assembly.reduced.speeds) if solved is None else len(solved.independent)
+    compiled = assembly.shared.get(
+        _COMPILED, lambda: _compile(assembly, programs, speeds, solver, order), programs, solver, order
+    )
+    values = np.asarray(assembly.parameter_values, dtype=float) if solved is None else solved.values
+    kernel = assembly.kernel(programs.momenta) if solved is None else solved.kernel(programs.momenta)
+    momenta = momenta_of(programs, kernel)
     sizes = _canonical_sizes(momenta, t, y, len(y) - speeds, settings.sizes)
     stepper = GaussStepper(compiled, values, momenta, problem.compiled(), settings.step or 1.0, sizes)
     if settings.step is None:

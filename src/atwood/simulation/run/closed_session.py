@@ -21,6 +21,7 @@ from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Statu
 from atwood.late import replace
 from atwood.simulation.problem.closed_loops import Solved, levels, on_branch, solve_at
 from atwood.simulation.problem.explicit_scene import explicit_problem_of
+from atwood.simulation.problem.options import FIXED_STEPS
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode
@@ -51,7 +52,7 @@ class ClosedLoopSession:
     request
         What is to be solved.
     solver
-        ``"explicit"`` or ``"taylor"``.
+        ``"explicit"``, ``"taylor"`` or ``"gauss"``.
     t, y
         Start values of all coordinates and speeds.
     solved
@@ -201,6 +202,12 @@ class ClosedLoopSession:
 
             series = taylor_problem(assembly, request.end, bool(directions), found, solved.values)
             return open_taylor(problem, series, settings, t, y, budget)
+        if self._solver in FIXED_STEPS:
+            from atwood.simulation.problem.gauss_scene import GaussSettings, open_gauss
+
+            asked, sizes = request.options, solved.reduced(request.plan.tolerances(1.0))
+            steps = GaussSettings(self._solver, asked.order, asked.step, request.end, sizes)
+            return open_gauss(assembly, problem, settings, steps, t, y, budget, solved)
         from atwood.integrators.explicit_session import open_explicit
 
         given = self._leave

@@ -206,7 +206,7 @@ def open_explicit_session(
     UsageError
         If the scene is not one for explicit methods.
     """
-    if solver != "gauss" and request.plan.balance.constraints:
+    if request.plan.balance.constraints:
         from atwood.simulation.problem.closed_loops import solve_at
         from atwood.simulation.run.closed_session import ClosedLoopSession
 
