@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.interpolate import make_interp_spline
 
 from atwood import Result, Scene, assemble, compare, simulate
 from atwood.arrays import FloatArray
@@ -265,6 +266,19 @@ def test_dead_centres_in_each_swing_are_passed() -> None:
     assert tight.energy.max_drift < 1e-9
 
 
+def test_swings_over_dead_centres_are_right_to_rounding() -> None:
+    result = simulate(rocking(), t_end=3.0, rtol=1e-14, outputs=3001)
+    assert by_formulas(result)
+    assert result.run.statistics.reinitializations >= 4
+    assert result.energy.max_drift < 1e-12
+    # Where energy and lengths are kept, only the course of time is left: displacements are integrals of speeds.
+    angle = result["rocker.angle"]
+    moved = make_interp_spline(result.time, result["rocker.angular_velocity"], k=9).antiderivative()
+    assert np.ptp(angle) > 0.5
+    assert_allclose(angle[0] + moved(result.time), angle, atol=1e-11)
+    assert_allclose(states(simulate(rocking(), t_end=3.0, rtol=1e-13, outputs=3001)), states(result), atol=1e-9)
+
+
 @needs_sundials
 def test_angles_of_links_that_all_turn_go_on_without_jumps() -> None:
     def drag_link() -> FourBar:
@@ -337,19 +351,43 @@ def test_what_no_group_solves_is_left_to_the_numeric_loop() -> None:
     assert "closed loops leave constraints" in simulate(Bricard(), t_end=0.05).solver
 
 
-@needs_sundials
-def test_near_a_singular_position_the_numeric_loop_takes_over() -> None:
-    def parallelogram() -> FourBar:
-        scene = FourBar(crank_length=1.0, coupler_length=2.0, rocker_length=1.0, frame_length=2.0)
-        scene.start = {"crank.angle": 1.0, "crank.angular_velocity": 8.0}
-        scene.guess = {"coupler.angle": 0.0, "rocker.angle": 1.0}
-        return scene
+def parallelogram(angle: float = 1.0) -> FourBar:
+    scene = FourBar(crank_length=1.0, coupler_length=2.0, rocker_length=1.0, frame_length=2.0)
+    scene.start = {"crank.angle": angle, "crank.angular_velocity": 8.0}
+    scene.guess = {"coupler.angle": 0.0, "rocker.angle": angle}
+    return scene
 
-    result = simulate(parallelogram(), t_end=1.0, rtol=1e-9)
-    assert [one.solver for one in result.run.choices][:2] == ["explicit", "ida"]
+
+@needs_sundials
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+def test_formulas_go_on_behind_a_singular_position(rtol: float) -> None:
+    result, numeric = (simulate(parallelogram(), t_end=1.5, rtol=rtol, solver=one) for one in ("auto", "ida"))
+    solvers = [one.solver for one in result.run.choices]
+    assert [one == "ida" for one in solvers] == [False, True] * 4 + [False]
     assert "a dead centre" in result.solver
+    assert "has been passed" in result.solver
+    found, expected = ([one.time for one in each.singular_crossings] for each in (result, numeric))
+    assert_allclose(found, expected, atol=1e-4)
+    assert len(found) == 4
     assert_allclose(result["rocker.angle"], result["crank.angle"], atol=1e-6)
-    assert result["crank.angle"][-1] > 4.0
+    assert_allclose(result["crank.angle"], numeric["crank.angle"], atol=1e3 * rtol + 1e-7)
+    assert result.energy.max_drift < 1e3 * rtol
+
+
+@needs_sundials
+def test_outputs_do_not_tell_when_formulas_go_on() -> None:
+    few, many = (simulate(parallelogram(), t_end=1.5, rtol=1e-8, outputs=outputs) for outputs in (2, 400))
+    assert len(few.run.choices) == len(many.run.choices) == 9
+    for one, other in zip(few.run.choices, many.run.choices, strict=True):
+        assert (one.solver, one.time) == (other.solver, pytest.approx(other.time, rel=1e-12))
+    assert_allclose(few["crank.angle"][-1], many["crank.angle"][-1], atol=1e-10)
+
+
+@needs_sundials
+def test_formulas_go_on_where_a_run_began_at_a_dead_centre() -> None:
+    result = simulate(parallelogram(0.1), t_end=0.35, rtol=1e-9)
+    assert [one.solver for one in result.run.choices] == ["ida", "explicit"]
+    assert_allclose(result["rocker.angle"], result["crank.angle"], atol=1e-6)
 
 
 def test_other_values_and_starts_use_the_same_programs() -> None:

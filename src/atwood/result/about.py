@@ -30,7 +30,7 @@ def versions() -> dict[str, str]:
 
 def solver_name(result: Result) -> str:
     """Return the name of the solver that a run was made with; of all, if it was changed on the way."""
-    return ", then ".join(one.name for one in result.run.choices)
+    return ", then ".join(dict.fromkeys(one.name for one in result.run.choices))
 
 
 def describe_run(result: Result) -> dict[str, Any]:

@@ -32,7 +32,18 @@ from atwood.late import dataclass, replace
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
 
-__all__ = ["AGREES", "ASIDE", "CLEAR", "TURN", "Solved", "can_be_solved", "levels", "on_branch", "solve_at"]
+__all__ = [
+    "AGREES",
+    "ASIDE",
+    "CLEAR",
+    "TURN",
+    "Solved",
+    "can_be_solved",
+    "have_formulas",
+    "levels",
+    "on_branch",
+    "solve_at",
+]
 
 _NEAR = 0.1
 """Nearer to a dead centre of every choice, as the square of a sine, the numeric loop takes over.
@@ -173,6 +184,10 @@ class _Choices:
 _CHOICES: Key[_Choices] = Key("choices of independent coordinates")
 
 
+def _choices(plan: Plan, t: float, q: FloatArray) -> _Choices:
+    return plan.assembly.shared.get(_CHOICES, lambda: _Choices(plan, t, q), plan.finding.rank)
+
+
 def _place(plan: Plan, t: float, q: FloatArray) -> Place:
     equations, assembly = plan.assembly.reduced, plan.assembly
     here = {equations.time: t, **dict(zip(equations.coordinates, map(float, q), strict=True))}
@@ -202,6 +217,22 @@ def can_be_solved(plan: Plan) -> bool:
         and rates_are_speeds(equations)
         and all(one.value is not None for one in equations.constraints)
     )
+
+
+def have_formulas(plan: Plan, t: float, q: FloatArray) -> bool:
+    """Return whether formulas solve the loops of a scene, if perhaps not where it is.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    t, q
+        An admissible position.
+    """
+    if not can_be_solved(plan):
+        return False
+    choices = _choices(plan, t, q)
+    return any(choices.form(plan.assembly, one) is not None for one in choices.every)
 
 
 def solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
@@ -235,8 +266,7 @@ _SOLVED: Key[_Found] = Key("solved loops")
 
 
 def _solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
-    assembly = plan.assembly
-    choices = assembly.shared.get(_CHOICES, lambda: _Choices(plan, t, q), plan.finding.rank)
+    assembly, choices = plan.assembly, _choices(plan, t, q)
     best: Solved | None = None
     for independent in choices.every:
         check_time()
@@ -268,6 +298,8 @@ def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArr
     y = solved.reduced(np.concatenate([q, u]))
     try:
         margin = min(_margins(solved, t, y), default=1.0)
+        if not margin > CLEAR:
+            return None
         made = solved.state(t, y)
     except KernelEvaluationError:
         return None

@@ -44,6 +44,10 @@ VERY_ACCURATE = 1e-10
 """From this relative tolerance on Taylor series, whose order follows it, cost least, and err a hundredth as much."""
 
 
+_SAID = 4
+"""So many changes of the solver are told one by one."""
+
+
 @dataclass(frozen=True)
 class Choice:
     """What solves a scene from a time on, and why.
@@ -56,11 +60,14 @@ class Choice:
         A key of `SOLVERS`.
     reason
         Why, in words.
+    goes_back
+        Whether formulas solve the loops of the scene elsewhere, and are to go on from there.
     """
 
     time: float
     solver: str
     reason: str
+    goes_back: bool = False
 
     @property
     def name(self) -> str:
@@ -138,11 +145,12 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
 
 def _choose_for_loops(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
     """Return what solves a mechanism with closed loops: an explicit method where formulas solve these."""
-    from atwood.simulation.problem.closed_loops import solve_at
+    from atwood.simulation.problem.closed_loops import have_formulas, solve_at
 
     solved = solve_at(plan, t, q, u)
     if solved is None:
-        return Choice(t, implicit_solver(), "closed loops leave constraints among the coordinates")
+        reason = "closed loops leave constraints among the coordinates"
+        return Choice(t, implicit_solver(), reason, have_formulas(plan, t, q))
     found = stiffness_of(plan, options, t, q, u)
     if found is not None and found.is_stiff:
         return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
@@ -156,11 +164,12 @@ def _choose_for_loops(plan: Plan, options: RunOptions, t: float, q: FloatArray, 
 
 
 def _has_closed_series(plan: Plan, options: RunOptions, solved: Solved) -> bool:
-    """Return whether accelerations with solved loops have Taylor series that no event keeps short."""
+    """Return whether accelerations with solved loops have Taylor series that pay: no event keeps them short."""
     from atwood.simulation.events.modes import find_event_functions
     from atwood.simulation.problem.taylor_scene import recurrences_of
 
-    if not solved.is_clear or solved.form.loops.counted or options.conditions or find_event_functions(plan.assembly):
+    watches = solved.form.loops.counted or options.conditions or find_event_functions(plan.assembly)
+    if options.relative_tolerance > VERY_ACCURATE and (watches or not solved.is_clear):
         return False
     try:
         recurrences_of(plan.assembly, solved.form.accelerations)
@@ -171,7 +180,7 @@ def _has_closed_series(plan: Plan, options: RunOptions, solved: Solved) -> bool:
 
 def dead_centre(t: float) -> Choice:
     """Return the choice of the numeric loop in the middle of a run, where formulas for it have no value near by."""
-    return Choice(t, implicit_solver(), "a dead centre of every choice of independent coordinates is near")
+    return Choice(t, implicit_solver(), "a dead centre of every choice of independent coordinates is near", True)
 
 
 _HAS_SERIES: Key[bool] = Key("whether accelerations have Taylor series")
@@ -241,5 +250,7 @@ def describe_choices(choices: Sequence[Choice]) -> str:
         One after the other.
     """
     said = [f"{choices[0].name}: {choices[0].reason}"]
-    said += [f"from t = {one.time:.6g} s {one.name}: {one.reason}" for one in choices[1:]]
+    said += [f"from t = {one.time:.6g} s {one.name}: {one.reason}" for one in choices[1:_SAID]]
+    if len(choices) > _SAID:
+        said.append(f"and so on, {len(choices) - 1} times in all until t = {choices[-1].time:.6g} s")
     return "; ".join(said)

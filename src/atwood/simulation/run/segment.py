@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from atwood.clock import TimeIsUp, check_time, more_time, time_left
+from atwood.clock import TimeIsUp, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.integrators.explicit_session import SamplingSession
 from atwood.integrators.protocol import Budget, FloatArray, ReadingSession, Session, Statistics, Status, StepResult
@@ -24,12 +24,14 @@ from atwood.simulation.events.modes import EventRecord
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import dead_centre, stiffness_of, turned_stiff
+from atwood.simulation.run.nothing_free import follow
 from atwood.simulation.run.outcome import Outcome, Segment
 from atwood.simulation.run.record import Recorder
 from atwood.simulation.run.session import SolverRequest, open_explicit_session, open_implicit_session
 from atwood.simulation.run.tolerances import too_tight
 
 if TYPE_CHECKING:
+    from atwood.simulation.run.way_back import WayBack
     from atwood.simulation.singular.crossing import SingularCrossing
     from atwood.simulation.singular.monitor import SingularityMonitor
 
@@ -60,7 +62,7 @@ def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u
     if already is not None:
         return Outcome(t, "event", "", Statistics(), (segment.choice,), already)
     if n == 0:
-        return _follow(segment, recorder, t)
+        return follow(segment, recorder, t)
     return _Runner(segment, recorder).run(t, y, yp)
 
 
@@ -73,35 +75,6 @@ def _first_state(segment: Segment, t: float, q: FloatArray, u: FloatArray) -> tu
     return np.concatenate([q, u]), np.zeros(0)
 
 
-def _follow(segment: Segment, recorder: Recorder, t: float) -> Outcome:
-    """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen."""
-    nothing, last, options = np.zeros(0), t, segment.options
-    noted: list[EventRecord] = []
-
-    def ended(t: float, status: str, message: str = "", event: EventRecord | None = None) -> Outcome:
-        return Outcome(t, status, message, Statistics(), (segment.choice,), event, noted=tuple(noted))
-
-    try:
-        for moment, show in zip(segment.samples.times, segment.samples.shown, strict=True):
-            check_time()
-            event = segment.probe.between(last, float(moment))
-            while event is not None and not event.target:
-                noted.append(event)
-                recorder.take(event.time, nothing, True)
-                event = segment.probe.between(event.time, float(moment))
-            if event is not None:
-                recorder.take(event.time, nothing, True)
-                return ended(event.time, "event", event=event)
-            last = float(moment)
-            recorder.take(last, nothing, bool(show))
-            if options.progress is not None:
-                options.progress(last)
-    except TimeIsUp:
-        last = recorder.close()
-        return ended(last, "time_limit", options.out_of_time(last))
-    return ended(last, "finished")
-
-
 class _Runner:
     """The way through one stretch, with whatever solves it."""
 
@@ -111,6 +84,7 @@ class _Runner:
         self.before = Statistics(error_test_failures=0, convergence_failures=0)
         self.session: Session | None = None
         self.monitor: SingularityMonitor | None = None
+        self.way_back: WayBack | None = None
         self.request: SolverRequest | None = None
         self.noted: list[EventRecord] = []
 
@@ -237,6 +211,7 @@ class _Runner:
 
     def _open(self, t: float, y: FloatArray, yp: FloatArray) -> Session:
         segment, choice = self.segment, self.choices[-1]
+        self.way_back = None
         options, spent = segment.options, segment.spent + self.before
         request = SolverRequest(
             segment.plan,
@@ -257,6 +232,10 @@ class _Runner:
             self.request = request
             self.monitor = singularity_monitor_of(segment.plan, options.relative_tolerance, segment.end, here)
             self.session = open_implicit_session(request, choice.solver, t, y, yp, self.monitor)
+            if choice.goes_back:
+                from atwood.simulation.run.way_back import WayBack
+
+                self.way_back = WayBack(segment.plan, options, segment.end, here)
         else:
             leave = self._is_stiff if options.solver == "auto" else None
             try:
@@ -315,17 +294,19 @@ class _Runner:
         plan, told = segment.plan, -np.inf
         reads, repairs = hasattr(type(session), "read_on"), self._repairs  # protocols are slow to ask
         while done < len(times):
-            moment, monitor = times[done], self.monitor
-            between = monitor is not None and monitor.next < moment
-            target = monitor.next if monitor is not None and between else moment
+            moment, monitor, way = times[done], self.monitor, self.way_back
+            look, ask = np.inf if monitor is None else monitor.next, np.inf if way is None else way.next
+            target = min(moment, look, ask)
             step_result = session.advance(target)
             if step_result.status is Status.FAILED and self._repartitioned(session, step_result):
                 step_result = session.advance(target)
             noticed = step_result.status is Status.NOTICED
-            between = between or noticed
-            turned = self._turned(step_result) if between or monitor is None else None
-            at_end = (moment >= segment.end and not noticed) or turned is not None
-            crossing = None if monitor is None else monitor.look(step_result, between, at_end)
+            between = target < moment or noticed
+            looks = noticed or look == target < moment
+            back = way.ask(step_result) if way is not None and step_result.t >= ask else None
+            turned = self._turned(step_result) if back is None and (looks or monitor is None) else None
+            at_end = (moment >= segment.end and not noticed and moment <= ask) or turned is not None or back is not None
+            crossing = None if monitor is None else monitor.look(step_result, looks, at_end)
             if crossing is not None:
                 done, stopped = self._pass_over(session, crossing)
                 if stopped is not None:
@@ -339,6 +320,10 @@ class _Runner:
                 monitor.agreed.clear()
             if step_result.status not in (Status.REACHED, Status.NOTICED):
                 return done, step_result
+            if back is not None:
+                choice, y = back
+                self.choices.append(choice)
+                return done, replace(step_result, y=y, status=Status.STIFF)
             if turned is not None:
                 session = self._keep(turned, step_result)
             if between:
@@ -365,7 +350,7 @@ class _Runner:
         """Return whether nothing is looked at, or put right, from one output to the next within a step."""
         plan, monitor = self.segment.plan, self.monitor
         looks = plan.finding.redundant if monitor is None else monitor.next < np.inf
-        return not (looks or plan.reviews_outputs or self._repairs)
+        return not (looks or self.way_back is not None or plan.reviews_outputs or self._repairs)
 
     @property
     def _repairs(self) -> bool:
@@ -393,7 +378,10 @@ class _Runner:
             y, yp = pack_state(plan, path.end, q, u)
             session.reinitialize(path.end, y, yp)
             assert self.monitor is not None
-            self.monitor.restart(StepResult(path.end, y, yp, Status.REACHED), is_behind=True)
+            behind = StepResult(path.end, y, yp, Status.REACHED)
+            self.monitor.restart(behind, is_behind=True)
+            if self.way_back is not None:
+                self.way_back.begin_again(behind)
         return done, None
 
     def _repartitioned(self, session: Session, step_result: StepResult) -> bool:
