@@ -7,14 +7,10 @@ both points with these slopes (Hermite), and both parts are judged in the same w
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import sqrt
 
-import numpy as np
-
-from atwood.arrays import BoolArray
 from atwood.codegen.tangents import FULL, STEEP
-from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 
 __all__ = ["Point", "find_dip", "may_dip"]
@@ -32,11 +28,11 @@ class Point:
     """Event functions and their rates of change along the solution at a time."""
 
     time: float
-    values: FloatArray
-    slopes: FloatArray
+    values: Sequence[float]
+    slopes: Sequence[float]
 
 
-def may_dip(first: Point, last: Point, signs: FloatArray, share: float = FULL) -> BoolArray:
+def may_dip(first: Point, last: Point, signs: Sequence[float], share: float = FULL) -> list[bool]:
     """Return which functions may lose the sign between two points at both of which they have it.
 
     Parameters
@@ -49,16 +45,19 @@ def may_dip(first: Point, last: Point, signs: FloatArray, share: float = FULL) -
         Up to which share of the distance the tangents must keep the sign.
     """
     width = last.time - first.time
-    with np.errstate(all="ignore"):
-        a, b = signs * first.values, signs * last.values
-        down, up = signs * first.slopes * width, signs * last.slopes * width
-        falls = (a + share * down <= 0.0) | (b - share * up <= 0.0)
-        steep = np.maximum(abs(down), abs(up)) > STEEP * np.maximum(a, b)
-    found: BoolArray = (a > 0.0) & (b > 0.0) & (falls | steep)
-    return found
+    return [
+        sign != 0.0 and _may(sign * a, sign * b, sign * down * width, sign * up * width, share)
+        for a, b, down, up, sign in zip(first.values, last.values, first.slopes, last.slopes, signs, strict=True)
+    ]
 
 
-def find_dip(first: Point, last: Point, signs: FloatArray, read: Callable[[float, float], Point]) -> float | None:
+def _may(a: float, b: float, down: float, up: float, share: float) -> bool:
+    if not (a > 0.0 and b > 0.0):
+        return False
+    return a + share * down <= 0.0 or b - share * up <= 0.0 or max(abs(down), abs(up)) > STEEP * max(a, b)
+
+
+def find_dip(first: Point, last: Point, signs: Sequence[float], read: Callable[[float, float], Point]) -> float | None:
     """Return a time at which one of the functions has lost its sign between two points; None if none does.
 
     Parameters
@@ -75,12 +74,12 @@ def find_dip(first: Point, last: Point, signs: FloatArray, read: Callable[[float
     while parts and count < _MOST:
         a, b = parts.pop()
         width = b.time - a.time
-        suspects = np.flatnonzero(may_dip(a, b, signs, share))
-        if not len(suspects) or width <= shortest:
+        suspects = [i for i, may in enumerate(may_dip(a, b, signs, share)) if may]
+        if not suspects or width <= shortest:
             continue
-        lowest = min(_lowest(a, b, int(i), float(signs[i])) for i in suspects)
+        lowest = min(_lowest(a, b, i, signs[i]) for i in suspects)
         point = read(a.time + lowest * width, width)
-        if np.any((signs != 0.0) & (signs * point.values <= 0.0)):
+        if any(sign and sign * value <= 0.0 for sign, value in zip(signs, point.values, strict=True)):
             return point.time
         parts += [(point, b), (a, point)]
         count, share = count + 1, _HALF

@@ -16,15 +16,15 @@ The rules, which decide the cases on the edge:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from math import inf, isnan
 
 import numpy as np
 
-from atwood.arrays import BoolArray
 from atwood.codegen.tangents import SECANT
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.dips import Point, find_dip, may_dip
-from atwood.integrators.protocol import FloatArray, ImplicitProblem, IndexArray
+from atwood.integrators.protocol import FloatArray, ImplicitProblem, Values
 from atwood.late import dataclass
 
 __all__ = ["EventLocator", "Root", "State"]
@@ -48,6 +48,9 @@ class Root:
 class EventLocator:
     """The signs of a problem's event functions along a solution.
 
+    Events are few, and are read at some tens of places one after the other: plain numbers, since arrays of so few take
+    ten times as long.
+
     Parameters
     ----------
     problem
@@ -59,14 +62,13 @@ class EventLocator:
     def __init__(self, problem: ImplicitProblem, horizon: float) -> None:
         assert problem.events is not None
         self._function = problem.events
-        self._directions = np.array(problem.event_directions or (0,) * problem.event_count, dtype=np.intp)
-        self._rough = np.zeros(problem.event_count, dtype=bool)
-        self._rough[list(problem.event_rough)] = True
+        self._directions = problem.event_directions or (0,) * problem.event_count
+        self._rough = [i in problem.event_rough for i in range(problem.event_count)]
         self._moment = 100 * ROUNDING * horizon
-        self._set_signs(np.zeros(problem.event_count, dtype=np.intp))
-        self._fired = np.zeros(problem.event_count, dtype=bool)
-        self._fired_at = -np.inf
-        self._start = -np.inf
+        self._signs = [0] * problem.event_count
+        self._fired = [False] * problem.event_count
+        self._fired_at = -inf
+        self._start = -inf
         self._settling = True
         self._last: Point | None = None
         self.evaluations = 0
@@ -74,7 +76,7 @@ class EventLocator:
     @property
     def signs(self) -> FloatArray:
         """The sign that each event last had for certain; zero where it is not known."""
-        return np.array(self._sign_list)
+        return np.array(self._signs, dtype=np.float64)
 
     @property
     def is_settling(self) -> bool:
@@ -84,10 +86,10 @@ class EventLocator:
     def restart(self, state: State) -> None:
         """Take the signs from a new start of the solution."""
         t = state[0]
-        signs = np.sign(self._values(state)).astype(np.intp)
+        signs = [_sign(value) for value in self._values(state)]
         if t == self._fired_at:
-            signs[self._fired] = 0
-        self._set_signs(signs)
+            signs = [0 if fired else sign for sign, fired in zip(signs, self._fired, strict=True)]
+        self._signs = signs
         self._start = t
         self._settling = True
         self._last = None
@@ -105,20 +107,16 @@ class EventLocator:
             begin, self._settling = settled, False
         return self._first_root(begin, end, at)
 
-    def _values(self, state: State) -> FloatArray:
+    def _values(self, state: State) -> list[float]:
         self.evaluations += 1
         try:
-            values = np.asarray(self._function(*state), dtype=np.float64)
+            values = _listed(self._function(*state))
         except ArithmeticError as error:
             raise KernelEvaluationError(f"the event functions have no value at t = {state[0]:.9g}: {error}") from error
-        missing = np.isnan(values)
-        if missing.any():
-            raise KernelEvaluationError(f"event function {int(missing.argmax())} has no value at t = {state[0]:.9g}")
+        for i, value in enumerate(values):
+            if isnan(value):
+                raise KernelEvaluationError(f"event function {i} has no value at t = {state[0]:.9g}")
         return values
-
-    def _set_signs(self, signs: IndexArray) -> None:
-        self._signs = signs
-        self._sign_list = [float(sign) for sign in signs]
 
     def _nothing_changed(self, state: State) -> bool:
         """Tell quickly, for the many steps without events, that all signs are still the same."""
@@ -128,14 +126,22 @@ class EventLocator:
         except ArithmeticError:
             return False
         # A product is positive only for two signs that are equal and known.
-        return all(value * sign > 0.0 for value, sign in zip(values, self._sign_list, strict=True))
+        return all(value * sign > 0.0 for value, sign in zip(values, self._signs, strict=True))
 
-    def _crossings(self, values: FloatArray) -> tuple[IndexArray, BoolArray]:
-        """Return the signs of values, and which of them have passed zero in a direction that counts."""
-        signs = np.sign(values).astype(np.intp)
-        changed = (self._signs != 0) & (signs != self._signs)
-        allowed = (self._directions == 0) | (self._directions == -self._signs)
-        return signs, changed & allowed
+    def _crossings(self, values: Sequence[float]) -> list[bool]:
+        """Return which values have passed zero in a direction that counts."""
+        return [
+            known != 0 and _sign(value) != known and direction in (0, -known)
+            for value, known, direction in zip(values, self._signs, self._directions, strict=True)
+        ]
+
+    def _learn(self, values: Sequence[float], which: Sequence[bool] | None = None) -> None:
+        """Take the signs of values; of all that are not zero, or of those that are named."""
+        pairs = enumerate(zip(values, self._signs, strict=True))
+        if which is None:
+            self._signs = [_sign(value) or known for _, (value, known) in pairs]
+        else:
+            self._signs = [_sign(value) if which[i] else known for i, (value, known) in pairs]
 
     def _first_root(self, begin: float, end: float, at: Interpolant) -> Root | None:
         dip = self._dip(begin, end, at)
@@ -147,41 +153,41 @@ class EventLocator:
         moment = max(self._moment, 25 * tolerance)
         while True:
             values = self._values(at(end))
-            signs, crossed = self._crossings(values)
-            if not crossed.any():
+            crossed = self._crossings(values)
+            if not any(crossed):
                 # A zero that is not an event keeps the sign it came with.
-                self._set_signs(np.where(signs != 0, signs, self._signs))
+                self._learn(values)
                 return None
-            if not np.any(crossed & ~self._rough):
-                self._set_signs(np.where(signs != 0, signs, self._signs))
-                return Root(at(end), tuple(int(sign) for sign in np.where(crossed, signs, 0)))
+            if all(rough for one, rough in zip(crossed, self._rough, strict=True) if one):
+                self._learn(values)
+                return Root(at(end), tuple(_sign(v) if one else 0 for v, one in zip(values, crossed, strict=True)))
             before, time = self._narrow(begin, end, values, at, tolerance)
             dip = self._dip(begin, before, at)
             if dip is not None:
                 return self._first_root(begin, dip, at) or self._first_root(dip, end, at)
             # What follows within rounding belongs to the same moment.
             after = min(time + moment, end)
-            signs, together = self._crossings(self._values(at(after)))
-            state = at(time)
-            together |= self._crossings(self._values(state))[1]
-            events = np.where(together, -self._signs, 0)
-            self._set_signs(np.where(together, signs, self._signs))
+            later, state = self._values(at(after)), at(time)
+            here = self._crossings(self._values(state))
+            together = [one or other for one, other in zip(self._crossings(later), here, strict=True)]
+            events = tuple(-sign if one else 0 for one, sign in zip(together, self._signs, strict=True))
+            self._learn(later, together)
             if time - self._start > moment:
                 self._fired, self._fired_at = together, time
-                return Root(state, tuple(int(event) for event in events))
+                return Root(state, events)
             if after >= end:
                 return None
             begin = after
 
     def _dip(self, begin: float, end: float, at: Interpolant) -> float | None:
         """Return a time between two others at which an event has the other sign, where both have the known one."""
-        signs = np.where(self._rough, 0.0, self._signs)
-        if not (signs.any() and begin < end):
+        signs = [0 if rough else sign for rough, sign in zip(self._rough, self._signs, strict=True)]
+        if not (any(signs) and begin < end):
             return None
         last = self._last
         first = last if last is not None and last.time == begin else self._point(at(begin), end - begin)
         self._last = last = self._point(at(end), begin - end)
-        if not may_dip(first, last, signs).any():
+        if not any(may_dip(first, last, signs)):
             return None
         return find_dip(first, last, signs, lambda t, width: self._point(at(t), -width))
 
@@ -191,21 +197,20 @@ class EventLocator:
         values, past = self._values(state), SECANT * width
         self.evaluations += 1
         try:
-            others = np.asarray(self._function(t + past, y + past * yp, yp), dtype=np.float64)
+            others = _listed(self._function(t + past, y + past * yp, yp))
         except ArithmeticError:
             others = values
-        with np.errstate(invalid="ignore"):
-            return Point(t, values, np.nan_to_num((others - values) / past, nan=0.0))
+        return Point(t, values, [_slope(b - a, past) for a, b in zip(values, others, strict=True)])
 
     def _narrow(
-        self, begin: float, end: float, end_values: FloatArray, at: Interpolant, tolerance: float
+        self, begin: float, end: float, end_values: Sequence[float], at: Interpolant, tolerance: float
     ) -> tuple[float, float]:
         """Return the last time before some event has passed zero and the first after it, within the tolerance.
 
         Regula falsi on the event functions that have passed zero at the end, with a bisection whenever two
         guesses together did not halve the interval.
         """
-        values = self._values(at(begin))
+        values: Sequence[float] = self._values(at(begin))
         width, guesses = end - begin, 0
         while end - begin > tolerance:
             if guesses == 2:
@@ -220,17 +225,34 @@ class EventLocator:
                 break
             guesses += 1
             middle_values = self._values(at(middle))
-            if self._crossings(middle_values)[1].any():
+            if any(self._crossings(middle_values)):
                 end, end_values = middle, middle_values
             else:
                 begin, values = middle, middle_values
         return begin, end
 
-    def _guess(self, begin: float, end: float, values: FloatArray, end_values: FloatArray) -> float:
+    def _guess(self, begin: float, end: float, values: Sequence[float], end_values: Sequence[float]) -> float:
         """Return the earliest zero of the chords of the event functions that have passed zero at the end."""
-        chosen = self._crossings(end_values)[1]
-        first, last = values[chosen], end_values[chosen]
-        slope = first - last
-        share = np.divide(first, slope, out=np.full_like(first, 0.5), where=slope != 0.0)
-        share = np.clip(np.nan_to_num(share, nan=0.5), 0.0, 1.0)
-        return begin + float(share.min()) * (end - begin)
+        least = 1.0
+        for first, last, chosen in zip(values, end_values, self._crossings(end_values), strict=True):
+            if chosen:
+                share = first / (first - last) if first != last else 0.5
+                least = min(least, 0.5 if isnan(share) else max(share, 0.0))
+        return begin + least * (end - begin)
+
+
+def _sign(value: float) -> int:
+    return (value > 0.0) - (value < 0.0)
+
+
+def _listed(values: Values) -> list[float]:
+    return values.tolist() if isinstance(values, np.ndarray) else [float(value) for value in values]
+
+
+_LARGEST = float(np.finfo(np.float64).max)
+
+
+def _slope(change: float, width: float) -> float:
+    """Return a rate of change, zero where there is none."""
+    slope = change / width
+    return 0.0 if isnan(slope) else min(max(slope, -_LARGEST), _LARGEST)

@@ -208,8 +208,8 @@ class LimitedStepper(Protocol):
 class RenewedStepper(Protocol):
     """What a stepper has in addition if it can make one run after another."""
 
-    def renew(self, horizon: float) -> None:
-        """Count from zero again, for a run of another typical length, s."""
+    def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
+        """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
         ...
 
 

@@ -134,9 +134,8 @@ class ExplicitSession:
     ) -> None:
         self._size = problem.size
         self._stepper = stepper
-        # The watch reads nothing of a problem but its events.
-        watched = cast("ImplicitProblem", problem)
-        self._locator = EventLocator(watched, options.horizon) if problem.events is not None else None
+        self._problem = problem
+        self._watch(options.horizon)
         self._notices = self._event_stepper(problem, stepper)
         if leave is not None and _has(type(stepper), HeedingStepper):
             cast("HeedingStepper", stepper).heed_stiffness()
@@ -154,13 +153,26 @@ class ExplicitSession:
         self._seconds = 0.0
         self.reinitialize(t, y)
 
+    def _watch(self, horizon: float) -> None:
+        """Look for events, if there are any, with signs that are not known yet."""
+        # The watch reads nothing of a problem but its events.
+        watched = cast("ImplicitProblem", self._problem)
+        self._locator = EventLocator(watched, horizon) if watched.events is not None else None
+
     def begin_again(
-        self, t: float, y: FloatArray, horizon: float, budget: Budget | None, leave: Leave | None, end: float
+        self,
+        t: float,
+        y: FloatArray,
+        horizon: float,
+        budget: Budget | None,
+        leave: Leave | None,
+        end: float,
+        absolute: FloatArray | None = None,
     ) -> None:
         """Make another run, with the same method: all is as in a new session, and is counted from zero.
 
-        What the rates depend on besides time and values may have changed before. For compiled steps without events,
-        and for sessions that were opened to leave stiff problems to others or not, as this run does.
+        What the rates and events depend on besides time and values may have changed before. For compiled steps, and for
+        sessions that were opened to leave stiff problems to others or not, as this run does.
 
         Parameters
         ----------
@@ -168,10 +180,13 @@ class ExplicitSession:
             As in `open_explicit`.
         horizon
             A typical length of the run, s.
+        absolute
+            Absolute tolerances; as before if not given.
         """
-        if not _has(type(self._stepper), RenewedStepper) or self._locator is not None:
-            raise UsageError("only compiled steps without events can be begun again")
-        cast("RenewedStepper", self._stepper).renew(horizon)
+        if not _has(type(self._stepper), RenewedStepper):
+            raise UsageError("only compiled steps can be begun again")
+        cast("RenewedStepper", self._stepper).renew(horizon, absolute)
+        self._watch(horizon)
         self._begin(t, y, budget, leave, end)
 
     @staticmethod

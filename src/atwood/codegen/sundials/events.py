@@ -73,6 +73,8 @@ class EventData:
         Number of events.
     memory
         What the functions remember from step to step.
+    arrays
+        What depends on parameters alone, room for the code, and what is added to each value.
     keep
         Whatever must live as long as the addresses are used.
     """
@@ -83,6 +85,7 @@ class EventData:
     address: int
     count: int
     memory: NDArray[np.float64]
+    arrays: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
     keep: object
 
     def restart(self, t: float) -> None:
@@ -156,18 +159,25 @@ class EventCode:
         shifts
             What is added to each value.
         """
-        values = np.array(parameter_values, dtype=np.float64)
-        if values.shape != (len(self.program.parameters),):
-            raise UsageError(f"needs {len(self.program.parameters)} parameter values, got an array of {values.shape}")
         derived, scratch = np.empty(len(self.program.prologue)), np.empty(self._built.scratch)
         shift = np.array(shifts, dtype=np.float64)
-        self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
         memory = np.zeros(3 + 3 * len(shift))
         arrays: tuple[NDArray[np.float64], ...] = (derived, scratch, shift, memory)
         data = (c_void_p * 4)(*(array.ctypes.data for array in arrays))
-        keep = (self._built, arrays, data)
         functions = self._plain, self._explicit, self._ida
-        return EventData(*functions, ctypes.addressof(data), len(shift), memory, keep)
+        place, own = ctypes.addressof(data), (derived, scratch, shift)
+        made = EventData(*functions, place, len(shift), memory, own, (self._built, data))
+        self.fill(made, parameter_values, shifts)
+        return made
+
+    def fill(self, data: EventData, parameter_values: ArrayLike, shifts: ArrayLike) -> None:
+        """Give the functions of a session other parameters and shifts; arguments as of `bind`."""
+        values = np.array(parameter_values, dtype=np.float64)
+        if values.shape != (len(self.program.parameters),):
+            raise UsageError(f"needs {len(self.program.parameters)} parameter values, got an array of {values.shape}")
+        derived, scratch, shift = data.arrays
+        shift[:] = shifts
+        self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
 
 
 def compile_events(program: Program, for_ida: bool) -> EventCode:

@@ -203,8 +203,10 @@ class CompiledStepper:
         """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
         self._counts[_HEEDS] = 1
 
-    def renew(self, horizon: float) -> None:
-        """Count from zero again, for a run of another typical length, s."""
+    def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
+        """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
+        if absolute is not None:
+            self._arrays[ROWS["absolute"], : self._size] = np.maximum(absolute, np.finfo(float).tiny)
         self._counts[_STEPS : _STEPS + _COUNTED] = 0
         self._numbers[_HORIZON] = horizon
         self._numbers[_LONGEST] = self._options.max_step or inf

@@ -22,6 +22,7 @@ __all__ = [
     "multiplier_sizes",
     "scene_length",
     "total_mass",
+    "total_masses",
 ]
 
 
@@ -129,7 +130,27 @@ _MASSES: Key[Program] = Key("masses")
 
 def total_mass(assembly: Assembly) -> float:
     """Return the mass of all that moves, at the start, kg."""
+    return float(sum(assembly.kernel(_masses(assembly))([assembly.flat.t_start])[0]))
 
+
+def total_masses(assembly: Assembly, rows: FloatArray | None) -> FloatArray | float:
+    """Return the same for runs with parameters of their own; 1 kg where nothing that moves has a mass.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    rows
+        Parameters of each run, shape (runs, number); None where all have the same.
+    """
+    if rows is None:
+        return total_mass(assembly) or 1.0
+    kernel = assembly.compiled(_masses(assembly), vectorized=True).bind(rows.T)
+    found = np.sum(kernel(np.full((1, len(rows)), assembly.flat.t_start))[0], axis=0)
+    return np.where(found > 0.0, found, 1.0)
+
+
+def _masses(assembly: Assembly) -> Program:
     def make() -> Program:
         masses, graph = assembly.own_equations.masses, assembly.mechanism.table.graph
         found = [graph.convert(one.mass) for one in masses.bodies.values()]
@@ -138,4 +159,4 @@ def total_mass(assembly: Assembly) -> float:
         time = InputGroup("t", (assembly.mechanism.time,))
         return Program("masses", (time,), assembly.parameters, (OutputGroup("masses", tuple(found)),))
 
-    return float(sum(assembly.kernel(assembly.shared.get(_MASSES, make))([assembly.flat.t_start])[0]))
+    return assembly.shared.get(_MASSES, make)

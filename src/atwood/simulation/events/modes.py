@@ -180,6 +180,11 @@ class EventProbe:
         for_ida
             Whether SUNDIALS is to call it.
         """
+        code = self.code(for_ida)
+        return None if code is None else code.bind(self.assembly.parameter_values, self.shift)
+
+    def code(self, for_ida: bool) -> EventCode | None:
+        """Return the machine code of the same, for any parameter values and shifts; see `compiled`."""
         if not self.event_functions or not len(self.assembly.own_equations.coordinates):
             return None
 
@@ -193,8 +198,7 @@ class EventProbe:
                 return None
             return compile_events(program, for_ida)
 
-        code = self.assembly.shared.get(_EVENT_CODE, make, for_ida, *self.key)
-        return None if code is None else code.bind(self.assembly.parameter_values, self.shift)
+        return self.assembly.shared.get(_EVENT_CODE, make, for_ida, *self.key)
 
     @property
     def key(self) -> tuple[Any, ...]:

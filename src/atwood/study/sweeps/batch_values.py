@@ -27,7 +27,7 @@ from atwood.simulation.initialization.targets import Level, sort_targets
 from atwood.study.sweeps.cases import Axis
 from atwood.study.sweeps.runs import SweepRequest
 
-__all__ = ["ParameterRows", "StartRows"]
+__all__ = ["ParameterRows", "StartRows", "read_starts"]
 
 
 class ParameterRows:
@@ -279,14 +279,14 @@ class StartRows:
         found = np.ones(len(runs), dtype=bool)
         for place, run in enumerate(runs.tolist()):
             try:
-                start = find_start(self._assembly(run))
+                start = find_start(self.assembly(run))
             except AtwoodError:
                 found[place] = False
                 continue
             q[place], u[place], lengths[place] = start.coordinates, start.speeds, start.length
         return q, u, lengths, found
 
-    def _assembly(self, run: int) -> Assembly:
+    def assembly(self, run: int) -> Assembly:
         """Return the assembly of a run."""
         request, assembly = self._request, self._request.assembly
         if assembly.mechanism.constants or any(not axis.is_start for axis in request.cases.axes):
@@ -303,6 +303,25 @@ class StartRows:
         for given in self._lengths:
             lengths = np.maximum(lengths, np.abs(_of(given, runs)))
         return np.where(lengths > 0.0, lengths, 1.0)
+
+
+def read_starts(
+    starts: StartRows, rows: ParameterRows, runs: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], tuple[FloatArray, FloatArray], FloatArray, FloatArray | None]:
+    """Return the runs whose structure and start could be found, and of these states, extents and parameters.
+
+    Parameters
+    ----------
+    starts, rows
+        What gives starts and parameters.
+    runs
+        Numbers of the runs.
+    """
+    parameters, usable = rows.read(runs)
+    q, u, lengths, found = starts.read(runs, parameters)
+    usable &= found & np.all(np.isfinite(q), axis=1) & np.all(np.isfinite(u), axis=1)
+    kept = None if parameters is None else parameters[usable]
+    return runs[usable], (q[usable], u[usable]), lengths[usable], kept
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,253 @@
+"""One mode of a scene with events, as the runs of a sweep meet it: its rates, its events and a session."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.codegen.sundials.events import EventCode, EventData
+from atwood.errors import AtwoodError
+from atwood.expr import Program
+from atwood.forms.assembly import Assembly
+from atwood.forms.shared import decisions_of
+from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
+from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents
+from atwood.integrators.explicit_session import ExplicitSession, open_explicit
+from atwood.integrators.protocol import Budget, SolverOptions, Statistics, StepResult
+from atwood.late import dataclass, replace
+from atwood.mechanics.outputs.event_functions import EventFunction
+from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
+from atwood.simulation.dynamics.scales import total_masses
+from atwood.simulation.events.modes import EventProbe, EventRecord
+from atwood.simulation.problem.explicit_scene import explicit_problem_of, own_rates
+from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.run.choice import choose
+from atwood.simulation.run.stiffness import can_be_stiff
+from atwood.study.sweeps.motions import OpenTree
+from atwood.study.sweeps.runs import SweepRequest
+
+__all__ = ["SweepMode", "find_mode"]
+
+
+@dataclass(frozen=True, eq=False)
+class SweepMode:
+    """A mode with a session of its own, for one thread.
+
+    Attributes
+    ----------
+    motion
+        The scene in this mode, with the values of the first run.
+    functions
+        What is watched.
+    session
+        Takes the steps of one run after another.
+    rates, own_rates
+        The compiled rates, and their place for parameters.
+    events, event_data, program
+        The compiled events with theirs, and their program of (t, q, u, shift); None where nothing is watched.
+    columns
+        Where the parameters of this mode stand among those of the sweep.
+    """
+
+    motion: OpenTree
+    functions: tuple[EventFunction, ...]
+    session: ExplicitSession
+    rates: CompiledAccelerations
+    own_rates: OwnRates
+    events: EventCode | None
+    event_data: EventData | None
+    program: Program | None
+    columns: NDArray[np.intp]
+
+    @property
+    def assembly(self) -> Assembly:
+        """The scene in this mode."""
+        return self.motion.assembly
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates there are."""
+        return len(self.assembly.reduced.coordinates)
+
+    def arranged(self, rows: FloatArray) -> FloatArray:
+        """Return parameters of runs, one row each, in the order of this mode."""
+        return rows[:, self.columns]
+
+    def keeps_state(self, modes: tuple[tuple[str, str], ...]) -> bool:
+        """Return whether other modes have the same coordinates and speeds, none of them held by a constraint."""
+        other, own = self.assembly.other_mode(dict(modes), {}).reduced, self.assembly.reduced
+        alike = [one.name for one in other.names] == [one.name for one in own.names]
+        return (
+            alike
+            and [one.name for one in other.speed_names] == [one.name for one in own.speed_names]
+            and not (other.constraints or own.constraints or own.orientation_coordinates)
+        )
+
+    def shifts(
+        self,
+        t: FloatArray,
+        q: FloatArray,
+        u: FloatArray,
+        values: FloatArray | None,
+        lengths: FloatArray,
+        time: FloatArray,
+        tolerance: float,
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Return what is added to events that start at zero, one row each, and which runs can go on from there.
+
+        The rule is that of `atwood.simulation.events.modes.EventProbe`; a run in which a one-sided bound does not hold
+        at once is made by itself.
+
+        Parameters
+        ----------
+        t, q, u
+            States, of shape (runs,) and (runs, number).
+        values
+            Parameters of each run in the order of this mode; None where all have the same.
+        lengths, time
+            Its sizes, m and s.
+        tolerance
+            The relative tolerance.
+        """
+        runs, count = len(t), len(self.functions)
+        if self.program is None:
+            return np.zeros((runs, 0)), np.ones(runs, dtype=bool)
+        bound = self.assembly.parameter_values if values is None else values.T
+        kernel = self.assembly.compiled(self.program, vectorized=True).bind(bound)
+        found = np.broadcast_to(kernel(t[None, :], q.T, u.T, np.zeros((count, runs)))[0], (count, runs)).T
+        small = np.full((runs, count), 10.0 * tolerance)
+        for k, one in enumerate(self.functions):
+            if one.unit == "m":
+                small[:, k] *= lengths
+            elif one.unit == "m/s":
+                small[:, k] *= lengths / time
+            elif one.unit == "N":
+                small[:, k] *= total_masses(self.assembly, values) * lengths / time**2
+        directions = np.array([one.direction for one in self.functions], dtype=float)
+        shifts = np.where(np.abs(found) <= small, -directions * small, 0.0)
+        holds = ~np.any(directions * found > small, axis=1)
+        known = np.all(np.isfinite(found), axis=1) & np.all(found + shifts != 0.0, axis=1)
+        return shifts, holds & known
+
+    def run(
+        self,
+        t: float,
+        y: FloatArray,
+        values: FloatArray | None,
+        shift: FloatArray,
+        absolute: FloatArray,
+        budget: Budget,
+        times: FloatArray,
+        end: float,
+    ) -> tuple[FloatArray, StepResult, Statistics]:
+        """Take a run from a state through output times, as far as no event stops it.
+
+        Parameters
+        ----------
+        t, y
+            The state.
+        values
+            Its parameters; None where all runs have the same.
+        shift
+            What is added to its events.
+        absolute
+            Absolute tolerances.
+        budget
+            Its limits.
+        times
+            Output times that are left, s.
+        end
+            The end of the run, s.
+        """
+        if values is not None:
+            self.rates.fill(self.own_rates, values)
+        if self.events is not None and self.event_data is not None:
+            given = self.assembly.parameter_values if values is None else values
+            self.events.fill(self.event_data, given, shift)
+        self.session.begin_again(t, y, end - t, budget, None, end, absolute)
+        found, _, result = self.session.sample(times)
+        return found, result, self.session.statistics
+
+    def event(self, result: StepResult) -> EventFunction | None:
+        """Return which event a run goes on from: the first that happened and leads somewhere."""
+        fired = (one for one, sign in zip(self.functions, result.events, strict=True) if sign and one.target)
+        return next(fired, None)
+
+    def record(self, event: EventFunction, t: float) -> EventRecord:
+        """Return an event of a run."""
+        return EventRecord(t, event.part, event.law, event.message, event.target, event.impact)
+
+
+def find_mode(
+    request: SweepRequest, modes: Mapping[str, str], at: tuple[float, FloatArray, FloatArray, float], varies: bool
+) -> tuple[SweepMode | None, str]:
+    """Return a mode of the first run, by what it is at a state; None, and why, where runs are made by themselves.
+
+    Parameters
+    ----------
+    request
+        The sweep.
+    modes
+        The mode of each part.
+    at
+        Time, coordinates and speeds, and the extent of the scene, m.
+    varies
+        Whether parameters change from run to run.
+    """
+    base, options = request.assembly, request.options
+    assembly = base.other_mode(dict(modes), {})
+    equations = assembly.reduced
+    if equations.constraints or not equations.coordinates:
+        return None, "events are watched where constraints are left among the coordinates"
+    if options.solver == "auto" and can_be_stiff(assembly):
+        return None, "whether it is stiff depends on each run (with solver='explicit' it is not asked)"
+    t, q, u, length = at
+    try:
+        plan = make_plan(assembly, t, q, u, length, options.t_end - base.flat.t_start)
+        chosen = choose(plan, options, t, q, u).solver
+        probe = EventProbe(plan, t, q, u, options.relative_tolerance)
+    except AtwoodError:
+        return None, "the first run cannot start"
+    functions = probe.event_functions
+    if chosen != "explicit":
+        return None, f"the solver is {chosen!r}, and events are watched"
+    if any(one.target == COORDINATE_SWITCH for one in functions):
+        return None, "its orientations change their coordinates on the way"
+    names = [one.name for one in base.parameters]
+    own = [one.name for one in assembly.parameters]
+    if varies and (decisions_of(assembly.mechanism, assembly.shared) or not set(own) <= set(names)):
+        return None, "what is varied may change how a mode is solved"
+    columns = np.array([names.index(one) if one in names else 0 for one in own], dtype=np.intp)
+    found, data = own_rates(assembly), probe.compiled(for_ida=False)
+    if found is None or (functions and data is None):
+        return None, "it calls functions in Python"
+    session = _opened(assembly, found[1], functions, data, request, (t, np.concatenate([q, u])))
+    code = None if data is None else probe.code(for_ida=False)
+    program = probe.program() if functions else None
+    return SweepMode(OpenTree(assembly), functions, session, *found, code, data, program, columns), ""
+
+
+def _opened(
+    assembly: Assembly,
+    rates: OwnRates,
+    functions: tuple[EventFunction, ...],
+    data: EventData | None,
+    request: SweepRequest,
+    start: tuple[float, FloatArray],
+) -> ExplicitSession:
+    """Return a session that looks for events by itself; each run begins it again."""
+    options = request.options
+    directions = tuple(one.direction for one in functions)
+    events = None if data is None else data.function()
+    program = OpenTree(assembly).program
+    problem = explicit_problem_of(assembly, program, assembly.parameter_values, events, directions)
+    problem = replace(problem, compiled=lambda: rates.rates)
+    if data is not None:
+        compiled = CompiledEvents(data.explicit, data.address, data.count, data.restart, data)
+        problem = replace(problem, compiled_events=lambda: compiled)
+    relative = min(options.relative_tolerance, LOOSEST)
+    settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=options.t_end - start[0])
+    return open_explicit(problem, settings, *start, end=options.t_end)

@@ -1,0 +1,90 @@
+"""Sizes of many runs at once: in what time something happens, tolerances, and whether all that moves has inertia."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.forms.assembly import Assembly
+from atwood.integrators.explicit_problem import LOOSEST
+from atwood.simulation.initialization.many import size_rows
+from atwood.study.sweeps.motions import Motion
+
+__all__ = ["absolute_tolerances", "have_inertia", "time_scales"]
+
+
+def time_scales(
+    motion: Motion,
+    t: FloatArray,
+    q: FloatArray,
+    u: FloatArray,
+    lengths: FloatArray,
+    values: FloatArray | None,
+    span: float,
+) -> FloatArray:
+    """Return in what time something happens in each run, as `find_scales` has it; nan where that has no value.
+
+    Parameters
+    ----------
+    motion
+        The scene.
+    t, q, u
+        States, of shape (runs,) and (runs, number).
+    lengths
+        Extent of each run, m.
+    values
+        Its parameters, shape (runs, number); None where all have the same.
+    span
+        Length of a run, s.
+    """
+    assembly = motion.assembly
+    if not len(t):
+        return np.zeros(0)
+    a = motion.accelerations(t, q.T, u.T, values).T
+    _, sizes = size_rows(assembly.reduced, lengths)
+    times = [np.full_like(u, span), sizes / np.abs(u), np.sqrt(sizes / np.abs(a))]
+    symbols = [one.name for one in assembly.parameters]
+    if "gravity" in symbols:
+        given = assembly.parameter_values if values is None else values.T
+        gravity = np.abs(given[symbols.index("gravity")])
+        times.append(np.broadcast_to(np.sqrt(lengths / gravity)[:, None], u.shape))
+    every = np.concatenate(times, axis=1)
+    time: FloatArray = np.min(np.where(every > 0.0, every, np.inf), axis=1)
+    return np.where(np.all(np.isfinite(a), axis=1), time, np.nan)
+
+
+def absolute_tolerances(assembly: Assembly, lengths: FloatArray, time: FloatArray, relative: float) -> FloatArray:
+    """Return the absolute tolerances of coordinates and speeds of each run, as `Plan.tolerances` has them.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    lengths, time
+        Sizes of each run, m and s.
+    relative
+        The relative tolerance that was asked for.
+    """
+    coordinate_sizes, sizes = size_rows(assembly.reduced, lengths)
+    share = min(relative, LOOSEST)
+    return np.concatenate([share * coordinate_sizes, share * (sizes / time[:, None])], axis=1)
+
+
+def have_inertia(
+    motion: Motion, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray
+) -> NDArray[np.bool_]:
+    """Return where nothing can move without inertia, by the measure of `make_plan`; see `time_scales`."""
+    mass = motion.masses(t, q.T, u.T, values)
+    directions = motion.open_directions(t, q.T, u.T, values)
+    if directions is None:
+        _, sizes = size_rows(motion.assembly.reduced, lengths)
+    else:
+        mass = np.swapaxes(directions, 1, 2) @ mass @ directions
+        sizes = 1.0 / np.sqrt(np.abs(np.diagonal(mass, axis1=1, axis2=2)))
+    mass = mass * sizes[:, :, None] * sizes[:, None, :]
+    usable = np.all(np.isfinite(mass), axis=(1, 2))
+    mass[~usable] = np.eye(mass.shape[1])
+    found = np.linalg.eigvalsh(mass)
+    good: NDArray[np.bool_] = usable & (found[:, 0] > 1e-14 * np.maximum(found[:, -1], 1e-300))
+    return good

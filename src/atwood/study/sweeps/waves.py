@@ -1,0 +1,264 @@
+"""Scenes with events many runs at a time: all runs go to their next event, then all enter their next modes.
+
+Each mode has one compiled session for each thread, which takes one run after another from where it stands to its next
+event or to the end. What a run by itself does before each stretch (sizes, tolerances, the values from which events are
+looked for) is worked out for all of them at once. A run in which something else happens is left to be made by itself.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.errors import AtwoodError
+from atwood.forms.assembly import Assembly
+from atwood.integrators.protocol import Budget, Status
+from atwood.late import dataclass
+from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction
+from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
+from atwood.simulation.events.mode_change import enter_mode
+from atwood.simulation.events.modes import EventRecord
+from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_starts
+from atwood.study.sweeps.modes import SweepMode, find_mode
+from atwood.study.sweeps.readout import read_quantities
+from atwood.study.sweeps.runs import Records, SweepRequest
+from atwood.study.sweeps.sizes import absolute_tolerances, have_inertia, time_scales
+
+__all__ = ["Waves"]
+
+_CHATTER = 20
+"""A run with so many stretches in a row that hardly last is left to be made, and judged, by itself."""
+
+_SHORT = 1e-9
+"""A stretch of a smaller share of the run hardly lasts."""
+
+
+@dataclass(eq=False)
+class _State:
+    """Where a run is.
+
+    Attributes
+    ----------
+    run, row
+        Its number, and its place in the piece.
+    t, y
+        Time, coordinates and speeds of its mode.
+    modes
+        The modes of all parts.
+    shown
+        How many output times it has passed.
+    steps, short
+        Steps so far, and stretches in a row that hardly lasted.
+    """
+
+    run: int
+    row: int
+    t: float
+    y: FloatArray
+    modes: tuple[tuple[str, str], ...]
+    shown: int = 0
+    steps: int = 0
+    short: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """States of a run in one mode at output times, one row each."""
+
+    state: _State
+    first: int
+    t: FloatArray
+    y: FloatArray
+
+
+class Waves:
+    """Pieces of a sweep over a scene with events.
+
+    Parameters
+    ----------
+    request, records
+        What to run, and where to write what became of it.
+    """
+
+    def __init__(self, request: SweepRequest, records: Records) -> None:
+        self.request, self.records = request, records
+        self.starts, self.rows = StartRows(request), ParameterRows(request)
+        self._own = threading.local()
+
+    def work(self, runs: NDArray[np.intp], stop: threading.Event) -> int:
+        """Make the runs of one piece; return how many are done."""
+        runs, (q, u), lengths, parameters = read_starts(self.starts, self.rows, runs)
+        assembly = self.request.assembly
+        first = tuple(sorted(assembly.modes.items()))
+        begin = assembly.flat.t_start
+        states = [
+            _State(run, row, begin, np.concatenate([q[row], u[row]]), first) for row, run in enumerate(runs.tolist())
+        ]
+        piece = _Piece(self, lengths, parameters)
+        while states:
+            if stop.is_set():
+                return 0
+            after: list[_State] = []
+            for modes in dict.fromkeys(one.modes for one in states):
+                together = [one for one in states if one.modes == modes]
+                mode = self.mode(modes, together[0], piece)
+                if mode is not None:
+                    after += piece.advance(mode, together)
+            states = after
+        return piece.record()
+
+    def mode(self, modes: tuple[tuple[str, str], ...], state: _State, piece: _Piece) -> SweepMode | None:
+        """Return a mode with this thread's session; None where runs that come there are made by themselves."""
+        if not hasattr(self._own, "modes"):
+            self._own.modes = {}
+        known: dict[tuple[tuple[str, str], ...], SweepMode | None] = self._own.modes
+        if modes not in known:
+            n = len(self.request.assembly.other_mode(dict(modes), {}).reduced.coordinates)
+            at = state.t, state.y[:n], state.y[n:], float(piece.lengths[state.row])
+            known[modes] = find_mode(self.request, dict(modes), at, self.rows.varies)[0]
+        return known[modes]
+
+    def own(self, run: int, modes: tuple[tuple[str, str], ...]) -> Assembly:
+        """Return the assembly of one run in some modes."""
+        return self.starts.assembly(run).other_mode(dict(modes), {})
+
+
+class _Piece:
+    """Runs that are made together."""
+
+    def __init__(self, waves: Waves, lengths: FloatArray, parameters: FloatArray | None) -> None:
+        self.waves, self.request, self.lengths, self.parameters = waves, waves.request, lengths, parameters
+        self.samples: dict[tuple[tuple[str, str], ...], list[_Samples]] = {}
+        self.ended: dict[int, tuple[_State, str]] = {}
+        self.seconds = 0.0
+
+    def advance(self, mode: SweepMode, states: Sequence[_State]) -> list[_State]:
+        """Take runs in one mode to their next event; return those that go on, each in the mode that it enters."""
+        n, rows = mode.coordinates, np.array([one.row for one in states])
+        y, t = np.array([one.y for one in states]), np.array([one.t for one in states])
+        q, u, lengths = y[:, :n], y[:, n:], self.lengths[rows]
+        values = None if self.parameters is None else mode.arranged(self.parameters[rows])
+        options = self.request.options
+        span = options.t_end - self.request.assembly.flat.t_start
+        with np.errstate(all="ignore"):
+            time = time_scales(mode.motion, t, q, u, lengths, values, span)
+            absolute = absolute_tolerances(mode.assembly, lengths, time, options.relative_tolerance)
+            shifts, watched = mode.shifts(t, q, u, values, lengths, time, options.relative_tolerance)
+            usable = watched & np.all(np.isfinite(absolute), axis=1)
+            usable &= have_inertia(mode.motion, t, q, u, values, lengths)
+        going: list[tuple[_State, EventFunction]] = []
+        for k in np.flatnonzero(usable).tolist():
+            event = self._stretch(mode, states[k], None if values is None else values[k], shifts[k], absolute[k])
+            if event is not None:
+                going.append((states[k], event))
+        return [one for one, event in going if self._enter(mode, one, event)]
+
+    def _stretch(
+        self, mode: SweepMode, state: _State, values: FloatArray | None, shift: FloatArray, absolute: FloatArray
+    ) -> EventFunction | None:
+        """Take one run to its next event; return it where another mode follows. What ends a run is noted."""
+        request = self.request
+        most, end = request.options.max_steps, request.options.t_end
+        budget = Budget(max_steps=None if most is None else max(0, most - state.steps))
+        before, left = state.t, request.times[state.shown :]
+        try:
+            y, result, cost = mode.run(state.t, state.y, values, shift, absolute, budget, left, end)
+        except AtwoodError:  # said by the run by itself
+            return None
+        state.steps += cost.steps
+        self.seconds += cost.seconds
+        self._take(state, left[: len(y)], y)
+        if result.status is Status.REACHED:
+            self.ended[state.run] = state, "finished"
+            return None
+        event = mode.event(result) if result.status is Status.EVENT else None
+        if event is None or event.target in (UPDATE, COORDINATE_SWITCH, ""):
+            return None
+        state.t, state.y = result.t, result.y
+        if event.target == "stop":
+            self._stop(state, mode.record(event, state.t))
+            return None
+        state.short = state.short + 1 if state.t - before < _SHORT * (end - request.assembly.flat.t_start) else 0
+        return event if state.short < _CHATTER else None
+
+    def _take(self, state: _State, t: FloatArray, y: FloatArray) -> None:
+        """Take states at output times."""
+        if len(y):
+            self.samples.setdefault(state.modes, []).append(_Samples(state, state.shown, t, y))
+            state.shown += len(y)
+
+    def _stop(self, state: _State, record: EventRecord) -> None:
+        """Note a run that an event has stopped: its last state is shown where one is asked for."""
+        times = self.request.times
+        if self.request.only_end or (state.shown < len(times) and times[state.shown] == state.t):
+            self._take(state, np.array([state.t]), state.y[None, :])
+        self.ended[state.run] = state, record.describe()
+
+    def _enter(self, mode: SweepMode, state: _State, event: EventFunction) -> bool:
+        """Take a run into the mode that an event leads to; return whether it goes on here."""
+        modes = tuple(sorted({**dict(state.modes), event.part: event.target}.items()))
+        if state.t >= self.request.options.t_end:  # the run by itself says how it ends
+            return False
+        if not (mode.keeps_state(modes) and not event.impact):
+            before = self.waves.own(state.run, state.modes)
+            n, length = mode.coordinates, float(self.lengths[state.row])
+            at = state.t, state.y[:n], state.y[n:]
+            try:
+                _, q, u = enter_mode(at, before, mode.record(event, state.t), before.other_mode, length)
+            except AtwoodError:
+                return False
+            state.y = np.concatenate([q, u])
+        state.modes = modes
+        return True
+
+    # -- what came out --------------------------------------------------------------------------------------------
+
+    def record(self) -> int:
+        """Write what became of the runs that came to an end; return how many these are."""
+        records, request = self.waves.records, self.request
+        whole = dict.fromkeys(self.ended, True)
+        for modes, parts in self.samples.items():
+            parts = [one for one in parts if one.state.run in self.ended]
+            if not parts:
+                continue
+            found = self._read(modes, parts)
+            if found is None:
+                whole.update((one.state.run, False) for one in parts)
+                continue
+            at = 0
+            for one in parts:
+                many = len(one.t)
+                records.values[:, one.state.run, one.first : one.first + many] = found[:, at : at + many]
+                at += many
+        done = [run for run, is_whole in whole.items() if is_whole]
+        for run in done:
+            state, how = self.ended[run]
+            records.steps[run] = state.steps
+            records.status[run] = "finished" if how == "finished" else "stopped"
+            if how == "finished":
+                records.end_time[run] = request.options.t_end if request.only_end else request.times[-1]
+            else:
+                records.end_time[run], records.messages[run] = state.t, how
+        with records.lock:
+            records.seconds += self.seconds
+            records.batched += len(done)
+        return len(done)
+
+    def _read(self, modes: tuple[tuple[str, str], ...], parts: Sequence[_Samples]) -> FloatArray | None:
+        mode = self.waves.mode(modes, parts[0].state, self)
+        assert mode is not None
+        counts = [len(one.t) for one in parts]
+        t, y = np.concatenate([one.t for one in parts]), np.concatenate([one.y for one in parts])
+        places = np.repeat([one.state.row for one in parts], counts)
+        rows = None if self.parameters is None else mode.arranged(self.parameters[places])
+        numbers = np.repeat([one.state.run for one in parts], counts)
+        own: Callable[[int], Assembly] = lambda run: self.waves.own(run, modes)  # noqa: E731
+        state = t, y[:, : mode.coordinates].T, y[:, mode.coordinates :].T
+        try:
+            return read_quantities(mode.motion, self.request.paths, state, rows, numbers, own)
+        except AtwoodError:  # a quantity that there is not in this mode
+            return None
