@@ -26,7 +26,7 @@ from atwood import (
 from atwood.simulation.problem.options import RunOptions
 from atwood.study.sweeps import batch as sweep_batch, runs as sweep_runs
 from atwood.study.sweeps.cases import make_cases
-from atwood_library import Ground, PointMass, Rod, Rope
+from atwood_library import Damper, Ground, PointMass, Rod, Rope, Spring
 from atwood_library.scenes import SCENES, Chain, DoublePendulum, FourBar, SliderCrank
 
 
@@ -140,6 +140,33 @@ def test_taylor_series_many_at_a_time(rtol: float, monkeypatch: pytest.MonkeyPat
     solver = "taylor" if rtol > 1e-10 else "auto"
     options = {**CASES["outputs"], "rtol": rtol, "solver": solver, "t_end": 1.0, "threads": 1}
     assert_same(sweep(DoublePendulum(), **options), one_by_one(monkeypatch, DoublePendulum(), **options))
+
+
+def hanging(damping: float = 1.0) -> Scene:
+    """Return a mass on a spring and a damper."""
+    scene = Scene(t_end=2.0)
+    ground, bob = scene.add("ground", Ground()), scene.add("bob", PointMass(mass=1.0))
+    spring = scene.add("spring", Spring(stiffness=100.0, natural_length=1.0))
+    damper = scene.add("damper", Damper(damping=damping))
+    for part in (spring, damper):
+        scene.connect(ground.frame, part.a)
+        scene.connect(part.b, bob.point)
+    scene.start.update({"bob.position.x": 0.3, "bob.position.z": -1.0, "bob.velocity.x": 0.0, "bob.velocity.z": 0.0})
+    return scene
+
+
+def test_damped_scenes_many_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    options = {"vary": {"damper.damping": [0.1, 1.0, 20.0]}, "outputs": 5, "threads": 1}
+    assert_same(sweep(hanging(), **options), one_by_one(monkeypatch, hanging(), **options))
+
+
+def test_stiff_runs_are_made_by_themselves(monkeypatch: pytest.MonkeyPatch) -> None:
+    options = {"vary": {"damper.damping": [1.0, 1e5, 2.0]}, "threads": 1}
+    found, single = sweep(hanging(), **options), one_by_one(monkeypatch, hanging(), **options)
+    assert found.statistics.batched == 2
+    assert found.status == single.status
+    for path in single.paths:
+        assert_allclose(found[path], single[path], rtol=1e-11, atol=1e-11)
 
 
 def test_threads_change_nothing() -> None:

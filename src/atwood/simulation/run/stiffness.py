@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.errors import KernelEvaluationError
 from atwood.expr import Expression, depends_on
@@ -22,7 +23,7 @@ from atwood.forms.kept import Key
 from atwood.integrators.protocol import FloatArray, Values
 from atwood.late import dataclass
 
-__all__ = ["Stiffness", "can_be_stiff", "find_stiffness"]
+__all__ = ["Stiffness", "can_be_stiff", "find_stiff_rows", "find_stiffness"]
 
 RATIO = 300.0
 """A decay that is so many times as fast as anything else is left to an implicit method."""
@@ -108,6 +109,48 @@ def find_stiffness(
     matrix = _jacobian(rates, t, y, scale)
     if matrix is None:
         return Stiffness(0.0, 0.0, RATIO)
+    return _judged(matrix, time, span, relative_tolerance)
+
+
+def find_stiff_rows(
+    rates: Callable[[FloatArray], FloatArray],
+    y: FloatArray,
+    scale: FloatArray,
+    time: FloatArray,
+    span: FloatArray,
+    relative_tolerance: float,
+) -> NDArray[np.bool_]:
+    """Return which of many runs are stiff, as `find_stiffness` has it of one.
+
+    Parameters
+    ----------
+    rates
+        The right-hand sides at states of all runs, one row each.
+    y, scale
+        States and sizes of the unknowns, shape (runs, number).
+    time, span
+        Of each run, s.
+    relative_tolerance
+        Of all runs.
+    """
+    runs, count = y.shape
+    matrix = np.empty((runs, count, count))
+    with np.errstate(all="ignore"):
+        here = rates(y)
+        for j in range(count):
+            moved = y.copy()
+            moved[:, j] += 1e-7 * scale[:, j]
+            step = moved[:, j] - y[:, j]
+            matrix[:, :, j] = (rates(moved) - here) * (scale[:, j] / step)[:, None] / scale
+    known = np.isfinite(matrix).all(axis=(1, 2))
+    found: NDArray[np.bool_] = np.zeros(runs, dtype=np.bool_)
+    for k in np.flatnonzero(known).tolist():
+        found[k] = _judged(matrix[k], float(time[k]), float(span[k]), relative_tolerance).is_stiff
+    return found
+
+
+def _judged(matrix: FloatArray, time: float, span: float, relative_tolerance: float) -> Stiffness:
+    """Return how stiff a problem is by its Jacobian in units of its sizes."""
     try:
         values = np.linalg.eigvals(matrix)
     except np.linalg.LinAlgError:  # nothing is known of it; the explicit method tells by its steps where it is stiff

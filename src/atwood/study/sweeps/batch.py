@@ -19,13 +19,12 @@ from atwood.integrators.ensemble.batch import BatchPlaces
 from atwood.late import dataclass
 from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.initialization.start import find_start
-from atwood.simulation.run.stiffness import can_be_stiff
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_starts
 from atwood.study.sweeps.modes import find_mode
 from atwood.study.sweeps.motions import METHODS, Way, find_way, open_places
 from atwood.study.sweeps.readout import read_quantities, reads
 from atwood.study.sweeps.runs import Records, SweepRequest, shared_work
-from atwood.study.sweeps.sizes import absolute_tolerances, have_inertia, time_scales
+from atwood.study.sweeps.sizes import absolute_tolerances, are_stiff, have_inertia, time_scales
 from atwood.study.sweeps.waves import Waves
 
 __all__ = ["run_batches", "why_not_batched"]
@@ -51,8 +50,6 @@ def why_not_batched(request: SweepRequest) -> str:
         return "something in it follows the clock"
     if assembly.mechanism.space.is_line:
         return "on a line, each start says on which side of each other the parts are"
-    if options.solver == "auto" and can_be_stiff(assembly):
-        return "whether it is stiff depends on each run (with solver='explicit' it is not asked)"
     if options.max_seconds is not None:
         return "each run has a limit of time"
     if request.has_turns:
@@ -165,7 +162,8 @@ class _Batches:
             state, values, usable = motion.begin(begin, q, u, parameters, lengths, time)
             usable &= np.isfinite(time) & have_inertia(motion, t, q, u, values, lengths)
             tolerances = absolute_tolerances(assembly, lengths, time, options.relative_tolerance)[:, motion.columns()]
-        usable &= np.all(np.isfinite(tolerances), axis=1)
+        usable &= np.all(np.isfinite(tolerances), axis=1) & np.all(np.isfinite(state), axis=1)
+        usable[usable] &= ~are_stiff(motion, *_where(usable, t, state, values, tolerances, time), options)
         kept = None if values is None else values[usable]
         return _Prepared(runs[usable], state[usable], kept, tolerances[usable])
 
@@ -200,3 +198,15 @@ class _Batches:
         numbers = np.repeat(ready.runs[good], moments)
         found = read_quantities(self.motion, request.paths, (t, q, u), rows, numbers, self.rows.assembly)
         return found.reshape(len(request.paths), count, moments)
+
+
+def _where(
+    which: NDArray[np.bool_],
+    t: FloatArray,
+    state: FloatArray,
+    values: FloatArray | None,
+    tolerances: FloatArray,
+    time: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray | None, FloatArray, FloatArray]:
+    """Return the rows of some runs."""
+    return t[which], state[which], None if values is None else values[which], tolerances[which], time[which]

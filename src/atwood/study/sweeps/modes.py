@@ -25,7 +25,6 @@ from atwood.simulation.events.modes import EventProbe, EventRecord
 from atwood.simulation.problem.explicit_scene import explicit_problem_of, own_rates
 from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.run.choice import choose
-from atwood.simulation.run.stiffness import can_be_stiff
 from atwood.study.sweeps.motions import OpenTree
 from atwood.study.sweeps.runs import SweepRequest
 
@@ -202,8 +201,6 @@ def find_mode(
     equations = assembly.reduced
     if equations.constraints or not equations.coordinates:
         return None, "events are watched where constraints are left among the coordinates"
-    if options.solver == "auto" and can_be_stiff(assembly):
-        return None, "whether it is stiff depends on each run (with solver='explicit' it is not asked)"
     t, q, u, length = at
     try:
         plan = make_plan(assembly, t, q, u, length, options.t_end - base.flat.t_start)

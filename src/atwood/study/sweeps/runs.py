@@ -254,7 +254,7 @@ def _take(request: SweepRequest, records: Records, run: int, result: Result) -> 
     records.steps[run] = statistics.steps
     with records.lock:
         records.seconds += statistics.seconds
-    records.end_time[run] = result.time[-1]
+    records.end_time[run] = result.run.segments[-1].time[-1]  # which may be between two outputs
     has_end = records.status[run] in ("finished", "stopped")
     table = result.table(request.paths)
     for k, path in enumerate(request.paths):

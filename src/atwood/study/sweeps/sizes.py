@@ -9,9 +9,11 @@ from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.integrators.explicit_problem import LOOSEST
 from atwood.simulation.initialization.many import size_rows
+from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.run.stiffness import can_be_stiff, find_stiff_rows
 from atwood.study.sweeps.motions import Motion
 
-__all__ = ["absolute_tolerances", "have_inertia", "time_scales"]
+__all__ = ["absolute_tolerances", "are_stiff", "have_inertia", "time_scales"]
 
 
 def time_scales(
@@ -88,3 +90,46 @@ def have_inertia(
     found = np.linalg.eigvalsh(mass)
     good: NDArray[np.bool_] = usable & (found[:, 0] > 1e-14 * np.maximum(found[:, -1], 1e-300))
     return good
+
+
+def are_stiff(
+    motion: Motion,
+    t: FloatArray,
+    y: FloatArray,
+    values: FloatArray | None,
+    tolerances: FloatArray,
+    time: FloatArray,
+    options: RunOptions,
+) -> NDArray[np.bool_]:
+    """Return which runs `choose` would give to an implicit method; none where a method was asked for.
+
+    Parameters
+    ----------
+    motion
+        The scene.
+    t, y
+        Times, and what is integrated, of shape (runs,) and (runs, number).
+    values
+        Parameters of what is integrated, shape (runs, number); None where all runs have the same.
+    tolerances
+        Absolute tolerances, as many shares of the unknowns' sizes.
+    time
+        In what time something happens, s.
+    options
+        What was asked for.
+    """
+    assembly = motion.assembly
+    if not len(t) or options.solver != "auto" or not can_be_stiff(assembly):
+        return np.zeros(len(t), dtype=np.bool_)
+    program = motion.program.program
+    kernel = assembly.compiled(program, vectorized=True).bind(assembly.parameter_values if values is None else values.T)
+    n = len(program.inputs[1].symbols)
+
+    def rates(states: FloatArray) -> FloatArray:
+        found = kernel(t[None, :], states[:, :n].T, states[:, n:].T)
+        first = states[:, n:].T if len(found) == 1 else found[0]
+        both = [np.broadcast_to(one, (len(one), len(t))) for one in (first, found[-1])]
+        return np.asarray(np.concatenate(both).T, dtype=np.float64)
+
+    relative = options.relative_tolerance
+    return find_stiff_rows(rates, y, tolerances / min(relative, LOOSEST), time, options.t_end - t, relative)

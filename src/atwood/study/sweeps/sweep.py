@@ -86,9 +86,9 @@ def sweep(
 ) -> Sweep:
     """Run a scene with many values of its parameters and of its start.
 
-    Equations and machine code are made once for all runs that share a structure. Smooth scenes in the reduced form
-    without events, whose closed loops (if any) formulas solve, are run many at a time in machine code; all others one
-    by one, with the same answers. A run that fails stays in the sweep, with the reason.
+    Equations and machine code are made once for all runs that share a structure. Scenes in the reduced form, whose
+    closed loops (if any) formulas solve, are run many at a time in machine code, also with stops and other events; all
+    others one by one, with the same answers. A run that fails stays in the sweep, with the reason.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_star
 from atwood.study.sweeps.modes import SweepMode, find_mode
 from atwood.study.sweeps.readout import read_quantities
 from atwood.study.sweeps.runs import Records, SweepRequest
-from atwood.study.sweeps.sizes import absolute_tolerances, have_inertia, time_scales
+from atwood.study.sweeps.sizes import absolute_tolerances, are_stiff, have_inertia, time_scales
 
 __all__ = ["Waves"]
 
@@ -150,6 +150,7 @@ class _Piece:
             shifts, watched = mode.shifts(t, q, u, values, lengths, time, options.relative_tolerance)
             usable = watched & np.all(np.isfinite(absolute), axis=1)
             usable &= have_inertia(mode.motion, t, q, u, values, lengths)
+            usable &= ~are_stiff(mode.motion, t, y, values, absolute, time, options)
         going: list[tuple[_State, EventFunction]] = []
         for k in np.flatnonzero(usable).tolist():
             event = self._stretch(mode, states[k], None if values is None else values[k], shifts[k], absolute[k])
@@ -168,6 +169,8 @@ class _Piece:
         try:
             y, result, cost = mode.run(state.t, state.y, values, shift, absolute, budget, left, end)
         except AtwoodError:  # said by the run by itself
+            return None
+        if mode.session.seems_stiff and request.options.solver == "auto":  # it may change its solver
             return None
         state.steps += cost.steps
         self.seconds += cost.seconds
