@@ -20,9 +20,9 @@ static inline void accelerate(const real *q, const real *u, const real *p, real 
     const real dn = (C * x + S * y + kk * b * b - nn * dot) * det;
     const real v = -S - 0.5 * k * y, w = C + 0.5 * k * x; /* rates of the coupler's centre */
     const real dv = -C - 0.5 * (dk * y + kk * x), dw = -S + 0.5 * (dk * x - kk * y);
-    const real I = m2 * b * b * (1.0 / 12.0), J = m3 * c * c * (1.0 / 3.0);
-    const real M = m1 * a * a * (1.0 / 3.0) + m2 * (v * v + w * w) + I * kk + J * nn;
-    const real half = m2 * (v * dv + w * dw) + I * k * dk + J * n * dn;
+    const real M2 = m2 * b * b * (1.0 / 12.0), M3 = m3 * c * c * (1.0 / 3.0);
+    const real M = m1 * a * a * (1.0 / 3.0) + m2 * (v * v + w * w) + M2 * kk + M3 * nn;
+    const real half = m2 * (v * dv + w * dw) + M2 * k * dk + M3 * n * dn;
     const real pull = 0.5 * m1 * C + m2 * w + 0.5 * m3 * n * X;
     out[0] = -(half * u[0] * u[0] + g * pull) / M;
 }

@@ -14,8 +14,8 @@ static inline void accelerate(const real *q, const real *u, const real *p, real 
     const real k = -c * over, dk = (s + y * k * k) * over;
     const real v = -s - 0.5 * y * k, w = 0.5 * c, V = -s - y * k; /* rates of the rod's centre and of the piston */
     const real turn = x * k * k + y * dk, dv = -c - 0.5 * turn, dw = -0.5 * s, dV = -c - turn;
-    const real I = m2 * l * l * (1.0 / 12.0);
-    const real M = m1 * r * r * (1.0 / 3.0) + m2 * (v * v + w * w) + I * k * k + m3 * V * V;
-    const real half = m2 * (v * dv + w * dw) + I * k * dk + m3 * V * dV;
+    const real moment = m2 * l * l * (1.0 / 12.0);
+    const real M = m1 * r * r * (1.0 / 3.0) + m2 * (v * v + w * w) + moment * k * k + m3 * V * V;
+    const real half = m2 * (v * dv + w * dw) + moment * k * dk + m3 * V * dV;
     a[0] = -(half * u[0] * u[0] + 0.5 * g * (m1 + m2) * c) / M;
 }
