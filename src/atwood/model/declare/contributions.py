@@ -59,7 +59,9 @@ class PointInertia:
     masses: Sequence[Sequence[Scalar]]
 
     def __post_init__(self) -> None:
-        check_fields(self, DeclarationError, points=each(_POINT, "points, such as self.a", 1), masses=_MATRIX)
+        check_fields(
+            self, DeclarationError, points=each(_POINT, "points in brackets, such as (self.a,)", 1), masses=_MATRIX
+        )
         if any(len(row) != len(self.points) for row in (self.masses, *self.masses)):
             raise DeclarationError(
                 f"masses cannot be {show(self.masses)} for {len(self.points)} points",

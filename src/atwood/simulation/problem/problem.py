@@ -304,10 +304,15 @@ class Plan:
         return tuple(i for i, one in enumerate(self.assembly.own_equations.names) if one.unit == "rad")
 
     def tolerances(self, relative: float) -> FloatArray:
-        """Return the absolute tolerance of each unknown; multipliers are kept out of the error test."""
-        program = self.program
-        loose = np.full(program.multipliers + program.extra, 1e3 * max(self.scales.force, 1.0))
-        return np.concatenate([relative * self.coordinate_sizes, relative * (self.sizes / self.scales.time), loose])
+        """Return the absolute tolerance of each unknown; multipliers are kept out of the error test.
+
+        Those of the stabilised form move points by speeds, and turn bodies by speeds over arms.
+        """
+        program, scales = self.program, self.scales
+        forces = np.full(program.multipliers, 1e3 * scales.force)
+        shifts = np.full(program.extra, 1e3 * max(scales.length, 1.0 / scales.length) / scales.time)
+        motion = relative * self.coordinate_sizes, relative * (self.sizes / scales.time)
+        return np.concatenate([*motion, forces, shifts])
 
 
 def _restored(

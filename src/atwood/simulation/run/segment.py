@@ -422,7 +422,8 @@ class _Runner:
         if plan.program.level != "index1-projected" and not needs_normalization:
             return
         _, q, u, held = self.recorder.last()
-        if needs_normalization or np.max(held) > 100.0 * self.segment.options.relative_tolerance:
+        drift = max(float(held[0]), float(held[1]) * plan.scales.time)  # of places, and of speeds
+        if needs_normalization or drift > 100.0 * self.segment.options.relative_tolerance:
             session.reinitialize(step_result.t, *pack_state(plan, step_result.t, q, u))
 
 
