@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from atwood.pipeline import Assembly, assemble, simulate
     from atwood.plotting.drawing import animate, plot_mechanism
     from atwood.plotting.mode_shapes import plot_mode
+    from atwood.plotting.plots.energies import plot_energies
     from atwood.plotting.plots.linear import plot_bode, plot_branches, plot_nyquist, plot_root_locus
     from atwood.plotting.plots.phase import plot_phase_portrait, plot_section
     from atwood.plotting.plots.precision import plot_comparison
@@ -260,6 +261,7 @@ __all__ += [
     "plot_branches",
     "plot_comparison",
     "plot_effective_potential",
+    "plot_energies",
     "plot_mechanism",
     "plot_mode",
     "plot_nyquist",
@@ -303,6 +305,7 @@ _ROOMS = {
     "atwood.pipeline": ("Assembly", "assemble", "simulate"),
     "atwood.plotting": ("animate", "plot", "plot_comparison", "plot_mechanism", "plot_sweep"),
     "atwood.plotting.mode_shapes": ("plot_mode",),
+    "atwood.plotting.plots.energies": ("plot_energies",),
     "atwood.plotting.plots.linear": ("plot_bode", "plot_branches", "plot_nyquist", "plot_root_locus"),
     "atwood.plotting.plots.reduction": ("plot_effective_potential", "plot_top_path"),
     "atwood.plotting.plots.phase": ("plot_phase_portrait", "plot_section"),

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
+from atwood.errors import UsageError
 from atwood.late import dataclass
+
+if TYPE_CHECKING:
+    from atwood.result.part_energy import PartEnergies
 
 __all__ = ["EnergyLedger", "Piece", "exchange", "make_ledger"]
 
@@ -47,6 +53,8 @@ class EnergyLedger:
         potential, and only the last two on the frame of reference.
     uncertainty
         What the digits of states and parameters leave open, J, and the estimated error of the work as an integral.
+    source
+        Gives `parts`, for what is exchanged.
     """
 
     kinetic: FloatArray
@@ -55,6 +63,20 @@ class EnergyLedger:
     max_drift: float
     exchanged: float
     uncertainty: float
+    source: Callable[[float], PartEnergies] | None = None
+
+    @cached_property
+    def parts(self) -> PartEnergies:
+        """The same for each component, worked out when it is first asked for: ``parts["bob"].work["point"]``.
+
+        Raises
+        ------
+        UsageError
+            If the run that it is of is not there.
+        """
+        if self.source is None:
+            raise UsageError("the run that the energy is of is not there", advice="Ask result.energy of a run.")
+        return self.source(self.exchanged)
 
     @property
     def total(self) -> FloatArray:

@@ -38,7 +38,7 @@ from atwood.result.result import Result
 from atwood.result.trajectories import Trajectories
 from atwood.showing import count_of, listed
 
-__all__ = ["SavedResult", "load_result", "save_result"]
+__all__ = ["SavedResult", "load_result", "save_result", "write_trajectories"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ def save_result(result: Result, file: str | os.PathLike[str], paths: Iterable[st
     UsageError
         If the suffix is not known, or the file cannot be written.
     """
-    target, (write, _) = Path(file), _format_of(Path(file))
+    _format_of(Path(file))  # refused before any work is done
     wanted = tuple(result.paths if paths is None else paths)
     saved = SavedResult(
         result.time,
@@ -142,6 +142,12 @@ def save_result(result: Result, file: str | os.PathLike[str], paths: Iterable[st
         {path: result.describe(path) for path in wanted},
         describe_run(result),
     )
+    return write_trajectories(saved, file)
+
+
+def write_trajectories(saved: SavedResult, file: str | os.PathLike[str]) -> Path:
+    """Write trajectories to a file, and return it; see `save_result`."""
+    target, (write, _) = Path(file), _format_of(Path(file))
     write_atomically(target, lambda part: write(saved, part))
     return target
 

@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.clock import Clock, TimeIsUp, check_time
+from atwood.late import dataclass, replace
 from atwood.result.accounts import power_into
 from atwood.result.energy import EnergyLedger, Piece, make_ledger
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.simulation.run.made import Run
+from atwood.simulation.run.record import SegmentRecord
 
-__all__ = ["find_ledger", "integral_in_steps", "integral_of_samples", "joined_times", "nodes_between"]
+if TYPE_CHECKING:
+    from atwood.result.part_energy import PartEnergies
+
+__all__ = [
+    "StepSamples",
+    "find_ledger",
+    "integral_in_steps",
+    "integral_of_samples",
+    "joined_times",
+    "nodes_between",
+    "nodes_in_steps",
+    "samples_in_steps",
+]
 
 
 _CLEAR, _PART = 0.01, 0.1
@@ -72,7 +88,7 @@ def nodes_between(times: FloatArray, count: int) -> FloatArray:
     return nodes
 
 
-def integral_in_steps(times: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
+def integral_in_steps(times: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the integral from the first time on, and its estimated error.
 
     Parameters
@@ -80,18 +96,24 @@ def integral_in_steps(times: FloatArray, values: FloatArray) -> tuple[FloatArray
     times
         Times between which values are smooth.
     values
-        At the points that `nodes_between` gives, shape (times - 1, points).
+        At the points that `nodes_between` gives, shape (..., times - 1, points).
+
+    Returns
+    -------
+    integral, error
+        Of shape (..., times) and (...).
     """
     from numpy.polynomial import legendre
 
-    count, half = values.shape[1], 0.5 * np.diff(times)
+    count, half = values.shape[-1], 0.5 * np.diff(times)
     points, weights = legendre.leggauss(count)
     to_coefficients = (np.arange(count) + 0.5)[:, None] * (legendre.legvander(points, count - 1) * weights[:, None]).T
     coefficients = np.abs(values @ to_coefficients.T)
-    sizes, last = np.max(coefficients, axis=1, initial=0.0), coefficients[:, -1]
+    sizes, last = np.max(coefficients, axis=-1, initial=0.0), coefficients[..., -1]
     # Gauss' rule errs by the term of twice the order, which follows if the coefficients fall evenly.
     fall = np.divide(last, sizes, out=np.zeros_like(last), where=sizes > 0.0) ** (2.0 * count / (count - 1.0))
-    return np.concatenate([[0.0], np.cumsum(half * (values @ weights))]), float(half @ (sizes * fall))
+    done = np.cumsum(half * (values @ weights), axis=-1)
+    return np.concatenate([np.zeros_like(done[..., :1]), done], axis=-1), (sizes * fall) @ half
 
 
 def find_ledger(
@@ -115,6 +137,16 @@ def find_ledger(
     shown
         Which of all samples are outputs.
     """
+    return replace(_balanced(run, pieces, shown), source=partial(_by_part, run, shown))
+
+
+def _by_part(run: Run, shown: NDArray[np.bool_], exchanged: float) -> PartEnergies:
+    from atwood.result.part_work import find_part_energies  # which few runs need
+
+    return find_part_energies(run, shown, exchanged)
+
+
+def _balanced(run: Run, pieces: Sequence[Piece], shown: NDArray[np.bool_]) -> EnergyLedger:
     known = [
         (np.zeros(len(one.time)), 0.0) if one.power is None else integral_of_samples(one.time, one.power)
         for one in pieces
@@ -132,7 +164,7 @@ def find_ledger(
     try:
         with Clock(None if limit is None else limit - sum(run.timings.values())).kept():
             check_time()
-            found = _work_in_steps(run, pieces, max(_NODES[one] for one in solvers))
+            found = _work_in_steps(run, pieces, nodes_in_steps(run))
     except TimeIsUp:
         return ledger
     return ledger if found is None else make_ledger(pieces, *found, shown)
@@ -140,25 +172,70 @@ def find_ledger(
 
 def _work_in_steps(run: Run, pieces: Sequence[Piece], count: int) -> tuple[list[FloatArray], float] | None:
     """Return the work at all samples, integrated within each step of the solver, and its estimated error."""
+    found = samples_in_steps(run, [one.time for one in pieces], count)
+    if found is None:
+        return None
+    work, unsure = [], 0.0
+    for one, piece in zip(found, pieces, strict=True):
+        power = power_into(SegmentQuantities(one.segment))
+        rows = np.zeros((len(one.grid) - 1, count)) if power is None else power[one.places].reshape(-1, count)
+        done, error = integral_in_steps(one.grid, rows)
+        work.append(done[np.searchsorted(one.grid, piece.time)])
+        unsure += float(error)
+    return work, unsure
+
+
+@dataclass(frozen=True, eq=False)
+class StepSamples:
+    """States within the steps of a segment.
+
+    Attributes
+    ----------
+    segment
+        The segment, with more samples.
+    grid
+        The times of its steps and of its own samples.
+    places
+        The samples of `segment` at the points of Gauss and Legendre between each two of these times.
+    """
+
+    segment: SegmentRecord
+    grid: FloatArray
+    places: NDArray[np.intp]
+
+
+def nodes_in_steps(run: Run) -> int:
+    """Return in how many points powers are integrated in a step of a run."""
+    return max(_NODES[one.solver] for one in run.choices)
+
+
+def samples_in_steps(run: Run, times: Sequence[FloatArray], count: int) -> list[StepSamples] | None:
+    """Return states within the steps of a run, for which it is made again; None if it comes out otherwise.
+
+    Parameters
+    ----------
+    run
+        The run.
+    times
+        Sample times of each segment.
+    count
+        So many points in each step.
+    """
     from atwood.simulation.run.retrace import run_again, times_of_steps
 
     steps = times_of_steps(run)
-    grids = [joined_times(one.time, steps) for one in pieces]
+    grids = [joined_times(one, steps) for one in times]
     nodes = [nodes_between(grid, count) for grid in grids]
     again = run_again(run, np.concatenate(nodes))
     if again is None:
         return None
-    work, unsure = [], 0.0
-    for segment, piece, grid, wanted in zip(again.segments, pieces, grids, nodes, strict=True):
-        places = np.searchsorted(segment.time, wanted)
-        if not np.array_equal(segment.time[np.minimum(places, len(segment.time) - 1)], wanted):
+    found = []
+    for segment, grid, wanted in zip(again.segments, grids, nodes, strict=True):
+        places = np.minimum(np.searchsorted(segment.time, wanted), len(segment.time) - 1)
+        if not np.array_equal(segment.time[places], wanted):
             return None
-        power = power_into(SegmentQuantities(segment))
-        rows = np.zeros((len(grid) - 1, count)) if power is None else power[places].reshape(-1, count)
-        done, error = integral_in_steps(grid, rows)
-        work.append(done[np.searchsorted(grid, piece.time)])
-        unsure += error
-    return work, unsure
+        found.append(StepSamples(segment, grid, places))
+    return found
 
 
 def joined_times(t: FloatArray, steps: FloatArray) -> FloatArray:

@@ -15,12 +15,19 @@ from atwood.mechanics.dynamics.equations import Equations, push_body
 from atwood.mechanics.dynamics.forces import Forces, constraint_forces, in_coordinates, local_map, part_forces
 from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.mechanics.outputs.observables import Reaction
+from atwood.model.local.laws import LocalPart
 from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector, cross
 from atwood.topology.bodies import Body
 from atwood.topology.graph import Joint
 
-__all__ = ["InternalReactions", "internal_reaction_program"]
+__all__ = [
+    "InternalReactions",
+    "add_inertia",
+    "add_reactions",
+    "internal_reaction_program",
+    "multipliers_by_part",
+]
 
 
 @dataclass(frozen=True)
@@ -80,33 +87,58 @@ def _counted(torque_W: Vector, axis: int, space: Space) -> Scalar:
 
 def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:
     """Return inertia less all other forces, with the sign reversed, node by node."""
-    graph, kinematics, site = equations.graph, equations.kinematics, equations.site
+    site, kinematics = equations.site, equations.kinematics
     signals = resolve_signals(mechanism, site, kinematics)
-    forces = Forces(graph)
-    by_part: dict[str, list[tuple[str, int, Expression]]] = {}
-    for one in equations.constraints:
-        by_part.setdefault(one.key[0], []).append((one.key[1], one.key[2], one.multiplier))
-    pull = mechanism.space.components(mechanism.gravity)
+    forces = Forces(equations.graph)
+    multipliers = multipliers_by_part(equations)
     for path, local in mechanism.locals_.items():
         mapping = {**local_map(site, local, kinematics), **signals}
         part_forces(site, local, kinematics, mapping, forces)
-        for constraint in local.constraints:
-            for law, index, multiplier in by_part.get(path, ()):
-                if (law, index) == (constraint.law.name, constraint.index):
-                    held = in_coordinates(local, constraint, kinematics.placements)
-                    constraint_forces(site, local, held.value, multiplier, mapping, forces)
-        for inertia in local.point_inertias:
-            nodes = [site.node(path, p.name) for p in inertia.points]
-            for i, node in enumerate(nodes):
-                push = [graph.constant(0.0) for _ in pull]
-                for j, other in enumerate(nodes):
-                    lifted = zip(kinematics.accelerations[other], pull, strict=True)
-                    push = [p - inertia.masses[i][j] * (a - g) for p, (a, g) in zip(push, lifted, strict=True)]
-                forces.push(node, push)
-        for body in local.body_inertias:
-            node = equations.site.node(path, body.frame.name)
-            push_body(equations.site, kinematics, forces, path, body, (kinematics.accelerations[node], pull))
+        add_reactions(equations, local, multipliers, mapping, forces)
+        add_inertia(mechanism, equations, path, forces)
     return forces
+
+
+def multipliers_by_part(equations: Equations) -> dict[str, dict[tuple[str, int], Expression]]:
+    """Return the multipliers of each part by law and number."""
+    found: dict[str, dict[tuple[str, int], Expression]] = {}
+    for one in equations.constraints:
+        part, law, number = one.key
+        found.setdefault(part, {})[law, number] = one.multiplier
+    return found
+
+
+def add_reactions(
+    equations: Equations,
+    local: LocalPart,
+    multipliers: Mapping[str, Mapping[tuple[str, int], Expression]],
+    mapping: Mapping[Expression, Expression],
+    forces: Forces,
+) -> None:
+    """Add the forces of a part's constraints."""
+    own = multipliers.get(local.part.path, {})
+    for constraint in local.constraints:
+        multiplier = own.get((constraint.law.name, constraint.index))
+        if multiplier is not None:
+            held = in_coordinates(local, constraint, equations.kinematics.placements)
+            constraint_forces(equations.site, local, held.value, multiplier, mapping, forces)
+
+
+def add_inertia(mechanism: Mechanism, equations: Equations, path: str, forces: Forces) -> None:
+    """Add the inertia and the weight of a part, with the sign of forces that it exerts."""
+    graph, kinematics, site = equations.graph, equations.kinematics, equations.site
+    local, pull = mechanism.locals_[path], mechanism.space.components(mechanism.gravity)
+    for inertia in local.point_inertias:
+        nodes = [site.node(path, p.name) for p in inertia.points]
+        for i, node in enumerate(nodes):
+            push = [graph.constant(0.0) for _ in pull]
+            for j, other in enumerate(nodes):
+                lifted = zip(kinematics.accelerations[other], pull, strict=True)
+                push = [p - inertia.masses[i][j] * (a - g) for p, (a, g) in zip(push, lifted, strict=True)]
+            forces.push(node, push)
+    for body in local.body_inertias:
+        node = site.node(path, body.frame.name)
+        push_body(site, kinematics, forces, path, body, (kinematics.accelerations[node], pull))
 
 
 def _through(

@@ -20,6 +20,7 @@ from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.kept import Key
 from atwood.forms.places import internal_reactions_of, to_maximal
 from atwood.forms.program import BalanceProgram
+from atwood.late import dataclass
 from atwood.linalg.matrices import is_best_full
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.columns import masses_at
@@ -31,7 +32,7 @@ from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, 
 if TYPE_CHECKING:
     from atwood.simulation.dynamics.sparse_states import States
 
-__all__ = ["ReactionSolver", "accelerations_and_multipliers", "accelerations_at", "maximal_state"]
+__all__ = ["BalanceAlong", "ReactionSolver", "accelerations_and_multipliers", "accelerations_at", "maximal_state"]
 
 
 _CHUNK = 4_000_000
@@ -174,6 +175,27 @@ def _solved(
     return found_a, found_l
 
 
+@dataclass(frozen=True, eq=False)
+class BalanceAlong:
+    """The balance of forces at many states, in maximal coordinates; shapes (number, samples).
+
+    Attributes
+    ----------
+    coordinates, speeds, accelerations
+        The motion.
+    multipliers
+        Of all constraints; where these depend on each other, those of least size.
+    powers
+        What each constraint puts in, W: minus its multiplier times the explicit part of its rate.
+    """
+
+    coordinates: FloatArray
+    speeds: FloatArray
+    accelerations: FloatArray
+    multipliers: FloatArray
+    powers: FloatArray
+
+
 class ReactionSolver:
     """Reactions of one assembled mode.
 
@@ -208,13 +230,8 @@ class ReactionSolver:
 
     def at(self, t: FloatArray, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return all reactions, of shape (number, samples), and the power of constraints that move with time."""
-        assembly = self.assembly
-        big_q, big_u = maximal_state(assembly, t, q, u)
-        found = [
-            accelerations_and_multipliers(assembly, "dae", t[part], big_q[:, part], big_u[:, part], kept)
-            for part, kept in self._kept_along(self.finding, "dae", t, big_q)
-        ]
-        a, multipliers, explicit_rate = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
+        assembly, now = self.assembly, self.balance_along(t, q, u)
+        big_q, big_u, a, multipliers = now.coordinates, now.speeds, now.accelerations, now.multipliers
         values = np.zeros((len(assembly.reactions), len(t)))
         internal = None
         if self._internal_reactions is not None:
@@ -227,8 +244,17 @@ class ReactionSolver:
                 values[i] = internal[rows[reaction.path]] if internal is not None and reaction.path in rows else np.nan
             elif reaction.key in self._of_constraint:
                 values[i] = reaction.sign * multipliers[self._of_constraint[reaction.key]]
-        power = -np.sum(multipliers * explicit_rate, axis=0) if len(multipliers) else np.zeros(len(t))
-        return values, power
+        return values, np.sum(now.powers, axis=0) if len(multipliers) else np.zeros(len(t))
+
+    def balance_along(self, t: FloatArray, q: FloatArray, u: FloatArray) -> BalanceAlong:
+        """Return what balances the forces at many states, in maximal coordinates."""
+        big_q, big_u = maximal_state(self.assembly, t, q, u)
+        found = [
+            accelerations_and_multipliers(self.assembly, "dae", t[part], big_q[:, part], big_u[:, part], kept)
+            for part, kept in self._kept_along(self.finding, "dae", t, big_q)
+        ]
+        a, multipliers, explicit_rate = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
+        return BalanceAlong(big_q, big_u, a, multipliers, -multipliers * explicit_rate)
 
     def _kept_along(
         self, finding: RankFinding, form: FormName, t: FloatArray, q: FloatArray

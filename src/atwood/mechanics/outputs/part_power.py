@@ -1,0 +1,178 @@
+"""Energies and powers part by part: what each part has, takes in at its connectors, is given, and dissipates.
+
+A part exerts the force F on whatever is connected at a node that moves with v, and so takes in the power ``-F . v``
+there; its inertia is one of these forces (d'Alembert; Goldstein, section 1.4). What comes in through all of its
+connectors is the rate of its energy, but for what its laws add or remove.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Literal
+
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jvp, substitute
+from atwood.late import dataclass, replace
+from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
+from atwood.mechanics.outputs.internal_reactions import add_inertia, add_reactions, multipliers_by_part
+from atwood.mechanics.outputs.observables import part_energies
+from atwood.model.local.laws import LocalPart
+from atwood.model.local.moving_mass import inertial_energy
+
+__all__ = ["Flow", "PartPowers", "part_energy_program", "part_powers"]
+
+
+@dataclass(frozen=True)
+class Flow:
+    """What a row of a program is.
+
+    Attributes
+    ----------
+    kind
+        Power that a part takes in at a node, or at the coordinate of a joint; that its loads and whatever changes with
+        time supply; that its dampers dissipate.
+    part
+        Path of the part.
+    place
+        Number of the node; path of the coordinate; else empty.
+    """
+
+    kind: Literal["node", "coordinate", "supplied", "dissipated"]
+    part: str
+    place: int | str = ""
+
+
+@dataclass(frozen=True)
+class PartPowers:
+    """Program of (t, q, u, a, multipliers), in maximal coordinates, with a row for each flow, W."""
+
+    program: Program
+    flows: tuple[Flow, ...]
+
+
+def part_energy_program(mechanism: Mechanism, equations: Equations, parameters: Collection[Expression]) -> Program:
+    """Return the program of (t, q, u) that gives kinetic and potential energy of each part in turn, J.
+
+    Parameters
+    ----------
+    mechanism, equations
+        The mechanism, and its equations in maximal coordinates.
+    parameters
+        The symbols of parameters.
+    """
+    signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
+    values = [x for path in mechanism.locals_ for x in part_energies(mechanism, equations, path, signals)]
+    return Program("energies by part", _inputs(equations)[:3], tuple(parameters), (OutputGroup("e", tuple(values)),))
+
+
+def part_powers(
+    mechanism: Mechanism, equations: Equations, parameters: Collection[Expression], of_impulses: bool = False
+) -> PartPowers:
+    """Return the program of all powers, part by part.
+
+    Parameters
+    ----------
+    mechanism, equations, parameters
+        See `part_energy_program`.
+    of_impulses
+        Whether to take inertia and constraints alone, which is all that acts in an impact.
+    """
+    signals = resolve_signals(mechanism, equations.site, equations.kinematics)
+    multipliers = multipliers_by_part(equations)
+    found: dict[Flow, Expression] = {}
+    for path, local in mechanism.locals_.items():
+        mapping = {**local_map(equations.site, local, equations.kinematics), **signals}
+        laws, loaded, damped = _by_kind(local)
+        total = Forces(equations.graph)
+        add_inertia(mechanism, equations, path, total)
+        add_reactions(equations, local, multipliers, mapping, total)
+        if of_impulses:
+            part_forces(equations.site, replace(laws, potentials=()), equations.kinematics, mapping, total)
+        else:
+            part_forces(equations.site, laws, equations.kinematics, mapping, total)
+            for flow, some, sign in ((Flow("supplied", path), loaded, 1.0), (Flow("dissipated", path), damped, -1.0)):
+                alone = Forces(equations.graph)
+                part_forces(equations.site, some, equations.kinematics, mapping, alone)
+                for power in _given_at(equations, path, alone).values():
+                    _add(found, flow, power * sign)
+                part_forces(equations.site, some, equations.kinematics, mapping, total)
+            _add(found, Flow("supplied", path), _explicit_rate(mechanism, equations, local, mapping, signals))
+        for flow, power in _given_at(equations, path, total).items():
+            _add(found, flow, -power)
+    kept = {flow: value for flow, value in found.items() if not value.is_zero}
+    outputs = (OutputGroup("p", tuple(kept.values())),)
+    return PartPowers(Program("powers by part", _inputs(equations), tuple(parameters), outputs), tuple(kept))
+
+
+def _inputs(equations: Equations) -> tuple[InputGroup, ...]:
+    return (
+        InputGroup("t", (equations.time,)),
+        InputGroup("q", equations.coordinates),
+        InputGroup("u", equations.speeds),
+        InputGroup("a", equations.accelerations),
+        InputGroup("multipliers", equations.multipliers),
+    )
+
+
+def _add(found: dict[Flow, Expression], flow: Flow, power: Expression) -> None:
+    held = found.get(flow)
+    found[flow] = power if held is None else held + power
+
+
+def _by_kind(local: LocalPart) -> tuple[LocalPart, LocalPart, LocalPart]:
+    """Return a part with its potentials and Lagrangians alone, with its loads alone, and with its dampers alone."""
+    loads: list[Expression] = []
+    dampers: list[Expression] = []
+    for value in local.dissipations:  # loads on joint coordinates are among them
+        (loads if depends_on(value, list(local.stand_ins)) else dampers).append(value)
+    none = replace(local, potentials=(), lagrangians=(), dissipations=(), loads=())
+    return (
+        replace(none, potentials=local.potentials, lagrangians=local.lagrangians),
+        replace(none, dissipations=tuple(loads), loads=local.loads),
+        replace(none, dissipations=tuple(dampers)),
+    )
+
+
+def _given_at(equations: Equations, path: str, forces: Forces) -> dict[Flow, Expression]:
+    """Return the power that forces of a part give to each node and joint coordinate."""
+    kinematics, found = equations.kinematics, dict[Flow, Expression]()
+    for node, force in forces.on_nodes.items():
+        for f, v in zip(force, kinematics.velocities[node], strict=True):
+            _add(found, Flow("node", path, node), f * v)
+    for node, torque in forces.at_nodes.items():
+        spin: Sequence[Expression] = kinematics.angular_velocities.get(equations.site.bodies.body_of[node], ())
+        for c, w in zip(torque, spin, strict=False):
+            _add(found, Flow("node", path, node), c * w)
+    for symbol, force_on_joint in forces.on_joints.items():
+        _add(found, Flow("coordinate", path, symbol.name), force_on_joint * kinematics.joint_rates[symbol])
+    return found
+
+
+def _explicit_rate(
+    mechanism: Mechanism,
+    equations: Equations,
+    local: LocalPart,
+    mapping: Mapping[Expression, Expression],
+    signals: Mapping[Expression, Expression],
+) -> Expression:
+    """Return how fast the energy of a part changes while nothing moves, W: with time, linked inputs and states."""
+    graph, kinematics = equations.graph, equations.kinematics
+    changing = [*local.potentials, *(-value for value in local.lagrangians)]
+    space = mechanism.space.name
+    changing += [graph.convert(inertial_energy(one, mechanism.gravity, space)) for one in local.varying]
+    placed, _ = in_joint_coordinates(local, kinematics, changing)
+    total = graph.constant(0.0)
+    if not placed:
+        return total
+    course: dict[Expression, Expression | float] = {mechanism.time: 1.0}
+    course.update(zip(equations.coordinates, equations.rates, strict=True))
+    course.update(zip(equations.speeds, equations.accelerations, strict=True))
+    directions: dict[Expression, Expression | float] = {mechanism.time: 1.0}
+    directions.update((one.symbol, course[one.symbol]) for one in local.states if one.symbol in course)
+    for symbol in local.signal_symbols.values():
+        if symbol in signals and depends_on(graph.convert(sum(placed)), [symbol]):
+            directions[symbol] = jvp([signals[symbol]], course)[0]
+    for slope in jvp(placed, directions):
+        total = total + substitute([slope], mapping)[0]
+    return total
