@@ -28,6 +28,7 @@ import numpy as np
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, atan2, cos, depends_on, evaluate, hypot, jacobian, jvp, sin, sqrt, substitute
 from atwood.forms.loops.branches import ClosedLoops, Group, Heading, Place
+from atwood.forms.loops.constraint_shapes import ConstraintShapes
 from atwood.forms.loops.harmonics import at, harmonics, sum_of_waves, waves_of
 from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.dynamics.equations import Equations
@@ -70,6 +71,7 @@ class Loops:
         self.joints: dict[tuple[str, str], list[int]] = {}
         for k, one in enumerate(equations.constraints):
             self.joints.setdefault(one.key[:2], []).append(k)
+        self.shapes = ConstraintShapes(self.values, self.q, place, self.elsewhere[0])
         self._number = 0
         self._known: dict[tuple[tuple[int, ...], tuple[int, ...]], Group | None] = {}
 
@@ -151,6 +153,8 @@ class Loops:
 
     def _one(self, k: int, number: int) -> Group | None:
         g, x, along = self.values[k], self.q[number], ((self.graph.one,),)
+        if not self.shapes.may_be((k,), {number: self.is_angle[number]}):
+            return None
         if not self.is_angle[number]:
             (constant,), (rate,) = at([g], {x: 0.0}), at(jvp([g], {x: 1.0}), {x: 0.0})
             places = {x: -(constant / rate)} if not rate.is_zero else {}
@@ -172,8 +176,11 @@ class Loops:
         angles = self.is_angle[i], self.is_angle[j]
         if all(angles):
             ways = ((i, j, 0.0), (i, j, 1.0), (i, j, -1.0), (j, i, 1.0), (j, i, -1.0))
-            found = (self._two_links(ks, *way) for way in ways)
+            fitting = (way for way in ways if self.shapes.may_be(ks, {way[0]: True, way[1]: True}, nested=way[2]))
+            found = (self._two_links(ks, *way) for way in fitting)
             return next((one for one in found if one is not None), None)
+        if not self.shapes.may_be(ks, {i: angles[0], j: angles[1]}):
+            return None
         if any(angles):
             return self._link_and_slide(ks, *((i, j) if angles[0] else (j, i)))
         return self._two_slides(ks, i, j)

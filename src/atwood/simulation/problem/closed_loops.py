@@ -61,6 +61,9 @@ _LEAVE = 0.25
 CLEAR = 0.003
 """A choice of which so much is left in a whole turn meets no dead centre."""
 
+_AMPLE = 0.5
+"""Of several independent coordinates, among which none turns fully for all others, a choice so far is good enough."""
+
 _MOST = 60
 """More choices of independent coordinates are not tried."""
 
@@ -276,7 +279,7 @@ def _solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | No
             continue
         if best is None or found.margin > best.margin:
             best = found
-        if found.least:
+        if found.least or (len(independent) > 1 and found.margin > _AMPLE):
             return found
     return best
 
