@@ -89,8 +89,11 @@ class Lookout:
         The flag of `fill` where it has taken as many steps as were allowed, and read what lies in the last of them.
     data
         Their own data.
-    due
-        When the next look is to be taken.
+    due, due_at
+        When the next look is to be taken, and the address of that time.
+    look
+        Address of ``int (double t, double *y, double *yp, data)``: takes one look, and returns whether somebody else
+        should.
     keep
         Whatever must live as long as the addresses are used.
     """
@@ -101,4 +104,6 @@ class Lookout:
     paused: int
     data: int
     due: Callable[[], float]
+    due_at: int = 0
+    look: int = 0
     keep: object = None

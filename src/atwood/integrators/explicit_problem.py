@@ -14,6 +14,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from atwood.errors import KernelEvaluationError, UsageError
+from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import State
 from atwood.integrators.protocol import FloatArray, SolverOptions, Values
 from atwood.late import dataclass
@@ -22,6 +23,8 @@ __all__ = [
     "CALM",
     "EDGE",
     "LOOSEST",
+    "MET",
+    "STEPS",
     "STIFF",
     "CompiledEvents",
     "CompiledRates",
@@ -32,6 +35,7 @@ __all__ = [
     "Outcome",
     "RenewedStepper",
     "Stepper",
+    "WatchedStepper",
     "absolute_tolerances",
     "first_step",
     "no_interpolation",
@@ -40,6 +44,12 @@ __all__ = [
 
 EDGE = 6.1
 """Where the method stops being stable: the largest product of a step and a rate of decay."""
+
+MET = 1e-8
+"""A step of Newton's method that moves nothing by more of its size leaves misses of the square of that: rounding."""
+
+STEPS = 6
+"""So many of these are tried; at the end of a step that is good enough one or two are needed."""
 
 STIFF, CALM = 15, 6
 """So many steps at the edge of stability, with fewer than so many others in a row between, are a stiff problem."""
@@ -58,11 +68,16 @@ class CompiledRates:
         Its last argument.
     keep
         Whatever must live as long as the addresses are used.
+    project, project_data
+        The address of ``int (double t, double *y, void *data)``, which takes values onto the constraints and returns
+        0, or another number where it cannot, and its last argument; 0 where there are no constraints.
     """
 
     function: int
     data: int = 0
     keep: object = None
+    project: int = 0
+    project_data: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +132,9 @@ class ExplicitProblem:
         ``compiled()``: a compiled form of `rates`.  Each session asks once, and must not share it with another one.
     compiled_events
         ``compiled_events()``: the same for `events`, if there is one.
+    project
+        ``project(t, y)``: the values nearest to these that meet the constraints, with which steps end; None where there
+        are none.
     """
 
     size: int
@@ -127,6 +145,7 @@ class ExplicitProblem:
     event_rough: tuple[int, ...] = ()
     compiled: Callable[[], CompiledRates] | None = None
     compiled_events: Callable[[], CompiledEvents | None] | None = None
+    project: Callable[[float, FloatArray], Values] | None = None
 
     def __post_init__(self) -> None:
         if self.size < 1:
@@ -192,6 +211,19 @@ class HeedingStepper(Protocol):
 
     def heed_stiffness(self) -> None:
         """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
+        ...
+
+
+@runtime_checkable
+class WatchedStepper(Protocol):
+    """What a stepper has in addition if it can let the motion be looked at on its way."""
+
+    def look_out(self, lookout: Lookout) -> None:
+        """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
+        ...
+
+    def has_seen(self) -> bool:
+        """Return whether something was seen since this was last asked."""
         ...
 
 

@@ -15,6 +15,7 @@ from typing import Literal, Protocol, cast, runtime_checkable
 import numpy as np
 
 from atwood.errors import KernelEvaluationError, StartError, UsageError
+from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import ROUNDING, EventLocator, Root, State
 from atwood.integrators.explicit_problem import (
     EventStepper,
@@ -24,6 +25,7 @@ from atwood.integrators.explicit_problem import (
     Outcome,
     RenewedStepper,
     Stepper,
+    WatchedStepper,
 )
 from atwood.integrators.protocol import (
     Budget,
@@ -140,6 +142,7 @@ class ExplicitSession:
         if leave is not None and _has(type(stepper), HeedingStepper):
             cast("HeedingStepper", stepper).heed_stiffness()
         self._no_events = (0,) * problem.event_count
+        self._watched: WatchedStepper | None = None
         self._chunk = max(1, FIRST_CHUNK // problem.size)
         self._begin(t, y, budget, leave, end)
 
@@ -189,6 +192,14 @@ class ExplicitSession:
         self._watch(horizon)
         self._begin(t, y, budget, leave, end)
 
+    def look_out(self, lookout: Lookout) -> bool:
+        """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""
+        if not _has(type(self._stepper), WatchedStepper):
+            return False
+        self._watched = cast("WatchedStepper", self._stepper)
+        self._watched.look_out(lookout)
+        return True
+
     @staticmethod
     def _event_stepper(problem: ExplicitProblem, stepper: Stepper) -> EventStepper | None:
         """Let the stepper look for events by itself, if it can."""
@@ -217,6 +228,11 @@ class ExplicitSession:
         )
 
     @property
+    def here(self) -> StepResult:
+        """The state that was handed out last."""
+        return StepResult(*_copied(self._here), Status.REACHED, self._no_events)
+
+    @property
     def seems_stiff(self) -> bool:
         """Whether stability, and not accuracy, has kept steps short: an implicit method would take far fewer."""
         return self._stepper.counts.stiff > 0
@@ -241,7 +257,7 @@ class ExplicitSession:
         self._root: Root | None = None
         self._searched = self._here[0]
         self._stalled = 0
-        self._broken = False
+        self._broken = self._sees = False
         self._starts += 1
 
     def advance(self, t_out: float) -> StepResult:
@@ -325,7 +341,7 @@ class ExplicitSession:
                 else:
                     count, outcome = self._fill(times[filled:], values[filled:], rates[filled:])
                     filled += count
-                if outcome is Outcome.TOO_SMALL:
+                if outcome is Outcome.TOO_SMALL or self._sees:
                     break
         except KeyboardInterrupt:
             self._broken = True
@@ -370,6 +386,7 @@ class ExplicitSession:
         """Take up where the stepper came to, and up to where nothing has happened for certain."""
         before = self._newest[0]
         self._newest = self._stepper.state()
+        self._sees = self._sees or (self._watched is not None and self._watched.has_seen())
         if self._locator is None:
             self._searched = self._newest[0]
         elif self._notices is not None and self._newest[0] > before and not self._locator.is_settling:
@@ -385,6 +402,10 @@ class ExplicitSession:
                 self._root = None
                 self._here = root.state
                 return StepResult(*_copied(root.state), Status.EVENT, root.events)
+            if self._sees:
+                self._sees = False
+                self._here = self._newest if t_out >= self._newest[0] else self._stepper.interpolate(t_out)
+                return StepResult(*_copied(self._here), Status.NOTICED, self._no_events)
             if t_out <= self._newest[0]:
                 self._here = self._newest if t_out == self._newest[0] else self._stepper.interpolate(t_out)
                 return StepResult(*_copied(self._here), Status.REACHED, self._no_events)

@@ -79,12 +79,15 @@ class LookoutCode:
         ``IDAGetNumSteps``. It returns `NOTICED`, or IDA's flag.
     fill
         See `~atwood.integrators.compiled_functions.Lookout`. It returns the same, or `PAUSED` or `UNREADABLE`.
+    look_address
+        Address of the function that takes one look; see the same.
     """
 
     def __init__(self, program: Program, shape: Shape, built: Built) -> None:
         self.program, self.shape, self.built = program, shape, built
         self.drive, self.fill = (built.code.addresses[name] for name in ("drive", "fill"))
-        self.look = _LOOK(built.code.addresses["look"])
+        self.look_address = built.code.addresses["look"]
+        self.look = _LOOK(self.look_address)
 
     def bind(self, parameter_values: ArrayLike, sizes: ArrayLike, kept: Sequence[int], pace: Pace) -> LookoutData:
         """Return the data of one run; they must live as long as it goes on.
@@ -172,6 +175,11 @@ class LookoutData:
     def due(self) -> float:
         """Return when the next look is to be taken."""
         return float(self._state[AT["next"]])
+
+    @property
+    def due_at(self) -> int:
+        """The address of that time."""
+        return self._state.ctypes.data + 8 * AT["next"]
 
     @property
     def has_seen_low(self) -> bool:

@@ -6,6 +6,7 @@ it knows of a problem comes in through pointers, so that it is compiled once and
 
 from __future__ import annotations
 
+from atwood.integrators.dop853.constraint_code import project_code, watch_code
 from atwood.integrators.dop853.layout import COUNTS, NUMBERS, POINTERS, prologue
 from atwood.integrators.dop853.reference import GROWTH, RETREAT, SAFETY, SHRINKAGE
 from atwood.integrators.dop853.start_code import begin_code
@@ -58,7 +59,8 @@ def _run() -> str:
     """Return the function that takes steps.
 
     It ends with 0 at the stop time, 1 at the limit of steps, 2 if steps get too small, and with 5 after a step in which
-    an event may have happened, or after which the problem seems stiff and that is heeded.
+    an event may have happened, after which the problem seems stiff and that is heeded, or in which something was seen
+    by what watches the motion.
     """
     return f"""define i32 @run(ptr %session) #0 {{
 entry:
@@ -78,6 +80,10 @@ going:
   %used = icmp sge i64 %steps, %limit
   br i1 %used, label %return1, label %begin
 begin:
+  %left = call i32 @watched(ptr %session, double %t)
+  %is_left = icmp ne i32 %left, 0
+  br i1 %is_left, label %return5, label %set_out
+set_out:
   call void @shift(ptr %arrays, i64 %m)
   store i64 0, ptr %is_dense.at
   %first = load double, ptr %next.at
@@ -140,8 +146,8 @@ nothing:
 def _attempt() -> str:
     """Return the instructions that try steps until one is good enough."""
     return f"""attempt:
-  %wanted = phi double [ %first, %begin ], [ %shorter, %again ]
-  %rejected = phi i1 [ false, %begin ], [ true, %again ]
+  %wanted = phi double [ %first, %set_out ], [ %shorter, %again ]
+  %rejected = phi i1 [ false, %set_out ], [ true, %again ]
   %long = fcmp olt double %wanted, %longest
   %h = select i1 %long, double %wanted, double %longest
   %moves = fcmp ogt double %h, %least
@@ -172,6 +178,10 @@ judge:
   br i1 %finite, label %reject, label %retreat
 last:
   %t_new = fadd double %t, %h
+  %p12 = call i32 @held(ptr %session, double %t_new)
+  %meets = icmp eq i32 %p12, 0
+  br i1 %meets, label %renew, label %retreat
+renew:
   %e12 = call i32 @evaluate(ptr %session, double %t_new, i64 {ROWS["trial"]}, i64 12)
   %ok12 = icmp eq i32 %e12, 0
   br i1 %ok12, label %accept, label %retreat
@@ -215,12 +225,15 @@ def _acceptance() -> str:
   store i64 %stepped, ptr %steps.at
 {_stability()}
   call void @accept(ptr %arrays, i64 %m)
+  %watched = call i32 @watched(ptr %session, double %t_new)
   %look = call i32 @look(ptr %session, double %t_new)
   %happens = icmp ne i32 %look, 0
   %heeding = load i64, ptr %heeds.at
   %is_heeding = icmp ne i64 %heeding, 0
   %stiffens = and i1 %found, %is_heeding
-  %is_noted = or i1 %happens, %stiffens
+  %is_seen = icmp ne i32 %watched, 0
+  %is_event = or i1 %happens, %stiffens
+  %is_noted = or i1 %is_event, %is_seen
   br i1 %is_noted, label %return5, label %step"""
 
 
@@ -253,6 +266,28 @@ def _stability() -> str:
   store i64 %edgy.new, ptr %edgy.at"""
 
 
+def _densify() -> str:
+    """Return the function that makes the dense output of the last step, unless it is there; 1 where there is none."""
+    return f"""define internal i32 @densify(ptr %session) #0 {{
+entry:
+{prologue()}
+  %known = load i64, ptr %is_dense.at
+  %ready = icmp ne i64 %known, 0
+  br i1 %ready, label %done, label %more
+more:
+  %t = load double, ptr %t_old.at
+  %h = load double, ptr %h.at
+{_evaluations((13, 14, 15), "failed")}
+  call void @dense(ptr %arrays, i64 %m, double %h)
+  store i64 1, ptr %is_dense.at
+  ret i32 0
+done:
+  ret i32 0
+failed:
+  ret i32 1
+}}"""
+
+
 def _interpolate() -> str:
     """Return the function that writes values and rates at a time within the last step; 3 where there are none."""
     return f"""define i32 @interpolate(ptr %session, double %time, ptr %y_out, ptr %yp_out) #0 {{
@@ -276,14 +311,9 @@ at_end:
   call void @llvm.memcpy.p0.p0.i64(ptr %yp_out, ptr %end.slope, i64 %bytes, i1 false)
   ret i32 0
 inside:
-  %known = load i64, ptr %is_dense.at
-  %ready = icmp ne i64 %known, 0
-  br i1 %ready, label %value, label %more
-more:
-{_evaluations((13, 14, 15), "failed")}
-  call void @dense(ptr %arrays, i64 %m, double %h)
-  store i64 1, ptr %is_dense.at
-  br label %value
+  %lacks = call i32 @densify(ptr %session)
+  %is_dense = icmp eq i32 %lacks, 0
+  br i1 %is_dense, label %value, label %failed
 value:
   %since = fsub double %time, %t
   %x = fdiv double %since, %h
@@ -313,7 +343,10 @@ def step_code() -> str:
         _evaluate(),
         begin_code(),
         _look(),
+        project_code(),
+        watch_code(),
         _run(),
+        _densify(),
         _interpolate(),
         sample_code("%session", prologue(), "%n"),
     ]

@@ -6,7 +6,7 @@ from atwood.integrators.machine_text import unpack
 
 __all__ = ["COUNTS", "NUMBERS", "POINTERS", "prologue"]
 
-NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first")
+NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked")
 COUNTS = (
     "size",
     "padded",
@@ -22,8 +22,24 @@ COUNTS = (
     "calm",
     "event_count",
     "heeds",
+    "seen",
 )
-POINTERS = ("function", "data", "numbers", "counts", "arrays", "events", "events_data", "values", "signs")
+POINTERS = (
+    "function",
+    "data",
+    "numbers",
+    "counts",
+    "arrays",
+    "events",
+    "events_data",
+    "values",
+    "signs",
+    "project",
+    "project_data",
+    "watch",
+    "watch_data",
+    "due",
+)
 
 
 def prologue() -> str:

@@ -21,6 +21,7 @@ from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.once import once
 from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.expr import Program
+from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.dop853.code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
 from atwood.integrators.dop853.stepping_code import ROWS
 from atwood.integrators.event_location import State
@@ -40,7 +41,7 @@ from atwood.late import dataclass, names_of
 if TYPE_CHECKING:
     from atwood.integrators.ensemble.batch import BatchPlaces
 
-__all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates"]
+__all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates", "rates_code"]
 
 _RATES = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
 _UNLIMITED = 2**62
@@ -68,7 +69,7 @@ class CompiledAccelerations:
         part = Part("kernel", program)
         _, q, u = (len(group.symbols) for group in program.inputs)
         self.program, self.size = program, q + u
-        more = _rates_code(q, u, given=len(program.outputs) == 2)
+        more = rates_code(q, u, given=len(program.outputs) == 2)
         self._built = build_code([part], default_options([part]), more=more, exports=["rates"])
         self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
 
@@ -164,6 +165,7 @@ class CompiledStepper:
         self._numbers[_LONGEST] = options.max_step or inf
         self._numbers[_HORIZON], self._numbers[_FIRST] = options.horizon, options.first_step or 0.0
         self._pointers[:5] = rates.function, rates.data, base + 8 * ends[0], base + 8 * ends[1], base
+        self._pointers[_PROJECT : _PROJECT + 2] = rates.project, rates.project_data
         self._session = c_void_p(base + 8 * ends[2])
         self._places = c_void_p(base + 8 * ends[3]), c_void_p(base + 8 * ends[4])
         self._run, self._interpolate, self._sample, self._begin = functions()
@@ -194,6 +196,16 @@ class CompiledStepper:
     def expect(self, signs: FloatArray) -> None:
         """Say which sign each event has; where it is zero, every step is noticed."""
         self._signs[:] = signs
+
+    def look_out(self, lookout: Lookout) -> None:
+        """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
+        self._keep = (self._keep, lookout)
+        self._pointers[_WATCH : _WATCH + 3] = lookout.look, lookout.data, lookout.due_at
+
+    def has_seen(self) -> bool:
+        """Return whether something was seen since this was last asked."""
+        seen, self._counts[_SEEN] = bool(self._counts[_SEEN]), 0
+        return seen
 
     def limit_steps(self, longest: float) -> None:
         """Take no longer steps from now on than this, nor than the options allow."""
@@ -284,7 +296,8 @@ _COUNTED = len(names_of(Counts))
 _T, _STOP, _R, _LONGEST, _HORIZON, _FIRST = map(NUMBERS.index, ("t", "stop", "relative", "longest", "horizon", "first"))
 _T_OLD = NUMBERS.index("t_old")
 _LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
-_EVENTS, _HEEDS = map(COUNTS.index, ("event_count", "heeds"))
+_EVENTS, _HEEDS, _SEEN = map(COUNTS.index, ("event_count", "heeds", "seen"))
+_PROJECT, _WATCH = map(POINTERS.index, ("project", "watch"))
 
 
 @once
@@ -306,7 +319,7 @@ def functions() -> tuple[Callable[..., int], ...]:
     return tuple(ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items())
 
 
-def _rates_code(coordinates: int, speeds: int, given: bool) -> str:
+def rates_code(coordinates: int, speeds: int, given: bool) -> str:
     """Return the function that gives ``(q', u')`` from ``(q, u)``; its data: derived values and scratch.
 
     Parameters

@@ -78,6 +78,7 @@ class ReferenceStepper:
 
     def __init__(self, problem: ExplicitProblem, options: SolverOptions) -> None:
         self._rates, self._size, self._options = problem.rates, problem.size, options
+        self._project = problem.project
         self._absolute = absolute_tolerances(options, problem.size)
         self._longest = options.max_step or inf
         self._counts = Counts()
@@ -176,6 +177,7 @@ class ReferenceStepper:
                 return False
             error, new = self._attempt(h)
             if error <= 1.0:
+                new = self._held(t + h, new)
                 slope = self._slope(t + h, new)
                 if np.isfinite(slope).all():
                     break
@@ -191,6 +193,15 @@ class ReferenceStepper:
         self._y_old, self._y = y, new
         self._counts.steps += 1
         return True
+
+    def _held(self, t: float, y: FloatArray) -> FloatArray:
+        """Return values at the end of a step on the constraints; nan where these cannot be met."""
+        if self._project is None:
+            return y
+        try:
+            return np.asarray(self._project(t, y), dtype=np.float64)
+        except (KernelEvaluationError, ArithmeticError):
+            return np.full(self._size, np.nan)
 
     def _attempt(self, h: float) -> tuple[float, FloatArray]:
         """Try a step; return its error in units of what is allowed, nan where it has no value, and the new values."""

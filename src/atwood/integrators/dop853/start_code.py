@@ -19,6 +19,7 @@ entry:
 {prologue()}
   store double %t, ptr %t.at
   store double %t, ptr %t_old.at
+  store double %t, ptr %looked.at
   store i64 0, ptr %edgy.at
   store i64 0, ptr %calm.at
   %bytes = mul i64 %n, 8

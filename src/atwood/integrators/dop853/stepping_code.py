@@ -184,6 +184,27 @@ def _polynomial() -> str:
     return loop.function("polynomial", ", double %x", start="  %rest = fsub double 1.0, %x\n")
 
 
+def _slope() -> str:
+    """Return the function that writes the slope of the cubic through both ends of a step, at a share of it."""
+    loop = _Loop()
+    step = loop.binary("fsub", loop.load(ROWS["y"]), loop.load(ROWS["y_old"]))
+    total = loop.binary("fmul", step, loop.spread("%both"))
+    for row, name in ((0, "%begin"), (12, "%end")):
+        total = loop.binary("fadd", total, loop.binary("fmul", loop.load(row), loop.spread(name)))
+    loop.store(total, ROWS["last"])
+    start = """  %rest = fsub double 1.0, %x
+  %product = fmul double %x, %rest
+  %six = fmul double %product, 6.0
+  %both = fdiv double %six, %h
+  %thrice = fmul double %x, 3.0
+  %left = fsub double 1.0, %thrice
+  %begin = fmul double %rest, %left
+  %past = fsub double %thrice, 2.0
+  %end = fmul double %x, %past
+"""
+    return loop.function("slope", ", double %x, double %h", start=start)
+
+
 def loop_code() -> str:
     """Return the functions; each takes the table and the length of its rows."""
     parts = [_stage(stage) for stage in range(1, 16)]
@@ -192,7 +213,7 @@ def loop_code() -> str:
     parts += [_size("size0", ROWS["y"]), _size("size1", 12), _size("size2", 1, 12), _euler()]
     parts += [_copy("shift", {12: 0}), _copy("unshift", {0: 12})]
     parts += [_copy("accept", {ROWS["y"]: ROWS["y_old"], ROWS["trial"]: ROWS["y"]})]
-    parts += [_dense(), _polynomial()]
+    parts += [_dense(), _polynomial(), _slope()]
     parts += [
         f"declare {_VECTOR} @llvm.fabs.v{WIDTH}f64({_VECTOR})",
         f"declare double @llvm.vector.reduce.fadd.v{WIDTH}f64(double, {_VECTOR})",

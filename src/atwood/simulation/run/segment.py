@@ -11,7 +11,7 @@ import numpy as np
 
 from atwood.clock import TimeIsUp, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
-from atwood.integrators.explicit_session import SamplingSession
+from atwood.integrators.explicit_session import ExplicitSession, SamplingSession
 from atwood.integrators.protocol import Budget, FloatArray, ReadingSession, Session, Statistics, Status, StepResult
 from atwood.late import replace
 from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
@@ -22,6 +22,7 @@ from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.dynamics.undefined_values import find_undefined_value, states_ahead
 from atwood.simulation.events.modes import EventRecord
 from atwood.simulation.problem.preparation import pack_state
+from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import dead_centre, stiffness_of, turned_stiff
 from atwood.simulation.run.nothing_free import follow
@@ -70,9 +71,12 @@ def _first_state(segment: Segment, t: float, q: FloatArray, u: FloatArray) -> tu
     """Return the start of a segment for a solver; explicit methods work out the rates themselves."""
     if not len(q):
         return np.zeros(0), np.zeros(0)
-    if segment.choice.solver.startswith("ida"):
-        return pack_state(segment.plan, t, q, u)
-    return np.concatenate([q, u]), np.zeros(0)
+    return _state_for(segment.choice.solver, segment.plan, t, q, u)
+
+
+def _state_for(solver: str, plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a state for a solver: with multipliers and rates for IDA alone."""
+    return pack_state(plan, t, q, u) if solver.startswith("ida") else (np.concatenate([q, u]), np.zeros(0))
 
 
 class _Runner:
@@ -94,8 +98,9 @@ class _Runner:
         try:
             session = self._open(t, y, yp)
             while True:
-                if isinstance(session, SamplingSession):
-                    done, step_result = self._sample(session, done)
+                if isinstance(session, SamplingSession) and (self.monitor is None or self.monitor.next == np.inf):
+                    done, step_result = self._sample_watched(session, done)
+                    session = self.session or session
                 else:
                     done, step_result = self._advance(session, done)
                     session = self.session or session
@@ -243,7 +248,20 @@ class _Runner:
             except StartError:
                 pack_state(segment.plan, t, *segment.plan.program.split(y))  # says what has no value, if it can
                 raise
+            self._watch(self.session)
         return self.session
+
+    def _watch(self, session: Session) -> None:
+        """Look out for singular positions where an explicit method goes on with constraints."""
+        if not (isinstance(session, ExplicitSession) and self.segment.plan.balance.constraints):
+            return
+        from atwood.simulation.singular.monitor import singularity_monitor_of
+
+        segment = self.segment
+        monitor = singularity_monitor_of(segment.plan, segment.options.relative_tolerance, segment.end, session.here)
+        self.monitor = monitor
+        if monitor is not None and not (monitor.lookout is not None and session.look_out(monitor.lookout)):
+            monitor.look_in_python()
 
     def _is_stiff(self, t: float, y: FloatArray) -> bool:
         plan = self.segment.plan
@@ -286,6 +304,38 @@ class _Runner:
                 progress(float(times[-1]))
         return done, None
 
+    def _sample_watched(self, session: SamplingSession, done: int) -> tuple[int, StepResult | None]:
+        """Let an explicit method fill tables, with looks at the motion where constraints stay."""
+        while True:
+            done, step_result = self._sample(session, done)
+            monitor = self.monitor
+            if monitor is None:
+                return done, step_result
+            assert isinstance(session, ExplicitSession)
+            here, at_end = step_result or session.here, step_result is None
+            noticed = here.status is Status.NOTICED
+            turned = self._turned(here) if noticed else None
+            crossing = monitor.look(here, noticed, at_end or turned is not None)
+            if crossing is not None:
+                done, stopped = self._pass_over(session, crossing)
+                if stopped is not None:
+                    return done, stopped
+                continue
+            self._note_crossings(monitor)
+            if turned is not None:
+                session = cast("SamplingSession", self._keep(turned, here))
+            elif not noticed:
+                return done, step_result
+
+    def _note_crossings(self, monitor: SingularityMonitor) -> None:
+        """Take crossings that the solver made by itself into the record."""
+        if monitor.agreed:
+            self.recorder.note(monitor.agreed)
+            for one in monitor.agreed:
+                if one.path is None:
+                    warnings.warn(one.describe(), stacklevel=2)
+            monitor.agreed.clear()
+
     def _advance(self, session: Session, done: int) -> tuple[int, StepResult | None]:
         """Go from sample to sample; return how many are done, and why it stopped early."""
         segment, recorder, progress = self.segment, self.recorder, self.segment.options.progress
@@ -312,12 +362,8 @@ class _Runner:
                 if stopped is not None:
                     return done, stopped
                 continue
-            if monitor is not None and monitor.agreed:
-                recorder.note(monitor.agreed)
-                for one in monitor.agreed:
-                    if one.path is None:
-                        warnings.warn(one.describe(), stacklevel=2)
-                monitor.agreed.clear()
+            if monitor is not None:
+                self._note_crossings(monitor)
             if step_result.status not in (Status.REACHED, Status.NOTICED):
                 return done, step_result
             if back is not None:
@@ -375,10 +421,12 @@ class _Runner:
             q, u, _ = (one[:, 0] for one in path.at(np.array([path.end])))
             q, u = project_safely(plan, path.end, q, u)
             plan.review_partitioning(path.end, q)
-            y, yp = pack_state(plan, path.end, q, u)
-            session.reinitialize(path.end, y, yp)
+            session.reinitialize(path.end, *self._packed(path.end, q, u))
             assert self.monitor is not None
-            behind = StepResult(path.end, y, yp, Status.REACHED)
+            if isinstance(session, ExplicitSession):
+                behind = session.here
+            else:
+                behind = StepResult(path.end, *self._packed(path.end, q, u), Status.REACHED)
             self.monitor.restart(behind, is_behind=True)
             if self.way_back is not None:
                 self.way_back.begin_again(behind)
@@ -388,7 +436,7 @@ class _Runner:
         """After a failure, go on with other dependent coordinates if those were a poor choice."""
         plan = self.segment.plan
         q, u = (part.copy() for part in plan.program.split(step_result.y))
-        if not plan.review_partitioning(step_result.t, q):
+        if not self.choices[-1].solver.startswith("ida") or not plan.review_partitioning(step_result.t, q):
             return False
         q, u = plan.balance.project(step_result.t, q, u, plan.sizes)
         session.reinitialize(step_result.t, *pack_state(plan, step_result.t, q, u))
@@ -409,7 +457,11 @@ class _Runner:
             q, u = project_safely(plan, step_result.t, q, u)
         self.before, self.session = self._cost(), None
         plan.keep(finding, step_result.t, q)
-        return self._open(step_result.t, *pack_state(plan, step_result.t, q, u))
+        return self._open(step_result.t, *self._packed(step_result.t, q, u))
+
+    def _packed(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return a state for the present solver."""
+        return _state_for(self.choices[-1].solver, self.segment.plan, t, q, u)
 
     def _repair(self, session: Session, step_result: StepResult) -> None:
         """Go on from the recorded state where the solver's own has strayed.

@@ -6,6 +6,8 @@ import ctypes
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from atwood.errors import UsageError
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
@@ -213,6 +215,8 @@ def open_explicit_session(
         solved = solve_at(request.plan, t, *request.plan.program.split(y))
         if solved is not None:
             return ClosedLoopSession(request, solver, t, y, solved, leave, give_up)
+    if solver == "explicit" and (request.plan.balance.constraints or request.plan.assembly.form == "dae"):
+        return _open_constrained(request, t, y, leave)
     if solver == "taylor":
         return _open_taylor(request, t, y)
     if solver in FIXED_STEPS:
@@ -242,6 +246,21 @@ def _open_steps(request: SolverRequest, t: float, y: FloatArray, leave: Leave | 
     return session
 
 
+def _open_constrained(request: SolverRequest, t: float, y: FloatArray, leave: Leave | None) -> ExplicitSession:
+    """Start the method of order 8(5,3) with steps that end on the constraints."""
+    from atwood.integrators.explicit_session import open_explicit
+    from atwood.simulation.problem.constrained_scene import constrained_problem
+
+    plan, probe = request.plan, request.probe
+    problem = constrained_problem(plan, t, y, probe.function(), probe.directions)
+    settings = request.settings(t, LOOSEST)
+    absolute = np.asarray(settings.absolute_tolerances)[: len(y)]
+    settings = replace(settings, absolute_tolerances=absolute)
+    session = open_explicit(_watched(request, problem), settings, t, y, request.budget, leave=leave, end=request.end)
+    session.limit_steps(longest_step(plan.assembly.own_equations, plan.program.split(y)[1]))
+    return session
+
+
 def _open_taylor(request: SolverRequest, t: float, y: FloatArray) -> ExplicitSession:
     from atwood.simulation.problem.taylor_scene import open_taylor, taylor_problem
 
@@ -267,11 +286,17 @@ def _explicit_problem(request: SolverRequest, solver: str) -> ExplicitProblem:
     problem = explicit_problem(assembly, probe.function(), probe.directions) if assembly.form == "reduced" else None
     if problem is None:
         raise UsageError(
-            f"an explicit method ({SOLVERS[solver]}) needs the reduced form of a scene without closed loops, or "
+            f"this method ({SOLVERS[solver]}) needs the reduced form of a scene without closed loops, or "
             "with such as formulas solve",
             where=assembly.flat.name,
-            advice="Use the solver 'ida'.",
+            advice="Use the solver 'explicit' or 'ida'.",
         )
+    return _watched(request, problem)
+
+
+def _watched(request: SolverRequest, problem: ExplicitProblem) -> ExplicitProblem:
+    """Return a problem whose events are machine code too, if they can be."""
+    probe = request.probe
     problem = replace(problem, event_rough=probe.rough)
     found = None if problem.events is None else probe.compiled(for_ida=False)
     if found is None:

@@ -85,7 +85,7 @@ def cubic(s: FloatArray, ends: tuple[FloatArray, FloatArray], slopes: tuple[Floa
     return found
 
 
-def compiled_looks(plan: Plan, whole: float) -> LookoutData | None:
+def compiled_looks(plan: Plan, whole: float, size: int) -> LookoutData | None:
     """Return what looks at a motion by itself, for one run; None where nothing can be compiled.
 
     Parameters
@@ -94,6 +94,8 @@ def compiled_looks(plan: Plan, whole: float) -> LookoutData | None:
         The scene in its mode.
     whole
         The length of the run.
+    size
+        The number of the solver's unknowns, which begin with coordinates and speeds.
     """
     held, assembly = plan.balance.program, plan.assembly
     if plan.not_compilable or held.constraints > _LARGEST:
@@ -103,9 +105,9 @@ def compiled_looks(plan: Plan, whole: float) -> LookoutData | None:
     places = held.jacobian_rows, held.jacobian_columns
     code = assembly.shared.get(
         _LOOKOUT,
-        lambda: compile_lookout(held.constraints_alone, held.speeds, plan.program.size, places),
+        lambda: compile_lookout(held.constraints_alone, held.speeds, size, places),
         assembly.form,
-        plan.program.size,
+        size,
     )
     pace = Pace(_MOVE, whole, _SHARE * whole, _LOW, _WORN if plan.finding.redundant else 0.0)
     return code.bind(assembly.parameter_values, plan.sizes, plan.finding.kept, pace)
@@ -115,4 +117,5 @@ def as_lookout(data: LookoutData) -> Lookout:
     """Return what a session is given to look with."""
     from atwood.codegen.sundials.lookout import NOTICED, PAUSED
 
-    return Lookout(data.code.drive, data.code.fill, NOTICED, PAUSED, data.address, data.due, data)
+    code = data.code
+    return Lookout(code.drive, code.fill, NOTICED, PAUSED, data.address, data.due, data.due_at, code.look_address, data)

@@ -120,7 +120,7 @@ class SingularityMonitor:
         self._judged = -np.inf
         self._largest = 0.0
         self._measures = RankMeasure(plan)
-        self._compiled = compiled_looks(plan, self._whole)
+        self._compiled = compiled_looks(plan, self._whole, len(step_result.y))
         if self._compiled is not None:
             errors = plan.balance.errors.near(step_result.t, step_result.y[: self._n], plan.sizes)
             self._compiled.rows[:] = tolerances.TRUSTED * errors

@@ -1,0 +1,262 @@
+"""Accelerations and projections of a mechanism whose constraints stay, for methods that need ``u'`` itself.
+
+The augmented system ``M a - G^T lambda = -bias``, ``G a = -gamma`` is eliminated on the graph, masses first and then
+one constraint after the other (Featherstone, Rigid Body Dynamics Algorithms, 2008, sections 3.2 and 8.5). What is left
+of the masses is ``G M^-1 G^T``, in which joints meet their neighbours alone; both parts are positive definite, so that
+no pivot is searched for.  Where something has no inertia of its own but is held, ``M + sum s_k G_k^T G_k`` takes the
+place of M: the constraints make the addition ``-s_k G_k^T gamma_k``, which goes to the other side (M. Fortin and
+R. Glowinski, Augmented Lagrangian Methods, 1983, chapter I).
+
+A state is projected by the shortest displacement along the speeds, each measured by its size:
+``d = -W G^T (G W G^T)^-1 g`` with ``W = diag(sizes^2)`` (Hairer, Lubich and Wanner, Geometric Numerical Integration,
+2006, section IV.4).
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+from atwood.expr import Expression, OutputGroup, Program, jacobian, solve, substitute
+from atwood.forms.dae import keep_constraints
+from atwood.forms.derived import derive_once
+from atwood.forms.program import rates_are_speeds, state_groups
+from atwood.late import dataclass, names_of
+from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of
+from atwood.mechanics.dynamics.equations import Equations
+
+__all__ = ["ConstrainedProgram", "constrained_program"]
+
+_LARGEST_FILL = 60_000
+"""More products than these are left to a loop when the program runs."""
+
+_NOT_READ = ("locals_", "site", "masses", "shapes", "decisions", "constants")
+"""What equations were made of; their derivation reads what was made."""
+
+Place = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class ConstrainedProgram:
+    """What an explicit method needs of a mechanism whose constraints stay.
+
+    The parameters of both programs are those of the scene, and then the size of a displacement along each speed.
+
+    Attributes
+    ----------
+    accelerations
+        Program of (t, q, u) with the accelerations; before them the rates of the coordinates, unless these are the
+        speeds.
+    projection
+        Program of (t, q, u) with coordinates and speeds after one step of Newton's method towards the constraints on
+        position and velocity, and by how much each speed's size the place has moved.
+    """
+
+    accelerations: Program
+    projection: Program
+
+
+def constrained_program(
+    name: str,
+    equations: Equations,
+    parameters: Sequence[Expression],
+    rows: Sequence[Expression],
+    kept: Sequence[int],
+    is_massive: bool,
+) -> ConstrainedProgram:
+    """Return accelerations and projections of a mechanism whose constraints stay.
+
+    Parameters
+    ----------
+    name
+        Named in messages.
+    equations
+        Equations in the coordinates of either form.
+    parameters
+        The symbols of parameters.
+    rows
+        The equations' rows, perhaps rewritten.
+    kept
+        Numbers of the constraints that are independent.
+    is_massive
+        Whether everything that moves has inertia of its own.
+    """
+    graph = equations.graph
+    sizes = tuple(graph.symbol(f"size of {one.name}") for one in equations.speed_names)
+    held = keep_constraints(equations, kept)
+    read = [getattr(held, one) for one in names_of(Equations) if one not in _NOT_READ]
+
+    def derive() -> tuple[str, list[Expression]]:
+        return "augmented", [*_accelerations(held, rows, sizes, is_massive), *_projection(held, sizes)]
+
+    _, found = derive_once("constrained", graph, (read, tuple(rows), parameters, sizes, is_massive), derive)
+    n, m = len(equations.coordinates), len(equations.speeds)
+    groups, known = state_groups(equations), (*parameters, *sizes)
+    outputs: tuple[OutputGroup, ...] = (OutputGroup("accelerations", tuple(found[:m])),)
+    if not rates_are_speeds(equations):
+        outputs = (OutputGroup("rates", equations.rates), *outputs)
+    parts = (tuple(found[i:j]) for i, j in pairwise((m, m + n, 2 * m + n, 3 * m + n)))
+    nearer = tuple(OutputGroup(*one) for one in zip(("coordinates", "speeds", "moved"), parts, strict=True))
+    return ConstrainedProgram(
+        Program(f"{name} (accelerations)", groups, known, outputs),
+        Program(f"{name} (projection)", groups, known, nearer),
+    )
+
+
+def _accelerations(
+    equations: Equations, rows: Sequence[Expression], sizes: Sequence[Expression], is_massive: bool
+) -> list[Expression]:
+    n, constraints = len(equations.speeds), equations.constraints
+    at_rest = dict.fromkeys(equations.accelerations, 0.0)
+    mass = jacobian(list(rows), list(equations.accelerations))
+    entries = {(r, c): e for r, c, e in zip(mass.rows, mass.columns, mass.entries, strict=True) if r <= c}
+    slopes = _slopes(equations, range(len(constraints)))
+    bias = substitute(list(rows), at_rest)
+    gamma = substitute([one.second for one in constraints], at_rest)
+    if not is_massive:
+        bias = _stiffen(entries, bias, slopes, gamma, sizes)
+    places = {(c, n + k): e for k, row in enumerate(slopes) for c, e in row.items()}
+    right = [-one for one in (*bias, *gamma)]
+    signs = [1] * n + [-1] * len(constraints)
+    return _solved(SymmetricSystem({**entries, **places}, right, signs))[:n]
+
+
+def _slopes(equations: Equations, rows: Sequence[int]) -> list[dict[int, Expression]]:
+    """Return the rows of the constraint Jacobian by column."""
+    chosen = [equations.constraints[k].rate for k in rows]
+    found = jacobian(chosen, list(equations.speeds))
+    slopes: list[dict[int, Expression]] = [{} for _ in rows]
+    for row, column, entry in zip(found.rows, found.columns, found.entries, strict=True):
+        if not entry.is_zero:
+            slopes[row][column] = entry
+    return slopes
+
+
+def _stiffen(
+    entries: dict[Place, Expression],
+    bias: list[Expression],
+    slopes: Sequence[Mapping[int, Expression]],
+    gamma: Sequence[Expression],
+    sizes: Sequence[Expression],
+) -> list[Expression]:
+    """Add ``s_k G_k^T G_k`` to the mass matrix, and return what the bias is then.
+
+    Each addition is as large as inertia: s_k is the mean of the diagonal of M over the square of the constraint's
+    slope, in displacements of the sizes.
+    """
+    graph = sizes[0].graph
+    inertia = graph.zero
+    for i, size in enumerate(sizes):
+        if (i, i) in entries:
+            inertia = inertia + entries[i, i] * size * size
+    bias = list(bias)
+    for row, second in zip(slopes, gamma, strict=True):
+        square = graph.zero
+        for column, entry in row.items():
+            square = square + (entry * sizes[column]) * (entry * sizes[column])
+        share = inertia / (float(len(sizes)) * square)
+        for i, first in row.items():
+            weighted = share * first
+            bias[i] = bias[i] + weighted * second
+            for j, other in row.items():
+                if i <= j:
+                    entries[i, j] = entries.get((i, j), graph.zero) + weighted * other
+    return bias
+
+
+def _projection(equations: Equations, sizes: Sequence[Expression]) -> list[Expression]:
+    """Return coordinates and speeds after one step of Newton's method, and the displacements in units of their sizes.
+
+    Speeds are projected with the slopes of the place before the step: what that leaves is of second order.
+    """
+    holding = [k for k, one in enumerate(equations.constraints) if one.holonomic]
+    everything = list(range(len(equations.constraints)))
+    values = [value for k in holding if (value := equations.constraints[k].value) is not None]
+    moved = _nearest(_slopes(equations, holding), values, sizes)
+    coordinates = _moved(equations, [-one * size for one, size in zip(moved, sizes, strict=True)])
+    there = dict(zip(equations.coordinates, coordinates, strict=True))
+    misses = substitute([one.rate for one in equations.constraints], there)
+    changed = _nearest(_slopes(equations, everything), misses, sizes)
+    speeds = [u - one * size for u, one, size in zip(equations.speeds, changed, sizes, strict=True)]
+    return [*coordinates, *speeds, *moved]
+
+
+def _nearest(
+    slopes: Sequence[Mapping[int, Expression]], right: Sequence[Expression], sizes: Sequence[Expression]
+) -> list[Expression]:
+    """Return the shortest solution of ``G d = right``, in units of the sizes."""
+    zero = sizes[0].graph.zero
+    scaled = [{c: e * sizes[c] for c, e in row.items()} for row in slopes]
+    by_column: dict[int, list[int]] = {}
+    for k, row in enumerate(scaled):
+        for column in row:
+            by_column.setdefault(column, []).append(k)
+    entries: dict[Place, Expression] = {}
+    for column, met in by_column.items():
+        for a, i in enumerate(met):
+            for j in met[a:]:
+                entries[i, j] = entries.get((i, j), zero) + scaled[i][column] * scaled[j][column]
+    found = _solved(SymmetricSystem(entries, right, [1] * len(right))) if right else []
+    moved = [zero] * len(sizes)
+    for row, multiplier in zip(scaled, found, strict=True):
+        for column, entry in row.items():
+            moved[column] = moved[column] + entry * multiplier
+    return moved
+
+
+def _moved(equations: Equations, displacements: Sequence[Expression]) -> list[Expression]:
+    """Return the coordinates after displacements along the speeds."""
+    if rates_are_speeds(equations):
+        return [q + d for q, d in zip(equations.coordinates, displacements, strict=True)]
+    tangent = jacobian(list(equations.rates[: equations.placing]), list(equations.speeds))
+    coordinates = list(equations.coordinates)
+    for row, column, entry in zip(tangent.rows, tangent.columns, tangent.entries, strict=True):
+        coordinates[row] = coordinates[row] + entry * displacements[column]
+    return coordinates
+
+
+def _solved(system: SymmetricSystem) -> list[Expression]:
+    """Return the solution of a system of masses and constraints."""
+    size, places = len(system.right), list(system.entries)
+    order = _order(places, system.signs)
+    if fill_of(places, order) > _LARGEST_FILL:
+        return _solved_by_loops(system)
+    known: dict[int, Expression] = {}
+    for step in reversed(eliminate(system, order)):
+        known[step.unknown] = back_substitute(step, known)
+    return [known[i] for i in range(size)]
+
+
+def _solved_by_loops(system: SymmetricSystem) -> list[Expression]:
+    """Return the same by elimination with pivots, for which no code of its own is written."""
+    size = len(system.right)
+    zero = system.right[0].graph.zero
+    matrix = [[zero] * size for _ in range(size)]
+    for (i, j), entry in system.entries.items():
+        matrix[j][i] = entry
+        matrix[i][j] = -entry if system.signs[i] != system.signs[j] else entry
+    return solve(matrix, list(system.right))
+
+
+def _order(places: Sequence[Place], signs: Sequence[int]) -> list[int]:
+    """Return an order of elimination that adds few entries: masses first, always what has the fewest neighbours."""
+    touching: dict[int, set[int]] = {i: set() for i in range(len(signs))}
+    for i, j in places:
+        if i != j:
+            touching[i].add(j)
+            touching[j].add(i)
+    heap = [(-signs[i], len(around), i) for i, around in touching.items()]
+    heapq.heapify(heap)
+    order: list[int] = []
+    while heap:
+        _, degree, i = heapq.heappop(heap)
+        if i not in touching or degree != len(touching[i]):
+            continue
+        around = touching.pop(i)
+        order.append(i)
+        for a in around:
+            touching[a] |= around
+            touching[a] -= {a, i}
+            heapq.heappush(heap, (-signs[a], len(touching[a]), a))
+    return order
