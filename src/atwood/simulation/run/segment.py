@@ -253,6 +253,7 @@ class _Runner:
 
     def _watch(self, session: Session) -> None:
         """Look out for singular positions where an explicit method goes on with constraints."""
+        self.monitor = None
         if not (isinstance(session, ExplicitSession) and self.segment.plan.balance.constraints):
             return
         from atwood.simulation.singular.monitor import singularity_monitor_of
