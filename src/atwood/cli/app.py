@@ -169,6 +169,13 @@ def info_command(
     help="Largest error of the motion, of positions relative to the scene's extent and of angles; tolerances follow.",
 )
 @click.option("--conserved", is_flag=True, help="Show by how much what the scene conserves drifts along the run.")
+@click.option(
+    "--energy",
+    type=click.Choice(["total", "parts"]),
+    default="total",
+    show_default=True,
+    help="Energy as a whole, or by component and connector: shown, with --json, in the file of --save, and as --plot.",
+)
 @click.option("--timings", is_flag=True, help="Show what each stage from the scene to the motion took.")
 @click.option("--plot", type=FILE, help="Save a plot; the suffix says how (.png, .svg, .pdf).")
 @click.option("--draw", type=FILE, help="Save a picture of the mechanism (.png, .svg, .pdf), or its motion (.gif).")

@@ -49,6 +49,7 @@ class RunRequest:
     until: tuple[str, ...] = ()
     record: tuple[str, ...] = ()
     conserved: bool = False
+    energy: str = "total"
     accuracy: float | None = None
     plot: Path | None = None
     draw: Path | None = None
@@ -127,12 +128,31 @@ def _run(request: RunRequest) -> Result:
 
 def _keep(result: Result, request: RunRequest) -> None:
     """Save, plot and draw a run, if that was asked for."""
-    if request.save is not None:
+    by_part = request.energy == "parts"
+    if request.save is not None and by_part:
+        _save_with_energies(result, request.save)
+    elif request.save is not None:
         result.save(request.save)
-    if request.plot is not None:
+    if request.plot is not None and by_part:
+        from atwood.plotting.plots.energies import plot_energies
+
+        plot_energies(result, request.plot)
+    elif request.plot is not None:
         result.plot(file=request.plot)
     if request.draw is not None:
         _draw(result, request.draw, request.view)
+
+
+def _save_with_energies(result: Result, file: Path) -> None:
+    """Save all trajectories, and the energies of components with them."""
+    from atwood.result.about import describe_run
+    from atwood.result.files import SavedResult, write_trajectories
+
+    more = result.energy.parts.trajectories()
+    units = {path: result.unit(path) for path in result.paths} | dict(more.units)
+    meanings = {path: result.describe(path) for path in result.paths} | dict(more.meanings)
+    found = {**result.table(), **more.quantities}
+    write_trajectories(SavedResult(result.time, found, units, meanings, describe_run(result)), file)
 
 
 def _keep_what_came_before(error: AtwoodError, request: RunRequest) -> None:
@@ -199,6 +219,8 @@ def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
     asked = {**data.pop("asked"), "set": list(request.settings)}
     assembly = result.assembly
     coordinates = [one.name for one in assembly.own_equations.names]
+    if request.energy == "parts":
+        data["energy"] |= {"parts": result.energy.parts.to_dict()}
     return {
         **{key: data.pop(key) for key in ("scene", "form", "level")},
         "degrees_of_freedom": degrees_of_freedom(result),

@@ -46,6 +46,10 @@ def print_summary(result: Result, request: RunRequest) -> None:
     if hidden:
         more = count_of(hidden, "more quantity", "more quantities")
         out.line((f"{more}: --json or --save FILE shows all", "dim"))
+    if request.energy == "parts":
+        from atwood.cli.energies import print_energies
+
+        print_energies(result.energy.parts, out)
     if request.timings:
         out.line()
         rows = [[name, f"{1e3 * spent:.3g}", STAGES[name]] for name, spent in result.timings.items()]
