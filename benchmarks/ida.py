@@ -2,7 +2,7 @@
 
 All solve the stabilised DAE form with the same start and tolerances, and IDA is told the same.  A step is timed inside
 the integration, and a run from making IDA's memory to freeing it.  Atwood and the C by hand then take the same steps
-but for rounding; beyond 90 unknowns Atwood chooses a sparse linear solver, and the C by hand stays dense.  Python
+but for rounding.  The C by hand has a band solver for chains, and Atwood eliminates with fixed pivots.  Python
 callbacks are Atwood's driver with the same problem without its compiled functions: plain Python called through ctypes.
 The row of scikit-sundae is the reference driver, with its own options.
 """
@@ -78,6 +78,7 @@ def hand_measure(prepared: Prepared, rtol: float, flags: str) -> Measure:
         prepared.plan.tolerances(rtol),
         flags,
         tuning=tuned(6 * prepared.mechanism.links),
+        band=prepared.mechanism.links > 2,
     )
     mechanism = prepared.mechanism
     with ida_session(prepared, rtol)() as session:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from enum import Enum
-from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -22,8 +22,12 @@ from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.late import dataclass
 from atwood.tolerances import tolerances
 
+if TYPE_CHECKING:
+    from atwood.linalg.fixed_pivots import FixedPivots
+
 __all__ = [
     "Budget",
+    "ChoosePivots",
     "FloatArray",
     "ImplicitProblem",
     "IndexArray",
@@ -39,7 +43,14 @@ __all__ = [
 ]
 
 Values: TypeAlias = Sequence[float] | FloatArray
-LinearSolver: TypeAlias = Literal["dense", "sparse"]
+ChoosePivots: TypeAlias = "Callable[[Sequence[FloatArray]], FixedPivots | None]"
+LinearSolver: TypeAlias = Literal["dense", "sparse", "fixed"]
+
+FIXED_SIZE = 20
+"""From so many unknowns on elimination with fixed pivots pays."""
+
+FIXED_SHARE = 0.3
+"""The largest share of the operations of a dense factorisation for which it pays: each takes longer."""
 
 SPARSE_SIZE = 90
 """From so many unknowns on a sparse matrix pays: chains take 0.8 of the time without it at 60, and 1.6 at 120."""
@@ -77,9 +88,12 @@ class ImplicitProblem:
     event_rough
         Numbers of the events whose exact time does not matter: they happen at the end of a step.
     native
-        ``native(linear_solver)``: compiled forms of the residual and the Jacobian for a matrix that is dense or
-        sparse.  Each session asks once, and must not share its answer with another one.  Drivers that cannot use
-        them ignore them.
+        ``native(linear_solver)``: compiled forms of the residual and the Jacobian for a matrix that is dense, sparse,
+        or one column with all entries.  Each session asks once, and must not share its answer with
+        another one.  Drivers that cannot use them ignore them.
+    pivots
+        ``pivots(samples)``: an elimination of the matrix with fixed pivots, which are good for matrices given by
+        their entries in the order of `pattern`; None if there is none.  It answers alike whenever it is asked.
     """
 
     size: int
@@ -92,6 +106,7 @@ class ImplicitProblem:
     event_directions: tuple[int, ...] = ()
     event_rough: tuple[int, ...] = ()
     native: Callable[[LinearSolver], NativeCallbacks] | None = None
+    pivots: ChoosePivots | None = None
 
     def __post_init__(self) -> None:
         if self.size < 1:
@@ -137,7 +152,8 @@ class SolverOptions:
     max_order
         The highest order of the method, 1 to 5.
     linear_solver
-        ``"auto"`` takes sparse for large problems with few entries.
+        ``"auto"`` takes fixed pivots where the problem has them and the driver can, and otherwise sparse for large
+        problems with few entries.
     horizon
         A typical length of the run in seconds.  An estimated first step is at most a thousandth of it.  It is an
         option, and not taken from the first output time, so that outputs never change the solution.
@@ -148,7 +164,7 @@ class SolverOptions:
     first_step: float | None = None
     max_step: float | None = None
     max_order: int = 5
-    linear_solver: Literal["auto", "dense", "sparse"] = "auto"
+    linear_solver: Literal["auto", "dense", "sparse", "fixed"] = "auto"
     horizon: float = 1.0
 
     def __post_init__(self) -> None:
@@ -162,8 +178,8 @@ class SolverOptions:
                 raise UsageError(f"{name} must be positive and finite, not {value}")
         if not 1 <= self.max_order <= 5:
             raise UsageError(f"max_order must lie in 1..5, not be {self.max_order}")
-        if self.linear_solver not in ("auto", "dense", "sparse"):
-            raise UsageError(f"the linear solver is 'auto', 'dense' or 'sparse', not {self.linear_solver!r}")
+        if self.linear_solver not in ("auto", "dense", "sparse", "fixed"):
+            raise UsageError(f"the linear solver is 'auto', 'dense', 'sparse' or 'fixed', not {self.linear_solver!r}")
 
 
 @dataclass(frozen=True)
@@ -336,8 +352,21 @@ class OpenSession(Protocol):
         ...
 
 
-def choose_linear_solver(problem: ImplicitProblem, options: SolverOptions) -> LinearSolver:
-    """Return the linear solver that the options and the pattern ask for."""
-    if options.linear_solver != "auto":
+def choose_linear_solver(problem: ImplicitProblem, options: SolverOptions, has_fixed: bool = False) -> LinearSolver:
+    """Return the linear solver that the options and the pattern ask for.
+
+    Parameters
+    ----------
+    problem, options
+        What is solved, and how.
+    has_fixed
+        Whether the driver can eliminate with fixed pivots.
+    """
+    if options.linear_solver == "dense" or options.linear_solver == "sparse":
         return options.linear_solver
+    wanted = options.linear_solver == "fixed"
+    if has_fixed and problem.pivots is not None and (wanted or problem.size >= FIXED_SIZE):
+        pivots = problem.pivots(())
+        if pivots is not None and (wanted or 3 * pivots.operations["factorise"] < FIXED_SHARE * problem.size**3):
+            return "fixed"
     return "sparse" if problem.size >= SPARSE_SIZE and problem.density < SPARSE_DENSITY else "dense"

@@ -44,6 +44,7 @@ def compile_ida_callbacks(
     size: int,
     sparse: bool = False,
     *,
+    is_list: bool = False,
     by_columns: bool = False,
     cache: bool = True,
     layout: SundialsLayout | None = None,
@@ -65,6 +66,8 @@ def compile_ida_callbacks(
         The length of y.
     sparse
         Whether IDA's matrix is sparse.
+    is_list
+        Whether IDA's matrix is one column with all entries.
     by_columns
         Whether the Jacobian is a program of (t, y, y', cj, direction) with its product with a direction; then the
         matrix is dense and filled column by column.
@@ -90,12 +93,14 @@ def compile_ida_callbacks(
     if at_columns.shape != at_rows.shape or not _inside(at_rows, size) or not _inside(at_columns, size):
         raise UsageError(f"the entries of the Jacobian are not all inside {size} x {size}", where=jacobian.name)
     layout = layout or sundials_layout()
-    positions: tuple[int, ...] | None
+    places: tuple[int, ...] | None
     if by_columns:
-        positions, more = None, columns_text(layout, size)
+        places, more = None, columns_text(layout, size)
+    elif is_list:
+        places, more = None, dense_text(layout)
     else:
-        positions, more = _jacobian_for(layout, at_rows, at_columns, size, sparse)
-    parts = [Part("residual", residual), Part("jacobian", jacobian, positions)]
+        places, more = _jacobian_for(layout, at_rows, at_columns, size, sparse)
+    parts = [Part("residual", residual), Part("jacobian", jacobian, places)]
     built = build_code(
         parts,
         default_options(parts),

@@ -179,6 +179,8 @@ def jacobian_function(
     given = _Views(problem.size, library.N_VGetArrayPointer, writeable=False)
     if linear_solver == "sparse":
         entries_of, places = _sparse_writer(problem, library)
+    elif linear_solver == "fixed":
+        entries_of, places = _Views(len(rows), library.SUNDenseMatrix_Data, writeable=True), slice(None)
     else:
         entries_of = _Views(problem.size**2, library.SUNDenseMatrix_Data, writeable=True)
         places = columns * problem.size + rows

@@ -13,6 +13,7 @@ import re
 import sys
 import threading
 from ctypes import POINTER, c_double, c_int, c_int32, c_int64, c_long, c_void_p
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,11 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
     "SUNLinSolInitialize": (c_int, _P),
     "SUNLinSolSetup": (c_int, _P, _P),
     "SUNLinSolFree": (c_int, _P),
+    "SUNLinSolNewEmpty": (_P, _P),
+    "SUNLinSolFreeEmpty": (None, _P),
+    "SUNLinSolGetType_Dense": (c_int, _P),
+    "SUNLinSolSetup_Dense": (c_int, _P, _P),
+    "SUNLinSolSolve_Dense": (c_int, _P, _P, _P, _P, _D),
     "IDACreate": (_P, _P),
     "IDAFree": (None, POINTER(_P)),
     "IDAInit": (c_int, _P, _P, _D, _P, _P),
@@ -173,6 +179,17 @@ class SundialsLibrary:
         self.N_VDestroy(vector)
         self.SUNContext_Free(ctypes.byref(context))
         return tells
+
+    @cached_property
+    def has_fixed_solvers(self) -> bool:
+        """Whether linear solvers of our own can be made: see `atwood.integrators.ida.fixed`."""
+        from atwood.integrators.ida.fixed import table_layout
+
+        try:
+            table_layout(self)
+        except LookupError:
+            return False
+        return True
 
     def __getattr__(self, name: str) -> Any:
         # Only so that type checkers know that further attributes exist; what was found is an attribute itself.

@@ -6,17 +6,21 @@ import ctypes
 import weakref
 from collections.abc import Callable, Sequence
 from ctypes import c_double, c_int, c_long, c_void_p
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from atwood.errors import UsageError
 from atwood.integrators.compiled_functions import Lookout
+from atwood.integrators.ida.callbacks import Record
 from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.ida.signatures import JACOBIAN
 from atwood.integrators.ida.sparse import SparseSolver
-from atwood.integrators.protocol import FloatArray, LinearSolver
+from atwood.integrators.protocol import ChoosePivots, FloatArray
 from atwood.late import dataclass
+
+if TYPE_CHECKING:
+    from atwood.integrators.ida.fixed import FixedSolver
 
 __all__ = ["ONE_STEP", "ROOT_RETURN", "STOPPED_BY_WEIGHTS", "TOO_MUCH_WORK", "TO_TIME", "Counts", "IdaMemory"]
 
@@ -68,6 +72,7 @@ class _Parts:
         self.ida = c_void_p()
         self.solver: int | None = None
         self.sparse: SparseSolver | None = None
+        self.fixed: FixedSolver | None = None
         self.matrix: int | None = None
         self.vectors: list[int] = []
         self.keep: list[object] = []
@@ -87,11 +92,13 @@ class _Parts:
     def free_solver(self) -> None:
         if self.sparse is not None:
             self.sparse.free()
+        if self.fixed is not None:
+            self.fixed.free()
         if self.solver:
             self.library.SUNLinSolFree(self.solver)
         if self.matrix:
             self.library.SUNMatDestroy(self.matrix)
-        self.solver = self.matrix = self.sparse = None
+        self.solver = self.matrix = self.sparse = self.fixed = None
 
 
 class IdaMemory:
@@ -163,10 +170,17 @@ class IdaMemory:
             sparse.free_solver(old)
         self.call("IDAReInit", t, self._y, self._yp)
 
-    def set_linear_solver(self, kind: LinearSolver, entries: int, jacobian: int) -> None:
-        """Make the matrix and the linear solver."""
+    def set_linear_solver(
+        self, entries: int, jacobian: int, is_sparse: bool, pivots: ChoosePivots | None, record: Record
+    ) -> None:
+        """Make the matrix and the linear solver; a record takes up what goes wrong in Python there."""
         library, parts, n = self.library, self._parts, self.size
-        if kind == "sparse":
+        if pivots is not None:
+            from atwood.integrators.ida.fixed import FixedSolver
+
+            parts.fixed = fixed = FixedSolver(library, pivots, parts.context, record)
+            matrix, solver = fixed.matrix, fixed.solver
+        elif is_sparse:
             parts.sparse = sparse = SparseSolver(library, n, entries, self._y, parts.context)
             matrix, solver = sparse.matrix, sparse.solver
         else:
@@ -193,7 +207,8 @@ class IdaMemory:
             What the Jacobian is given.
         """
         parts, library = self._parts, self.library
-        solver, matrix = (parts.sparse.solver, parts.sparse.matrix) if parts.sparse else (parts.solver, parts.matrix)
+        own = parts.fixed or parts.sparse
+        solver, matrix = (own.solver, own.matrix) if own else (parts.solver, parts.matrix)
         library.SUNMatZero(matrix)
         jacobian = JACOBIAN(self._jacobian)
         flag = jacobian(t, rate, self._y, self._yp, self._y, matrix, user_data, None, None, None)

@@ -22,7 +22,7 @@ from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import EventLocator, Root, State
 from atwood.integrators.ida.callbacks import InterruptLater, Record, explain
-from atwood.integrators.ida.library import available, why_not
+from atwood.integrators.ida.library import available, library, why_not
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
 from atwood.integrators.ida.pace import FIRST_CHUNK, Pace, first_chunk
 from atwood.integrators.ida.setup import IdaTuning, prepare
@@ -96,7 +96,7 @@ class NativeSession:
         self._horizon = options.horizon
         self._record = Record()
         state = checked_state(problem.size, t, y, yp)
-        linear_solver = choose_linear_solver(problem, options)
+        linear_solver = choose_linear_solver(problem, options, has_fixed=library().has_fixed_solvers)
         self._native = None if problem.native is None else problem.native(linear_solver)
         self._memory = prepare(
             problem, options, tuning or IdaTuning(), linear_solver, self._native, self._record, state

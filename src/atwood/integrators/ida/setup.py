@@ -114,7 +114,8 @@ def prepare(
     memory.y[:], memory.yp[:] = state[1:]
     memory.begin(native.residual, state[0], native.user_data)
     _set_weights(memory, problem, options, tuning, native, record)
-    memory.set_linear_solver(linear_solver, len(problem.pattern[0]), native.jacobian)
+    pivots = problem.pivots if linear_solver == "fixed" else None
+    memory.set_linear_solver(len(problem.pattern[0]), native.jacobian, linear_solver == "sparse", pivots, record)
     if problem.algebraic:
         kinds = np.ones(problem.size)
         kinds[list(problem.algebraic)] = 0.0

@@ -33,11 +33,13 @@ if TYPE_CHECKING:
     from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks
     from atwood.expr import Program
     from atwood.forms.null_space import NullSpaceProgram
+    from atwood.linalg.fixed_pivots import FixedPivots
     from atwood.simulation.problem.native_null_space import CompiledNullSpace
 
 __all__ = ["Plan", "dependent_speeds_of", "kept_rows"]
 
 _IDA: Key[IdaCallbacks] = Key("machine code for IDA")
+_PIVOTS: Key[FixedPivots | None] = Key("elimination with fixed pivots")
 _NULL_SPACE: Key[NullSpaceProgram] = Key("program of the null space")
 _NULL_SPACE_CODE: Key[NullSpaceCallbacks] = Key("machine code of the null space")
 
@@ -243,7 +245,17 @@ class Plan:
             event_count=len(directions),
             event_directions=directions,
             native=self._native(),
+            pivots=self._pivots if self.program.form == "dae" else None,
         )
+
+    def _pivots(self, samples: Sequence[FloatArray]) -> FixedPivots | None:
+        """Return how the Newton matrix of the dae form is eliminated."""
+        from atwood.simulation.problem.elimination import pivots_of
+
+        shared, program = self.assembly.shared, self.program
+        about = program, *(one.tobytes() for one in samples)
+        kept = self.assembly.kept if samples else shared
+        return kept.get(_PIVOTS, lambda: pivots_of(self.assembly.own_equations, program, samples), *about)
 
     def _native(self) -> Callable[[LinearSolver], NativeCallbacks] | None:
         """Return what compiles residual and Jacobian; None if nothing can."""
@@ -282,6 +294,7 @@ class Plan:
                 program.columns,
                 program.size,
                 sparse=linear_solver == "sparse",
+                is_list=linear_solver == "fixed",
                 by_columns=program.derivative.by_columns,
             ),
             program,
