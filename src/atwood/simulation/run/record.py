@@ -159,7 +159,7 @@ class Recorder:
             Sample times on its way, and which of them are outputs.
         """
         assert crossing.path is not None
-        self._rewind(crossing.path.start)
+        self.rewind(crossing.path.start)
         self.settle()
         self.singular_crossings.append(crossing)
         if len(t):
@@ -178,7 +178,7 @@ class Recorder:
                     q, u, _ = crossing.path.at(block.time[inside])
                     block.q[:, inside], block.u[:, inside] = self.plan.balance.kinematic_map.normalized(q), u
 
-    def _rewind(self, t: float) -> None:
+    def rewind(self, t: float) -> None:
         """Forget all samples after a time."""
         blocks, pending = self._samples
         kept = (one.first(int(np.searchsorted(one.time, t, side="right"))) for one in blocks)

@@ -159,6 +159,10 @@ class _Runner:
             self.recorder.settle()
             return self._ended(self.segment.end, "finished", "")
         if step_result.status is Status.EVENT:
+            from atwood.simulation.events.margins import without_margin
+
+            step_result = without_margin(self.segment.probe, step_result, self.began)
+            self.recorder.rewind(step_result.t)
             event = self.segment.probe.name(step_result)
             assert event is not None, "what changes nothing has been noted"
             if event.target != COORDINATE_SWITCH:
