@@ -40,7 +40,11 @@ def modes_of(flat: FlatScene) -> dict[str, str]:
 
 
 def assembled_anew(
-    assembly: Assembly, flat: FlatScene, modes: Mapping[str, str] | None = None, line_signs: LineSigns | None = None
+    assembly: Assembly,
+    flat: FlatScene,
+    modes: Mapping[str, str] | None = None,
+    line_signs: LineSigns | None = None,
+    same_origin: bool = False,
 ) -> Assembly:
     """Return a scene assembled in the form and the coordinates of another, with equations of its own.
 
@@ -52,10 +56,13 @@ def assembled_anew(
         The scene, taken apart.
     modes, line_signs
         Mode of each part that has modes, the one it begins in where none is given; on a line, the sign of lengths.
+    same_origin
+        Whether positions are counted from where the other counts them: states pass from one to the other.
     """
     all_modes = modes_of(flat) | dict(modes or {})
     with stage("mechanism"):
-        mechanism = read_mechanism(flat, all_modes, line_signs)
+        origin = {"origin": assembly.mechanism.origin} if same_origin else {}
+        mechanism = read_mechanism(flat, all_modes, line_signs, **origin)
     fresh = {**_FRESH, "given_values": None, "shared": Shared(), "orientation": Orientation(assembly.orientation.kind)}
     return with_constants_of_start(replace(assembly, flat=flat, mechanism=mechanism, modes=all_modes, **fresh))
 
@@ -117,7 +124,7 @@ def other_mode(
     coordinates = orientation or assembly.orientation
 
     def make() -> Assembly:
-        made = assembled_anew(assembly, assembly.flat, modes, line_signs)
+        made = assembled_anew(assembly, assembly.flat, modes, line_signs, same_origin=True)
         return replace(made, shared=Shared(assembly.shared.family), orientation=coordinates)
 
     about = tuple(sorted(modes.items())), tuple(sorted(line_signs.items())), coordinates

@@ -13,6 +13,7 @@ from atwood.mechanics.constraints.read_multipliers import known_multipliers, wit
 from atwood.mechanics.constraints.rolling import Taken, integrated, take_up, without_idle_spins
 from atwood.mechanics.constraints.values import Values, constraint_values, find_constraints, levels, velocity_levels
 from atwood.mechanics.constraints.whole_turns import without_whole_turns
+from atwood.mechanics.dynamics.augmented import difference
 from atwood.mechanics.dynamics.equations import Equations, force_rows, motion_rows, put_in_place
 from atwood.mechanics.dynamics.forces import Site, in_joint_coordinates, local_map
 from atwood.mechanics.dynamics.inertia import Masses, add_masses, check_masses
@@ -26,7 +27,7 @@ from atwood.mechanics.kinematics.mechanism import (
 )
 from atwood.mechanics.kinematics.motion import Motion, motion_in_plane, motion_in_space
 from atwood.mechanics.kinematics.orientation import body_offsets
-from atwood.mechanics.kinematics.positions import Kinematics, shapes
+from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, shapes
 from atwood.model.declare.component import bind
 from atwood.model.local.laws import LocalConstraint
 from atwood.model.local.parts import LocalState, multiplier_symbol
@@ -60,6 +61,7 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
     masses = add_masses(derivation.graph, bodies, derivation.locals_, layouts, space)
     check_masses(masses, derivation.table.values)
     shape_of = shapes(bodies, layouts, {index: one.center for index, one in masses.bodies.items()})
+    shape_of[0] = _from_origin(shape_of[0], derivation)
     turns = {node: turn for _, body_turns in layouts.values() for node, turn in body_turns.items()}
     site = Site(graph, derivation.graph, bodies, space, turns)
     motion = (motion_in_space if space.is_spatial else motion_in_plane)(derivation, forest, shape_of)
@@ -90,7 +92,10 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         coordinates=(*state.coordinates, *(one.symbol for one in parts)),
         speeds=state.speeds,
         accelerations=state.accelerations,
-        names=(*state.names, *(Coordinate(one.path, one.unit) for one in parts)),
+        names=(
+            *_counted_from(derivation, forest, state.names),
+            *(Coordinate(one.path, one.unit) for one in parts),
+        ),
         speed_names=state.speed_names,
         rates=(*state.rates, *(one.rate for one in parts)),
         rows=tuple(rows),
@@ -142,6 +147,31 @@ def _use_up(
     return [
         (path, c, substitute([v], solution)[0] if solution else v) for path, c, v in values if v is not SOLVED
     ], taken
+
+
+def _from_origin(world: BodyShape, mechanism: Mechanism) -> BodyShape:
+    """Return where what is fixed is, as positions are counted."""
+    table, space = mechanism.table, mechanism.space
+    if not table.origin:
+        return world
+    origin = space.vector(table.origin)
+
+    def counted(place: Vector) -> Vector:
+        pairs = ((table.graph.convert(p), table.graph.convert(o)) for p, o in zip(place, origin, strict=True))
+        return Vector(*(difference(p, o) for p, o in pairs))
+
+    offsets = {node: counted(place) for node, place in world.offsets.items()}
+    return BodyShape(offsets, world.turns, counted(world.reference))
+
+
+def _counted_from(mechanism: Mechanism, forest: SpanningForest, names: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
+    """Return the names of coordinates, of which positions say what they are counted from, if not the world's origin."""
+    if mechanism.origin is None:
+        return tuple(names)
+    free = (one for one in forest.attachments if one.joint is None)
+    positions = {forest.coordinates[i].name for one in free for i in one.coordinates}
+    beyond = f" from {'.'.join(mechanism.origin)}"
+    return tuple(replace(one, name=one.name + beyond) if one.name in positions else one for one in names)
 
 
 def _names_of(forest: SpanningForest, symbols: Sequence[Expression], chosen: Collection[Expression]) -> tuple[str, ...]:

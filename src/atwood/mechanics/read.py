@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from atwood.consistency.check import check_laws, check_names
 from atwood.expr import Expression, Graph
 from atwood.expr.core.relations import TimeRelations
+from atwood.late import replace
 from atwood.mechanics.constraints.idle_spin import hold_idle_spins
 from atwood.mechanics.dynamics.carried_inertia import inertia_asked_for
 from atwood.mechanics.dynamics.inertia import check_tensors
+from atwood.mechanics.kinematics.local_origin import Connector, decided_near, find_origin, origin_at
 from atwood.mechanics.kinematics.mechanism import Mechanism, check_closures, make_gravity
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.carried_inertia import Carried
@@ -28,7 +30,12 @@ LineSigns = Mapping[tuple[str, str, str], float]
 """On a line, the sign of each length: of (part, one connector, the other)."""
 
 
-def read_mechanism(flat: FlatScene, modes: Mapping[str, str], known_line_signs: LineSigns | None = None) -> Mechanism:
+def read_mechanism(
+    flat: FlatScene,
+    modes: Mapping[str, str],
+    known_line_signs: LineSigns | None = None,
+    origin: Connector | Literal["near"] | None = "near",
+) -> Mechanism:
     """Read the laws of all parts and find nodes, joints and bodies.
 
     Parameters
@@ -39,6 +46,9 @@ def read_mechanism(flat: FlatScene, modes: Mapping[str, str], known_line_signs: 
         Mode of each part that has modes.
     known_line_signs
         On a line, the sign of lengths, where it is known already.
+    origin
+        The fixed connector that positions are counted from, None for the world's origin; the one that is near, unless
+        another mode of the scene has settled it.
 
     Raises
     ------
@@ -54,6 +64,7 @@ def read_mechanism(flat: FlatScene, modes: Mapping[str, str], known_line_signs: 
     if space.is_line and not known_line_signs:  # lengths are signed by where their ends are, which bodies say
         line_signs = _find_line_signs(flat, ground, found)
         found = _read_laws(flat, modes, ground, line_signs)
+    carried: Mapping[tuple[str, str], Carried] | None = None
     if any(local.asks for local in found.locals_.values()):  # laws that read the inertia of the body they are on
         carried = inertia_asked_for(found.network, found.bodies, found.locals_, space)
         found = _read_laws(flat, modes, ground, line_signs, carried)
@@ -61,6 +72,13 @@ def read_mechanism(flat: FlatScene, modes: Mapping[str, str], known_line_signs: 
     told = None if known_line_signs else line_signs
     parts = ground.table, ground.time, space, gravity, *found, flat.links, told
     mechanism = Mechanism(*parts, t_start=flat.t_start)
+    at = find_origin(mechanism) if origin == "near" else origin
+    if at is not None:  # laws are read once more, since they read positions in the world
+        table = replace(ground.table, origin=origin_at(mechanism, at))
+        found = _read_laws(flat, modes, ground._replace(table=table), line_signs, carried)
+        parts = table, ground.time, space, gravity, *found, flat.links, told
+        mechanism = Mechanism(*parts, t_start=flat.t_start, origin=at)
+    mechanism = decided_near(mechanism)
     check_closures(mechanism)
     check_tensors(mechanism.locals_, ground.table.values, space)
     return hold_idle_spins(mechanism)

@@ -17,6 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import coordinate_program, state_program
 from atwood.late import dataclass, replace
 from atwood.linalg.matrices import scaled
+from atwood.mechanics.kinematics.local_origin import world_position
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
 from atwood.model.local.flatten import FlatScene
 from atwood.model.values.vector import Vector
@@ -243,7 +244,8 @@ def _nodes(assembly: Assembly, start: Start) -> dict[tuple[str, str], FloatArray
     )
     a, _ = balance.accelerate(start.time, q, u, kept)
     placements = kinematics.placements
-    tables = (placements.positions, kinematics.velocities, kinematics.accelerations)
+    places = {node: world_position(mechanism, placements, node) for node in placements.positions}
+    tables = (places, kinematics.velocities, kinematics.accelerations)
     nodes, expressions = sorted(tables[0]), []
     for node in nodes:
         body = mechanism.bodies.body_of[node]

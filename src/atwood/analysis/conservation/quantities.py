@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, affine_coefficients, substitute
+from atwood.expr import Expression, affine_coefficients, evaluate, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.forms.places import to_maximal
@@ -98,7 +98,7 @@ class Quantities:
         kinematics = assembly.maximal.kinematics
         for one in forest.attachments:
             if len(one.speeds) == count:
-                own, r = [p[k] for k in one.speeds], [whole.coordinates[k] for k in one.coordinates]
+                own, r = [p[k] for k in one.speeds], self._in_world([whole.coordinates[k] for k in one.coordinates])
                 momentum = [a + b for a, b in zip(momentum, own, strict=True)]
                 spins = [a + b for a, b in zip(spins, _about_origin(r, own), strict=True)]
             if one.spin:
@@ -109,7 +109,8 @@ class Quantities:
             if turn.coordinate is not None and space.is_planar:
                 spins[0] = spins[0] + p[turn.coordinate]
         free = [one for one in forest.attachments if len(one.speeds) == count]
-        moments = _first_moments(whole, momentum, free, assembly.parameters)
+        places = [self._in_world([whole.coordinates[k] for k in one.coordinates]) for one in free]
+        moments = _first_moments(whole, momentum, free, places, assembly.parameters)
         every = self._in_generalized([*momentum, *spins, *moments])
         turns = {"space": ("x", "y", "z"), "plane": ("",)}.get(space.name, ())
         n, m = count, count + len(spins)
@@ -122,13 +123,20 @@ class Quantities:
         q = from_regular(assembly, start.coordinates)
         places = np.asarray(assembly.kernel(to_maximal(assembly))([start.time], q, start.speeds)[0], dtype=float)
         count = len(assembly.mechanism.space.basis)
+        origin = evaluate(list(assembly.mechanism.table.origin), assembly.mechanism.table.values)
         every = [places[list(one.coordinates)] for one in assembly.maximal.forest.attachments]
         free = [one for one in every if len(one) == count]
         if not free:
             return np.zeros(count), start.length
         middle = np.mean(free, axis=0)
         apart = float(np.max(np.linalg.norm(np.array(free) - middle, axis=1)))
+        middle += origin or 0.0
         return middle, max(extent(assembly.mechanism), apart) or start.length
+
+    def _in_world(self, place: Sequence[Expression]) -> list[Expression]:
+        """Return a position from the world's origin, along the axes of the scene."""
+        origin = self.assembly.mechanism.table.origin
+        return [o + p for o, p in zip(origin, place, strict=True)] if origin else list(place)
 
     def _in_generalized(self, values: Sequence[Expression]) -> list[Expression]:
         """Return expressions of maximal coordinates in terms of generalized ones and their velocities."""
@@ -160,7 +168,11 @@ def _about_origin(r: Sequence[Expression], p: Sequence[Expression]) -> list[Expr
 
 
 def _first_moments(
-    whole: Lagrangian, momentum: Sequence[Expression], free: Sequence[Attachment], parameters: Sequence[Expression]
+    whole: Lagrangian,
+    momentum: Sequence[Expression],
+    free: Sequence[Attachment],
+    places: Sequence[Sequence[Expression]],
+    parameters: Sequence[Expression],
 ) -> list[Expression]:
     """Return ``sum m r`` along each axis; nothing where momentum is not the sum of masses times velocities."""
     found = []
@@ -168,6 +180,6 @@ def _first_moments(
         taken = affine_coefficients(total, [whole.velocities[one.speeds[k]] for one in free], parameters)
         if taken is None or not taken[1].is_zero:
             return []
-        places = [whole.coordinates[one.coordinates[k]] for one in free]
-        found.append(add_up([whole.graph.zero, *(m * r for m, r in zip(taken[0], places, strict=True))]))
+        along = (place[k] for place in places)
+        found.append(add_up([whole.graph.zero, *(m * r for m, r in zip(taken[0], along, strict=True))]))
     return found

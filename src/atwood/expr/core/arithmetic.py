@@ -64,7 +64,37 @@ def subtract(a: Expression, b: Expression) -> Expression:
     if left is not None:
         return left
     left = _without(b, a)
-    return graph.node("sub", (a, b)) if left is None else negate(left)
+    if left is not None:
+        return negate(left)
+    met = _known_together(a, b)
+    return graph.node("sub", (a, b)) if met is None else met
+
+
+def _known_together(a: Expression, b: Expression) -> Expression | None:
+    """Return ``a - b`` with the known terms of both taken from each other, so that a large one that both have is gone.
+
+    So positions that are counted from one place far away are as far apart as they are from there.
+    """
+    known_a, known_b = _known_term(a), _known_term(b)
+    if known_a is not None and known_b is not None:
+        return subtract(_other(a, known_a), _other(b, known_b)) if known_a is known_b else None
+    if known_a is not None and b.is_parametric:
+        return subtract(_other(a, known_a), subtract(b, known_a))
+    if known_b is not None and a.is_parametric:
+        return subtract(subtract(a, known_b), _other(b, known_b))
+    return None
+
+
+def _known_term(total: Expression) -> Expression | None:
+    """Return the term of a sum of two that is known and no constant, if the other is not known."""
+    if total.operation != "add" or total.is_parametric:
+        return None
+    return next((one for one in total.arguments if one.is_parametric and not one.is_constant), None)
+
+
+def _other(total: Expression, term: Expression) -> Expression:
+    """Return the other term of a sum of two."""
+    return total.arguments[1] if total.arguments[0] is term else total.arguments[0]
 
 
 def _without(a: Expression, b: Expression) -> Expression | None:
@@ -73,7 +103,7 @@ def _without(a: Expression, b: Expression) -> Expression | None:
     So the difference of two positions along a chain is the one link between them.
     """
     if a.operation == "add" and b in a.arguments:
-        return a.arguments[1] if a.arguments[0] is b else a.arguments[0]
+        return _other(a, b)
     if a.operation == "sub" and a.arguments[0] is b:
         return negate(a.arguments[1])
     return None

@@ -104,6 +104,8 @@ class Mechanism:
         When it starts, s.
     idle_spins
         The axis, in the axes of the body, of each body that has no inertia about it; see `idle_spin`.
+    origin
+        The fixed connector, as (part, name), that positions are counted from; None for the world's own origin.
     """
 
     table: ParameterTable
@@ -120,6 +122,7 @@ class Mechanism:
     constants: Mapping[Expression, Constant] = field(default_factory=dict)
     t_start: float = 0.0
     idle_spins: Mapping[int, Vector] = field(default_factory=dict)
+    origin: tuple[str, str] | None = None
 
     def known_at_start(self) -> dict[Expression, float]:
         """Return the values of parameters, of discrete states, of time and of relations of it at the start of a run."""

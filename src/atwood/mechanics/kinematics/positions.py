@@ -158,8 +158,8 @@ def place(
     positions: dict[int, Components] = {}
     references: dict[int, Components] = {}
     known: dict[Expression, Expression] = {}
-    world = bodies.bodies[0]
-    _spread(graph, world, shape_of[0], WORLD, origin, angles, space, positions)
+    for node, offset in shape_of[0].offsets.items():
+        positions[node] = _shift(graph, origin, offset, None, space)
     references[0] = positions[WORLD]
     for attachment in forest.attachments:
         body, shape = bodies.bodies[attachment.body], shape_of[attachment.body]

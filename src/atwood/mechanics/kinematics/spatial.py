@@ -36,7 +36,7 @@ from atwood.model.values.rotation import (
 )
 from atwood.model.values.vector import Vector, cross
 from atwood.topology.bodies import Bodies, Body
-from atwood.topology.graph import WORLD, Joint
+from atwood.topology.graph import Joint
 from atwood.topology.spanning_forest import Attachment, SpanningForest
 
 __all__ = ["Course", "move_in_space"]
@@ -130,6 +130,13 @@ class _Walk:
         self.orientation_coordinates = {
             orientation.coordinates: orientation for orientation in forest.orientation_coordinates
         }
+
+    def lay_world(self, origin: _State) -> None:
+        """Place what is fixed, from where positions are counted."""
+        shape = self.shape_of[0]
+        for node, offset in shape.offsets.items():
+            self.nodes[node] = origin.moved(self.arm(0, offset), True)
+        self.references[0] = origin.moved(self.arm(0, shape.reference), True)
 
     def spread(self, body: Body, node: int, state: _State) -> None:
         """Place all nodes of a body, and its reference point, from one of its nodes."""
@@ -295,7 +302,7 @@ def move_in_space(
         begins.
     """
     walk = _Walk(graph, bodies, forest, shape_of, course)
-    walk.spread(bodies.bodies[0], WORLD, _State(_STILL, _STILL, _STILL, -pull))
+    walk.lay_world(_State(_STILL, _STILL, _STILL, -pull))
     for attachment in forest.attachments:
         body, joint = bodies.bodies[attachment.body], attachment.joint
         if joint is not None:

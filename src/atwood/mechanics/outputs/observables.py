@@ -13,6 +13,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map, rate_symbol
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.body_points import body_point_of
+from atwood.mechanics.kinematics.local_origin import world_position
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world
 from atwood.model.declare.component import Binding
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
@@ -182,7 +183,7 @@ def make_binding(
         node = site.node(path, name)
         body = site.bodies.body_of[node]
         motion = Motion(
-            position=space.vector(kinematics.placements.positions[node]),
+            position=space.vector(world_position(mechanism, kinematics.placements, node)),
             velocity=space.vector(kinematics.velocities[node]),
             acceleration=space.vector(kinematics.accelerations[node]),
         )
@@ -257,21 +258,23 @@ def part_energies(
     pull = space.components(mechanism.gravity)
     for one in local.point_inertias:
         nodes = [site.node(path, p.name) for p in one.points]
+        places = [world_position(mechanism, kinematics.placements, node) for node in nodes]
         for i, a in enumerate(nodes):
             for j, b in enumerate(nodes):
                 for k, g in enumerate(pull):
                     va, vb = kinematics.velocities[a][k], kinematics.velocities[b][k]
                     kinetic = kinetic + 0.5 * (one.masses[i][j] * (va * vb))
-                    potential = potential - one.masses[i][j] * (g * kinematics.placements.positions[a][k])
+                    potential = potential - one.masses[i][j] * (g * places[i][k])
     for body in local.body_inertias:
         node = site.node(path, body.frame.name)
         index = site.bodies.body_of[node]
         turn = site.node_turns[node]
         arm = body_point_of(kinematics, index, turn, body.center_of_mass, space)
+        place = world_position(mechanism, kinematics.placements, node)
         for k, g in enumerate(pull):
             v = kinematics.velocities[node][k] + arm.velocity[k]
             kinetic = kinetic + 0.5 * (body.mass * (v * v))
-            potential = potential - body.mass * (g * (kinematics.placements.positions[node][k] + arm.position[k]))
+            potential = potential - body.mass * (g * (place[k] + arm.position[k]))
         kinetic = kinetic + _energy_of_turning(path, body, turn, kinematics.angular_velocities.get(index, ()))
     for value in in_joint_coordinates(local, kinematics, local.potentials)[0]:
         potential = potential + substitute([value], mapping)[0]

@@ -10,6 +10,7 @@ from atwood.mechanics.build import Mechanism
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.body_points import body_point_of
+from atwood.mechanics.kinematics.local_origin import world_position
 from atwood.mechanics.outputs.observables import Observable, take
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.laws import LocalPart
@@ -61,7 +62,7 @@ def part_totals(mechanism: Mechanism, equations: Equations, path: str) -> Totals
     total = Totals()
     for one in local.point_inertias:
         nodes = [equations.site.node(path, point.name) for point in one.points]
-        places = [space.vector(kinematics.placements.positions[node]) for node in nodes]
+        places = [space.vector(world_position(mechanism, kinematics.placements, node)) for node in nodes]
         moving = [space.vector(kinematics.velocities[node]) for node in nodes]
         for i, r in enumerate(places):
             for j, (s, v) in enumerate(zip(places, moving, strict=True)):
@@ -86,7 +87,7 @@ def _of_body(mechanism: Mechanism, equations: Equations, local: LocalPart, body:
     node = equations.site.node(local.part.path, body.frame.name)
     index, turn = equations.site.bodies.body_of[node], equations.site.node_turns[node]
     arm = body_point_of(kinematics, index, turn, body.center_of_mass, space)
-    place = space.vector(kinematics.placements.positions[node]) + space.vector(arm.position)
+    place = space.vector(world_position(mechanism, kinematics.placements, node)) + space.vector(arm.position)
     whole = _of_mass(body.mass, place, place, space.vector(kinematics.velocities[node]) + space.vector(arm.velocity))
     spin = kinematics.angular_velocities.get(index, ())
     if space.is_spatial:

@@ -60,7 +60,7 @@ def bind_part(
         if not isinstance(one, JointCoordinate)
     }
     joint_references = find_joint_references(taken, graph)
-    motions = {name: local_motion(symbols, space) for name, symbols in connectors.items()}
+    motions = {name: local_motion(symbols, space, table.origin) for name, symbols in connectors.items()}
     motions.update({one.connector: Motion(value=one.value, rate=one.rate) for one in joint_references})
     own_line_signs = (
         None if line_signs is None else {(a, b): s for (path, a, b), s in line_signs.items() if path == part.path}
@@ -86,9 +86,17 @@ def _local_connector(path: str, is_frame: bool, space: Space, graph: Graph) -> L
     return LocalConnector(position, velocity, axes=(x, y, z), angular_velocity=spin)
 
 
-def local_motion(symbols: LocalConnector, space: Space) -> Motion:
-    """Return the motion of a connector in terms of its symbols; the plane's rotation is about -y."""
-    position, velocity = space.vector(symbols.position), space.vector(symbols.velocity)
+def local_motion(symbols: LocalConnector, space: Space, origin: tuple[Expression, ...] = ()) -> Motion:
+    """Return the motion of a connector in terms of its symbols; the plane's rotation is about -y.
+
+    Its position in the world is that of the origin from which the symbols count, and the symbols; these sums are made
+    as they stand, so that the difference of two is seen to be that of the symbols.
+    """
+    place: tuple[Expression, ...] = symbols.position
+    if origin:
+        pairs = zip(origin, place, strict=True)
+        place = tuple(p if o.is_zero else p.graph.node("add", (o, p)) for o, p in pairs)
+    position, velocity = space.vector(place), space.vector(symbols.velocity)
     if symbols.axes is not None:
         return Motion(position, velocity, axes=symbols.axes, angular_velocity=symbols.angular_velocity)
     if symbols.angle is None or symbols.angular_speed is None:

@@ -21,11 +21,21 @@ __all__ = ["ParameterTable", "read_parameter", "read_signal", "read_variation", 
 
 @dataclass
 class ParameterTable:
-    """The parameters of a scene as symbols, with their values; filled while the laws are read."""
+    """The parameters of a scene as symbols, with their values; filled while the laws are read.
+
+    Attributes
+    ----------
+    graph, values, space
+        Where expressions live, the values of the parameters, and what the scene lives in.
+    origin
+        Place in the world, along the free components of the space, from which positions are counted; empty for the
+        world's own origin.
+    """
 
     graph: Graph
     values: dict[Expression, float] = field(default_factory=dict)
     space: str = "plane"
+    origin: tuple[Expression, ...] = ()
 
     def scalar(self, name: str, value: float, structural: bool = False) -> Scalar:
         """Return the symbol of a parameter, or the plain number if it shapes the program (exact zero, structural)."""

@@ -16,6 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import state_program
 from atwood.late import dataclass, replace
 from atwood.mechanics.build import Mechanism
+from atwood.mechanics.kinematics.local_origin import world_position
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
 from atwood.model.declare.connectors import Groove
 from atwood.model.local.laws import LocalPart
@@ -221,8 +222,8 @@ def _node_points(result: Result) -> dict[int, FloatArray]:
 
     def places(assembly: Assembly) -> Iterator[Scalar]:
         for node in nodes:
-            position = assembly.own_equations.kinematics.placements.positions[node]
-            where = assembly.mechanism.space.vector(tuple(position))
+            placements = assembly.own_equations.kinematics.placements
+            where = assembly.mechanism.space.vector(world_position(assembly.mechanism, placements, node))
             yield from (where.x, where.z)
 
     whole = _along_run(result, "places", places)

@@ -11,6 +11,7 @@ from atwood.expr import depends_on, is_zero
 from atwood.forms.quantities import state_program
 from atwood.late import replace
 from atwood.mechanics.build import Mechanism
+from atwood.mechanics.kinematics.local_origin import world_position
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.laws import LocalPart
@@ -100,7 +101,7 @@ def _poses(result: Result) -> dict[int, Pose]:
         placements, graph = assembly.own_equations.kinematics.placements, mechanism.table.graph
         expressions = []
         for body in mechanism.bodies.bodies:
-            expressions += [graph.convert(c) for c in placements.positions[body.root]]
+            expressions += [graph.convert(c) for c in world_position(mechanism, placements, body.root)]
             axes = placements.axes.get(body.index)
             unturned = [graph.constant(float(i == j)) for i in range(3) for j in range(3)]
             expressions += unturned if axes is None else [graph.convert(c) for axis in axes for c in axis]
