@@ -224,7 +224,8 @@ def balance_of(assembly: Assembly, form: FormName) -> Balance:
     held = partial(assembly.kernel, program.constraints_alone)
     places, kinematic_map = (program.jacobian_rows, program.jacobian_columns), kinematic_map_of(assembly, form)
     laws = [one.key[:2] for one in assembly.in_coordinates(form).constraints]
-    errors = RowErrors(assembly, program.constraints_alone, ("value", "jacobian"), laws, places, kinematic_map)
+    groups = ("value", "jacobian", "explicit_rate")
+    errors = RowErrors(assembly, program.constraints_alone, groups, laws, places, kinematic_map)
     return Balance(program, partial(assembly.kernel, program.program), held, kinematic_map, errors, mass)
 
 

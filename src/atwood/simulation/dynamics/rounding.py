@@ -43,7 +43,8 @@ class RowErrors:
     assembly
         The scene.
     program, groups
-        The program of (t, q, u), and the names of the output groups, that values and entries of slopes come from.
+        The program of (t, q, u), and the names of the output groups, that values and entries of slopes come from, and
+        the rates of values where nothing but time moves, if there are any.
     laws
         The law that each condition belongs to. What a law holds are components of one vector as a rule, in axes that
         could be any: each is as uncertain as the most uncertain one.
@@ -59,7 +60,7 @@ class RowErrors:
         self,
         assembly: Assembly,
         program: Program,
-        groups: tuple[str, str],
+        groups: tuple[str, ...],
         laws: Sequence[Hashable],
         places: tuple[Any, Any],
         kinematic_map: KinematicMap,
@@ -104,8 +105,12 @@ class RowErrors:
         return any(one.operation == "symbol" and one in self._program.inputs[0].symbols for one in self._program.nodes)
 
     def _learn(self, t: float, q: FloatArray, scales: FloatArray) -> None:
-        values, entries = (_spread(one) for one in self._rough(t, q, scales, 1.0))
-        tangent = self._kinematic_matrix(t, q)
+        found, slopes, rates = self._rough(t, q, scales, 1.0)
+        values, entries, tangent = _spread(found), _spread(slopes), self._kinematic_matrix(t, q)
+        fastest = float(np.max(np.abs(rates), initial=0.0))
+        if fastest > 0.0:  # in the time in which what is prescribed moves by as much as the coordinates are scaled by
+            sizes = self._of_rows(np.max(np.abs(slopes), axis=1), tangent, scales)
+            values = np.maximum(values, _spread(rates) * (float(np.max(sizes)) / fastest))
         if len(self._entries):
             values, entries = np.maximum(values, self._values), np.maximum(entries, self._entries)
             tangent = np.maximum(tangent, self._tangent)
@@ -122,7 +127,7 @@ class RowErrors:
             By how much the place misses what it was to meet, relative to the scales.
         """
         tangent = self._kinematic_matrix(t, q)
-        values, found = self._rough(t, q, scales, 1.0)
+        values, found, _ = self._rough(t, q, scales, 1.0)
         errors = self._of_rows(_spread(found), tangent, scales)
         sizes = np.maximum(self._of_rows(np.max(np.abs(found), axis=1), tangent, scales), errors / ROUGHNESS)
         unknown = np.divide(_spread(values), sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
@@ -150,8 +155,10 @@ class RowErrors:
         np.maximum.at(largest, self._laws, errors)
         return largest[self._laws]
 
-    def _rough(self, t: float, q: FloatArray, scales: FloatArray, off: float) -> tuple[FloatArray, FloatArray]:
-        """Return values and entries, each in as many ways, with coordinates off by so many roundings."""
+    def _rough(
+        self, t: float, q: FloatArray, scales: FloatArray, off: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return values, entries and rates, each in as many ways, with coordinates off by so many roundings."""
         rough, count = self._assembly.shared.get(_ROUGH, self._made, self._program), len(self._laws)
         speeds = np.zeros(len(self._program.inputs[2].symbols))
         places = q[:, None] * roughly(len(q))
@@ -159,14 +166,14 @@ class RowErrors:
         places = places + (steps if self._kinematic_map.is_plain else self._kinematic_map.matrix(t, q) @ steps)
         found = rough(self._assembly.parameter_values, t * roughly(1), places, speeds)
         found = np.where(np.all(np.isfinite(found), axis=1, keepdims=True), found, 0.0)  # others say that it has none
-        return found[:count], found[count:]
+        slopes = count + len(self._rows)
+        return found[:count], found[count:slopes], found[slopes:]
 
     def _made(self) -> RoughProgram:
         """Return the rough program."""
         by_name = {one.name: one.expressions for one in self._program.outputs}
-        values, entries = (by_name[name] for name in self._groups)
         symbols = self._program.parameters, *(group.symbols for group in self._program.inputs)
-        return RoughProgram(symbols, (*values, *entries))
+        return RoughProgram(symbols, tuple(one for name in self._groups for one in by_name[name]))
 
     def _kinematic_matrix(self, t: float, q: FloatArray) -> FloatArray:
         return np.abs(self._kinematic_map.matrix(t, q)) if self._of_coordinates else np.zeros(0)

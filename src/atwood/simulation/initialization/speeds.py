@@ -105,12 +105,16 @@ def solve_speeds(
         u = u - scales * least_norm(scaled(matrix, scales), residual)
     system = System(assembly, equations, level.fixed, True, of_speeds=True)
     errors = system.errors.of_jacobian(t, q, scales)
+    prescribed = system.errors.of_values(t, q, scales) if system.errors.moves_by_itself else np.zeros_like(errors)
     for _ in range(3):  # linear: the second pass takes out rounding
         residual, matrix = system.at(t, q, u)
         if not np.any(residual):
             break
         rows = row_scales(matrix, scales, errors)
         u = u - scales * least_norm(scaled(matrix, scales, rows), residual / rows)
+        fastest = float(np.max(np.abs(u / scales), initial=0.0))
+        if fastest > 0.0:  # a row that changes little is known no better than what is prescribed in it rounds
+            errors = np.maximum(errors, prescribed / fastest)
     residual, matrix = system.at(t, q, u)
     if residual.size:
         rows = row_scales(matrix, scales, errors)
