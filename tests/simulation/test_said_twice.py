@@ -9,7 +9,7 @@ import pytest
 
 from atwood import Scene, StartError, assemble, simulate, sin
 from atwood.simulation.initialization.start import find_start
-from atwood_library import Drive, Ground, Link, Pivot, PointMass, Weld
+from atwood_library import Drive, Ground, Link, Pivot, PointMass, RigidBody, Slider, Weld
 
 FORMS = ("reduced", "dae")
 
@@ -71,3 +71,21 @@ def test_a_prescribed_speed_may_be_said_as_well_as_it_is_known(form: str) -> Non
         else:
             with pytest.raises(StartError, match=r"bob\.velocity\.x"):
                 find_start(assemble(scene, form=form))
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-6, 1e6])
+def test_a_speed_that_nothing_can_have_is_measured_as_a_speed(scale: float) -> None:
+    """A carriage on a level rail has no speed upwards; what rounding says of it is none in any unit of time."""
+    scene = Scene(space="plane", gravity=0.0)
+    ground, rail = scene.add("ground", Ground()), scene.add("rail", Slider())
+    body, pivot = scene.add("body", RigidBody(mass=2.0, moments=(0.2, 0.3, 0.2))), scene.add("pivot", Pivot())
+    arm = scene.add("arm", Link(length=1.0, mass=0.7))
+    for one, other in ((ground.frame, rail.a), (rail.b, body.frame), (body.frame, pivot.a), (pivot.b, arm.a)):
+        scene.connect(one, other)
+    scene.start.update({"body.position.x": 0.4, "body.velocity.x": 20.0 * scale, "body.velocity.z": -3e-15 * scale})
+    scene.start.update({"pivot.angle": 0.5, "pivot.angular_velocity": 7.0 * scale})
+    found = simulate(scene, t_end=1e-3 / scale, outputs=2)
+    assert found["body.velocity.x"][0] == pytest.approx(20.0 * scale)
+    scene.start["body.velocity.z"] = -3e-3 * scale
+    with pytest.raises(StartError, match=r"body\.velocity\.z"):
+        simulate(scene, t_end=1e-3 / scale, outputs=2)

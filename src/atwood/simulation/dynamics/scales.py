@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import InputGroup, OutputGroup, Program
+from atwood.expr import InputGroup, OutputGroup, Program, depends_on, evaluate
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.kept import Key
 from atwood.late import dataclass
 from atwood.mechanics.build import extent
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.outputs.observables import Observable
 from atwood.model.values.units import parse_unit
 
 __all__ = [
@@ -46,13 +47,23 @@ class Scales:
 
 
 def scene_length(assembly: Assembly) -> float:
-    """Return the extent of a scene, from its parameters and start values that are lengths; 1 m if it has none."""
+    """Return the extent of a scene, from its parameters and start values that are lengths; 1 m if it has none.
+
+    Positions of a mechanism far from the world's origin count from where all others do.
+    """
     sizes = [extent(assembly.mechanism)]
     for path, value in assembly.flat.start.items():
         observable = assembly.start_observables.get(path)
         if observable is not None and observable.unit == "m":
-            sizes.append(abs(value))
+            sizes.append(abs(value - _at_origin(assembly, observable)))
     return max(sizes) or 1.0
+
+
+def _at_origin(assembly: Assembly, observable: Observable) -> float:
+    """Return the part of a quantity that is only where positions are counted from; 0 at the world's own origin."""
+    mechanism = assembly.mechanism
+    shift = sum((one for one in mechanism.table.origin if depends_on(observable.value, [one])), 0.0)
+    return float(evaluate([mechanism.table.graph.convert(shift)], mechanism.table.values)[0])
 
 
 def coordinate_scales(equations: Equations, length: float) -> FloatArray:

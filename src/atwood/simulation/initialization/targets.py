@@ -14,6 +14,7 @@ from atwood.forms.source import no_start_quantity
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable
+from atwood.model.values.units import parse_unit
 from atwood.tolerances import tolerances
 
 __all__ = ["Level", "Target", "as_said", "find_level", "named_once", "said", "sort_targets"]
@@ -122,8 +123,9 @@ def find_level(assembly: Assembly, equations: Equations, path: str) -> int:
             advice="Give coordinates, positions and velocities.",
         )
     own = [symbol for symbol in reads if symbol in speeds]
-    if not own:
-        return 0
+    if not own:  # what does not move with anything is a rate if its unit is one
+        still = reads.isdisjoint(equations.coordinates)
+        return int(still and parse_unit(one.unit).exponents[2] == -1)
     if not _is_linear(one.value, own):
         raise StartError(
             "the quantity is not linear in the speeds and cannot be prescribed at the start",
