@@ -60,8 +60,7 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
     layouts = {body.index: body_offsets(body, space) for body in bodies.bodies}
     masses = add_masses(derivation.graph, bodies, derivation.locals_, layouts, space)
     check_masses(masses, derivation.table.values)
-    shape_of = shapes(bodies, layouts, {index: one.center for index, one in masses.bodies.items()})
-    shape_of[0] = _from_origin(shape_of[0], derivation)
+    shape_of = _from_origin(shapes(bodies, layouts, {i: one.center for i, one in masses.bodies.items()}), derivation)
     turns = {node: turn for _, body_turns in layouts.values() for node, turn in body_turns.items()}
     site = Site(graph, derivation.graph, bodies, space, turns)
     motion = (motion_in_space if space.is_spatial else motion_in_plane)(derivation, forest, shape_of)
@@ -149,11 +148,11 @@ def _use_up(
     ], taken
 
 
-def _from_origin(world: BodyShape, mechanism: Mechanism) -> BodyShape:
-    """Return where what is fixed is, as positions are counted."""
-    table, space = mechanism.table, mechanism.space
+def _from_origin(shape_of: Mapping[int, BodyShape], mechanism: Mechanism) -> Mapping[int, BodyShape]:
+    """Return the shapes of bodies, with what is fixed as positions are counted."""
+    table, space, world = mechanism.table, mechanism.space, shape_of[0]
     if not table.origin:
-        return world
+        return shape_of
     origin = space.vector(table.origin)
 
     def counted(place: Vector) -> Vector:
@@ -161,7 +160,7 @@ def _from_origin(world: BodyShape, mechanism: Mechanism) -> BodyShape:
         return Vector(*(difference(p, o) for p, o in pairs))
 
     offsets = {node: counted(place) for node, place in world.offsets.items()}
-    return BodyShape(offsets, world.turns, counted(world.reference))
+    return {**shape_of, 0: BodyShape(offsets, world.turns, counted(world.reference))}
 
 
 def _counted_from(mechanism: Mechanism, forest: SpanningForest, names: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
