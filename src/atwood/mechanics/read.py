@@ -12,8 +12,15 @@ from atwood.late import replace
 from atwood.mechanics.constraints.idle_spin import hold_idle_spins
 from atwood.mechanics.dynamics.carried_inertia import inertia_asked_for
 from atwood.mechanics.dynamics.inertia import check_tensors
-from atwood.mechanics.kinematics.local_origin import Connector, decided_near, find_origin, origin_at
-from atwood.mechanics.kinematics.mechanism import Mechanism, check_closures, make_gravity
+from atwood.mechanics.kinematics.mechanism import (
+    Connector,
+    Mechanism,
+    check_closures,
+    decided_near,
+    find_origin,
+    make_gravity,
+    origin_at,
+)
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.carried_inertia import Carried
 from atwood.model.local.flatten import FlatScene

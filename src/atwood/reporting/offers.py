@@ -17,7 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import coordinate_program, state_program
 from atwood.late import dataclass, replace
 from atwood.linalg.matrices import scaled
-from atwood.mechanics.kinematics.local_origin import world_position
+from atwood.mechanics.kinematics.mechanism import world_position
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
 from atwood.model.local.flatten import FlatScene
 from atwood.model.values.vector import Vector

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Scalar, evaluate
@@ -21,24 +21,35 @@ from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector, as_vector
 from atwood.tolerances import tolerances
 from atwood.topology.bodies import Bodies
-from atwood.topology.graph import Joint, MechanismGraph
+from atwood.topology.graph import WORLD, Joint, MechanismGraph
+
+if TYPE_CHECKING:
+    from atwood.mechanics.kinematics.positions import Placements
 
 __all__ = [
+    "Connector",
     "Constant",
     "Decision",
     "Derivation",
     "Mechanism",
     "check_closures",
     "decide",
+    "decided_near",
     "derivation_of",
     "discrete_states_of",
     "extent",
+    "find_origin",
     "from_start",
     "make_gravity",
+    "origin_at",
     "started_at",
+    "world_position",
 ]
 
 T = TypeVar("T")
+
+Connector = tuple[str, str]
+"""A connector, as (part, name)."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +133,7 @@ class Mechanism:
     constants: Mapping[Expression, Constant] = field(default_factory=dict)
     t_start: float = 0.0
     idle_spins: Mapping[int, Vector] = field(default_factory=dict)
-    origin: tuple[str, str] | None = None
+    origin: Connector | None = None
 
     def known_at_start(self) -> dict[Expression, float]:
         """Return the values of parameters, of discrete states, of time and of relations of it at the start of a run."""
@@ -289,3 +300,74 @@ def make_gravity(table: ParameterTable, value: float, direction: tuple[float, fl
     pull = table.scalar("gravity", value)
     along: Vector = as_vector(direction) * pull
     return along
+
+
+# -- where positions are counted from ---------------------------------------------------------------------------------
+#
+# A place far away takes digits from every length that is a difference of positions: at a million sizes from the origin
+# a closed loop is known to 1e-10 of its size, and no tolerance below that can be met. So positions are counted from a
+# fixed node near by. Laws read positions in the world; differences of two do not contain the place any more
+# (`expr.core.arithmetic`).
+
+_FAR = 10.0
+"""Places farther from the origin than so many times the mechanism's extent cost more than a digit."""
+
+
+def find_origin(mechanism: Mechanism) -> Connector | None:
+    """Return the fixed connector that positions are counted from; None for the world's origin, if that is near.
+
+    Parameters
+    ----------
+    mechanism
+        With positions from the world's origin.
+    """
+    nodes = _attached(mechanism)
+    size = extent(mechanism)
+    if not nodes or nodes[0] == WORLD or size == 0.0:
+        return None
+    offsets = body_offsets(mechanism.bodies.bodies[0], mechanism.space)[0]
+    graph = mechanism.table.graph
+    flat = [graph.convert(c) for node in nodes for c in mechanism.space.components(offsets[node])]
+    if all(one.is_zero for one in flat):
+        return None
+    values, n = evaluate(flat, mechanism.table.values), len(mechanism.space.basis)
+    nearest = min(math.hypot(*values[i : i + n]) for i in range(0, len(values), n))
+    return mechanism.graph.nodes[nodes[0]].members[0] if nearest > _FAR * size else None
+
+
+def decided_near(mechanism: Mechanism) -> Mechanism:
+    """Return a mechanism with the note that the place to count from was chosen by where it is."""
+    if all(one.is_zero for one in _fixed_places(mechanism)):
+        return mechanism
+    return replace(mechanism, decisions=(*mechanism.decisions, Decision(find_origin, find_origin(mechanism))))
+
+
+def origin_at(mechanism: Mechanism, connector: Connector) -> tuple[Expression, ...]:
+    """Return where a fixed connector is, along the free components of the space."""
+    offsets = body_offsets(mechanism.bodies.bodies[0], mechanism.space)[0]
+    place = offsets[mechanism.graph.node_of[connector]]
+    return tuple(mechanism.table.graph.convert(c) for c in mechanism.space.components(place))
+
+
+def world_position(mechanism: Mechanism, placements: Placements, node: int) -> tuple[Scalar, ...]:
+    """Return the position of a node from the world's origin, along the free components of the space."""
+    place = placements.positions[node]
+    return tuple(o + p for o, p in zip(mechanism.table.origin or (0.0,) * len(place), place, strict=True))
+
+
+def _fixed_places(mechanism: Mechanism) -> Iterator[Expression]:
+    for place in body_offsets(mechanism.bodies.bodies[0], mechanism.space)[0].values():
+        yield from (mechanism.table.graph.convert(c) for c in mechanism.space.components(place))
+
+
+def _attached(mechanism: Mechanism) -> list[int]:
+    """Return the fixed nodes at which parts of something that moves begin, in order."""
+    bodies, network = mechanism.bodies, mechanism.graph
+    moving = {joint.a if bodies.body_of[joint.a] == 0 else joint.b for joint in network.joints if not joint.is_rigid}
+    found = {node for node in moving if bodies.body_of[node] == 0}
+    for path, local in mechanism.locals_.items():
+        nodes = [network.node_of[path, name] for name in local.connectors]
+        fixed = {node for node in nodes if bodies.body_of[node] == 0}
+        if len(fixed) < len(set(nodes)):
+            found |= fixed
+    return sorted(found)

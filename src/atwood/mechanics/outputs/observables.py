@@ -13,7 +13,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map, rate_symbol
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.body_points import body_point_of
-from atwood.mechanics.kinematics.local_origin import world_position
+from atwood.mechanics.kinematics.mechanism import world_position
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world
 from atwood.model.declare.component import Binding
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion

@@ -10,7 +10,7 @@ from atwood.mechanics.build import Mechanism
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.body_points import body_point_of
-from atwood.mechanics.kinematics.local_origin import world_position
+from atwood.mechanics.kinematics.mechanism import world_position
 from atwood.mechanics.outputs.observables import Observable, take
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.laws import LocalPart

@@ -16,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import state_program
 from atwood.late import dataclass, replace
 from atwood.mechanics.build import Mechanism
-from atwood.mechanics.kinematics.local_origin import world_position
+from atwood.mechanics.kinematics.mechanism import world_position
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
 from atwood.model.declare.connectors import Groove
 from atwood.model.local.laws import LocalPart

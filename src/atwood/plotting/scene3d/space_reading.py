@@ -11,7 +11,7 @@ from atwood.expr import depends_on, is_zero
 from atwood.forms.quantities import state_program
 from atwood.late import replace
 from atwood.mechanics.build import Mechanism
-from atwood.mechanics.kinematics.local_origin import world_position
+from atwood.mechanics.kinematics.mechanism import world_position
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.laws import LocalPart
