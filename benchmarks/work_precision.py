@@ -130,6 +130,7 @@ def measure(mechanism: Mechanism, chosen: Any) -> dict[str, Any]:
                 break  # tighter ones would only take longer
             try:
                 run = make(setting)
+                run()  # the first call may compile
                 spent, values = run()
             except (AtwoodError, ArithmeticError) as error:
                 print(f"{mechanism.name}, {way}, {setting:g}: {error}", file=sys.stderr)

@@ -27,6 +27,9 @@ ROWS = {"x": 0, **{name: HIGHEST + 1 + i for i, name in enumerate(_NAMES)}, "all
 _CHAINS = 4
 """Sums that the terms of a convolution are spread over, so that additions do not wait for each other."""
 
+_NONE = "zeroinitializer"
+"""The sum of no terms."""
+
 _BLOCK = f"<{LANES} x double>"
 _PART = f"<{WIDTH} x double>"
 
@@ -68,6 +71,10 @@ class _Terms:
         """Add an operation on two rows."""
         return self.put(f"{operation} {_BLOCK} {a}, {b}")
 
+    def multiply_add(self, a: str, b: str, c: str) -> str:
+        """Return a product of two rows and a third."""
+        return self.put(f"call {_BLOCK} @llvm.fmuladd.v{LANES}f64({_BLOCK} {a}, {_BLOCK} {b}, {_BLOCK} {c})")
+
     def total(self, products: list[tuple[str, str]]) -> str:
         """Return the sum of products."""
         chains: list[str] = []
@@ -75,33 +82,44 @@ class _Terms:
             if i < _CHAINS:
                 chains.append(self.binary("fmul", a, b))
             else:
-                c = chains[i % _CHAINS]
-                chains[i % _CHAINS] = self.put(
-                    f"call {_BLOCK} @llvm.fmuladd.v{LANES}f64({_BLOCK} {a}, {_BLOCK} {b}, {_BLOCK} {c})"
-                )
+                chains[i % _CHAINS] = self.multiply_add(a, b, chains[i % _CHAINS])
         while len(chains) > 1:
             chains = [
                 self.binary("fadd", *chains[i : i + 2]) if i + 1 < len(chains) else chains[i]
                 for i in range(0, len(chains), 2)
             ]
-        return chains[0] if chains else "zeroinitializer"
+        return chains[0] if chains else _NONE
 
 
 def _pairs(order: int) -> str:
-    """Return the function of the convolutions of two values at an order."""
+    """Return the function of the convolutions of two values at an order.
+
+    The rows of the order before have just been written by parts, and are the last that can be read: what they are in
+    is added last.
+    """
     terms = _Terms()
     products = [(terms.load("%left", j), terms.load("%right", order - j)) for j in range(1, order)]
-    return _blocks(f"pairs{order}", 2 * STRIDE, terms, terms.total(products))
+    total = terms.total(products[1:-1])
+    for a, b in products[:1] + products[1:][-1:]:
+        total = terms.binary("fmul", a, b) if total == _NONE else terms.multiply_add(a, b, total)
+    return _blocks(f"pairs{order}", 2 * STRIDE, terms, total)
 
 
 def _squares(order: int) -> str:
-    """Return the function of the convolutions of values with themselves: each product occurs twice but the middle."""
+    """Return the function of the convolutions of values with themselves: each product occurs twice but the middle.
+
+    What the rows of the order before are in is added last.
+    """
     terms = _Terms()
-    half = terms.total([(terms.load("%left", j), terms.load("%left", order - j)) for j in range(1, (order + 1) // 2)])
-    total = half if half == "zeroinitializer" else terms.binary("fadd", half, half)
+    half = terms.total([(terms.load("%left", j), terms.load("%left", order - j)) for j in range(2, (order + 1) // 2)])
+    total = half if half == _NONE else terms.binary("fadd", half, half)
     if order % 2 == 0:
         middle = terms.load("%left", order // 2)
-        total = terms.binary("fadd", total, terms.binary("fmul", middle, middle))
+        total = terms.binary("fmul", middle, middle) if total == _NONE else terms.multiply_add(middle, middle, total)
+    if order > 2:
+        first, last = terms.load("%left", 1), terms.load("%left", order - 1)
+        twice = terms.binary("fadd", first, first)
+        total = terms.binary("fmul", twice, last) if total == _NONE else terms.multiply_add(twice, last, total)
     return _blocks(f"squares{order}", STRIDE, terms, total)
 
 
