@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from itertools import islice
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, overload
 
-from atwood.arguments import NAME, Kind, check, show, takes_names
+from atwood.arguments import NAME, Kind, check, takes_names
 from atwood.errors import DeclarationError, ParameterError, UsageError, suggestion
 from atwood.model.compose.connection_rules import (
     Connection,
@@ -31,15 +30,16 @@ from atwood.model.compose.differences import (
     take_over,
     take_snapshot,
 )
+from atwood.model.compose.part_rules import check_new_parts
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression
+from atwood.model.declare.refusals import no_such_parameter
 from atwood.showing import count_of, field_text, fitted, html_table, listed
 
 PATH = Kind("a dotted path, such as 'left.rod'", NAME.read)
 
 __all__ = ["Connection", "Model", "connect"]
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _P = TypeVar("_P", bound=Component)
 
 
@@ -177,33 +177,7 @@ class Model(_State, Component):
         DeclarationError
             If the name is taken or no identifier, or the part belongs to a model already.
         """
-        where = self.path or type(self).__name__
-        check(NAME, name, "name", f"{where}.add", DeclarationError)
-        if not _NAME.match(name):
-            raise DeclarationError(
-                f"{name!r} cannot be the name of a part",
-                where=where,
-                advice="Use letters, digits and _, a letter first.",
-            )
-        if name in self._attached:
-            raise DeclarationError(
-                f"there is a part {name!r} already", where=where, advice="Use replace, or another name."
-            )
-        if hasattr(type(self), name):
-            raise DeclarationError(
-                f"the name {name!r} has a meaning of its own in a {type(self).__name__}",
-                where=where,
-                advice="Choose another name.",
-            )
-        parts: list[Any] = part if isinstance(part, list) else [part]
-        if not parts:
-            raise DeclarationError(f"the array {name!r} has no parts", where=where, advice="Give at least one.")
-        for one in parts:
-            self._check_is_free(name, one)
-        if len({id(one) for one in parts}) < len(parts):
-            raise DeclarationError(
-                f"the array {name!r} holds one object twice", where=where, advice="Give each its own object."
-            )
+        check_new_parts(self, name, part, taken=self._attached)
         added = list(part) if isinstance(part, list) else part
         try:
             self._attach(name, added)
@@ -211,28 +185,6 @@ class Model(_State, Component):
             self._release(name)
             raise
         return added
-
-    def _check_is_free(self, name: str, part: Any) -> None:
-        where = self.path or type(self).__name__
-        if not isinstance(part, Component):
-            advice = "Give a part, such as Rod(), or a list of parts."
-            if isinstance(part, type):
-                advice = f"Call the class: {part.__name__}() and not {part.__name__}."
-            problem = f"the part {name!r} cannot be {show(part)}, which is no component"
-            raise DeclarationError(problem, where=where, advice=advice)
-        if part._declared or part._parent is not None:
-            there = part._declared or part.path
-            raise DeclarationError(
-                f"the part given as {name!r} is already there as {there!r}",
-                where=where,
-                advice="Give each its own object; copy() makes one.",
-            )
-        around: Component | None = self
-        while around is not None:
-            if around is part:
-                advice = "Give it a copy(), or another model."
-                raise DeclarationError(f"a model cannot be a part of itself, as {name!r}", where=where, advice=advice)
-            around = around._parent
 
     @takes_names
     def connect(self, a: Any, b: Any) -> None:
@@ -337,17 +289,13 @@ class Model(_State, Component):
         setattr(self[".".join(steps)] if steps else self, name, value)
 
     def _unknown(self, name: str) -> ParameterError:
+        kind = type(self).__name__
         if name in getattr(self, "_parts", {}) or name in getattr(self, "_attached", {}):
             return ParameterError(
-                f"{name!r} is a part and cannot be set", where=self.path or type(self).__name__, advice="Use replace."
+                f"{name!r} is a part and cannot be set", where=self.path or kind, advice="Use replace."
             )
-        kind = type(self).__name__
         known = [*self._parameters, *self._signals, *self._prototypes]
-        return ParameterError(
-            f"a {kind} has no parameter {name!r}",
-            where=self.path or kind,
-            advice=suggestion(name, known) or "A part is added with add.",
-        )
+        return no_such_parameter(kind, self.path, name, known, otherwise="A part is added with add.")
 
     # -- showing -------------------------------------------------------------------------------------------------
 

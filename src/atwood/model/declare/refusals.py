@@ -38,9 +38,10 @@ def no_such_name(
     return MissingNameError(f"a {kind} has no {name!r}", where=path or kind, advice=advice)
 
 
-def no_such_parameter(kind: str, path: str, name: str, known: Collection[str]) -> ParameterError:
-    """Return the error of a name that is no parameter and no input."""
-    return ParameterError(f"a {kind} has no parameter {name!r}", where=path or kind, advice=suggestion(name, known))
+def no_such_parameter(kind: str, path: str, name: str, known: Collection[str], otherwise: str = "") -> ParameterError:
+    """Return the error of a name that is no parameter and no input, with advice where nothing is called alike."""
+    advice = suggestion(name, known) or otherwise
+    return ParameterError(f"a {kind} has no parameter {name!r}", where=path or kind, advice=advice)
 
 
 def no_such_reaction(path: str, name: str, readable: Collection[str], is_rigid: bool) -> DeclarationError:
