@@ -12,9 +12,10 @@ from functools import cached_property
 import numpy as np
 
 from atwood.analysis.number_functions import Function, Numbers, at_time
+from atwood.analysis.velocity_jacobians import by_speeds, velocity_jacobian
 from atwood.arrays import FloatArray
-from atwood.errors import SolveError, UnsupportedError, UsageError, suggestion
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute
+from atwood.errors import SolveError, UnsupportedError, UsageError
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.derivative import is_too_long
 from atwood.forms.kept import Key
@@ -240,7 +241,7 @@ class Dynamics:
             If there is no such quantity, or it depends on accelerations or reactions.
         """
         if path not in self._jacobians:
-            entries, shape = self._jacobian_of(path)
+            entries, shape = velocity_jacobian(self.assembly, self.equations, path)
             self._jacobians[path] = self._function(f"jacobian of {path}", lambda: entries, "q", shape)
         return self._jacobians[path](t, (q,), out)
 
@@ -304,7 +305,7 @@ class Dynamics:
         e, shape = self.equations, (len(self.equations.constraints), len(self.equations.speeds))
 
         def entries() -> list[Expression]:
-            return _full([one.rate for one in e.constraints], e.speeds, e)
+            return by_speeds([one.rate for one in e.constraints], e)
 
         return self._function("constraint Jacobian", entries, "q", shape)
 
@@ -318,29 +319,6 @@ class Dynamics:
     @cached_property
     def _jacobians(self) -> dict[str, Function]:
         return {}
-
-    def _jacobian_of(self, path: str) -> tuple[list[Expression], tuple[int, ...]]:
-        """Return the derivatives of a quantity's rate by the speeds, and the shape of what they make."""
-        e, observables = self.equations, self.assembly.observables
-        vector = [f"{path}.{axis}" for axis in "xyz" if f"{path}.{axis}" in observables]
-        if path not in observables and not vector:
-            known = sorted({one.rpartition(".")[0] if one[-2:] in (".x", ".y", ".z") else one for one in observables})
-            raise UsageError("there is no such quantity", where=path, advice=suggestion(path, known))
-        values = [observables[one].value for one in ([path] if path in observables else vector)]
-        others = [*e.accelerations, *(one.symbol for one in self.assembly.reactions)]
-        if any(depends_on(value, others) for value in values):
-            raise UsageError(
-                "it depends on accelerations or reactions, and has no derivative of motion",
-                where=path,
-                advice="Ask for a position, an angle or a velocity.",
-            )
-        if not any(depends_on(value, e.speeds) for value in values):
-            values = jvp(values, {e.time: 1.0, **dict(zip(e.coordinates, e.rates, strict=True))})
-        entries = _full(values, e.speeds, e)
-        if any(depends_on(one, e.speeds) for one in dict.fromkeys(entries)):
-            raise UsageError("it is not linear in the speeds", where=path, advice="Ask for a position or a velocity.")
-        shape = (len(e.speeds),)
-        return entries, shape if path in observables else (len(vector), *shape)
 
     # -- numbers ------------------------------------------------------------------------------------------------------
 
@@ -402,14 +380,3 @@ class Dynamics:
             where=self._name,
             advice="Something without mass is free to move, or the mechanism is in a singular position.",
         )
-
-
-def _full(values: Sequence[Expression], speeds: Sequence[Expression], equations: Equations) -> list[Expression]:
-    """Return the derivatives of values by the speeds, row by row."""
-    n = len(speeds)
-    entries = [equations.graph.zero] * (len(values) * n)
-    found = jacobian(list(values), list(speeds)) if values else None
-    if found is not None:
-        for row, column, entry in zip(found.rows, found.columns, found.entries, strict=True):
-            entries[row * n + column] = entry
-    return entries
