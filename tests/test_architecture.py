@@ -73,7 +73,6 @@ LONG_FILES = {
     "forms/program.py",
     "integrators/explicit_session.py",
     "integrators/ida/native.py",
-    "model/declare/component.py",
     "simulation/run/segment.py",
     "simulation/singular/monitor.py",
 }

@@ -11,14 +11,14 @@ class EnergySensor(Component):
     @observable(unit="J", doc="Kinetic energy of the model.")
     def kinetic(self) -> Scalar:
         """Return the kinetic energy."""
-        return self.energy_around("kinetic")
+        return self.total_around("kinetic")
 
     @observable(unit="J", doc="Potential energy of the model, weight and springs.")
     def potential(self) -> Scalar:
         """Return the potential energy."""
-        return self.energy_around("potential")
+        return self.total_around("potential")
 
     @observable(unit="J", doc="Kinetic and potential energy of the model.")
     def total(self) -> Scalar:
         """Return the energy."""
-        return self.energy_around("kinetic") + self.energy_around("potential")
+        return self.total_around("kinetic") + self.total_around("potential")

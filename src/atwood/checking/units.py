@@ -14,7 +14,8 @@ from typing import Any
 from atwood.checking.report import Finding
 from atwood.consistency.trials import Body, Trial
 from atwood.late import dataclass, replace
-from atwood.model.declare.component import Binding, Component, bind
+from atwood.model.declare.binding import Binding, bind
+from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.function_values import Function

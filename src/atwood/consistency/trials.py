@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from atwood.late import dataclass, replace
-from atwood.model.declare.component import Binding, Component, bind
+from atwood.model.declare.binding import Binding, bind
+from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Motion
 from atwood.model.declare.contributions import Placement
 from atwood.model.declare.law import Law

@@ -28,7 +28,7 @@ from atwood.mechanics.kinematics.mechanism import (
 from atwood.mechanics.kinematics.motion import Motion, motion_in_plane, motion_in_space
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, shapes
-from atwood.model.declare.component import bind
+from atwood.model.declare.binding import bind
 from atwood.model.local.laws import LocalConstraint
 from atwood.model.local.parts import LocalState, multiplier_symbol
 from atwood.model.returned import law_value

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from atwood.expr import Scalar
 from atwood.late import dataclass
 from atwood.model.declare.connectors import Motion
 from atwood.model.values.vector import Vector
 
-__all__ = ["Binding"]
+if TYPE_CHECKING:
+    from atwood.model.declare.component import Component
+
+__all__ = ["Binding", "bind"]
 
 
 @dataclass(frozen=True)
@@ -50,3 +53,20 @@ class Binding:
     known: Mapping[str, Any] = field(default_factory=dict)
     reactions: Mapping[str, Any] = field(default_factory=dict)
     energies: Mapping[str, Any] = field(default_factory=dict)
+
+
+def bind(component: Component, binding: Binding) -> Any:
+    """Return the component with values in place of its fields, so that its laws can be evaluated.
+
+    Parameters
+    ----------
+    component
+        The component.
+    binding
+        Numbers, expressions or sympy terms for everything its laws may read.
+    """
+    twin = object.__new__(type(component))
+    for name in ("_parent", "_name", "_settings"):
+        object.__setattr__(twin, name, getattr(component, name))
+    object.__setattr__(twin, "_bound", binding)
+    return twin

@@ -26,7 +26,7 @@ from atwood.model.values.outline import Outline
 from atwood.model.values.vector import Vector, dot, norm
 from atwood.showing import field_text, fitted, html_table
 
-__all__ = ["Binding", "Component", "bind"]
+__all__ = ["Component"]
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(connector, state, discrete_state))
@@ -253,10 +253,6 @@ class Component(metaclass=ComponentType):
             raise no_such_reaction(self.path, name, reactions, is_rigid)
         return reactions[name]
 
-    def energy_around(self, kind: str) -> Scalar:
-        """Return the ``"kinetic"`` or ``"potential"`` energy of the enclosing model; only within an observable."""
-        return self.total_around(kind)
-
     def total_around(self, kind: str) -> Any:
         """Return something of the enclosing model as a whole; only within an observable.
 
@@ -293,12 +289,7 @@ class Component(metaclass=ComponentType):
         scope = self._parent if given else self
         if not isinstance(value, ParameterExpression) or scope is None:
             return value
-        where = f"{self.path or type(self).__name__}.{name}"
-        try:
-            worked_out = value.value_in(scope)
-        except (ArithmeticError, TypeError) as error:
-            raise ParameterError(f"its value {value!r} cannot be worked out ({error})", where=where) from None
-        return spec.check(worked_out, where)
+        return self._checked(name, value.worked_out(scope, f"{self.path or type(self).__name__}.{name}"))
 
     def _field(self, name: str) -> Field:
         return self._parameters[name] if name in self._parameters else self._signals[name]
@@ -407,20 +398,3 @@ class Component(metaclass=ComponentType):
 
     def __copy__(self) -> Self:
         return self.copy()  # parts that two models share would belong to one of them
-
-
-def bind(component: Component, binding: Binding) -> Any:
-    """Return the component with values in place of its fields, so that its laws can be evaluated.
-
-    Parameters
-    ----------
-    component
-        The component.
-    binding
-        Numbers, expressions or sympy terms for everything its laws may read.
-    """
-    twin = object.__new__(type(component))
-    for name in ("_parent", "_name", "_settings"):
-        object.__setattr__(twin, name, getattr(component, name))
-    object.__setattr__(twin, "_bound", binding)
-    return twin

@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from atwood.errors import DeclarationError
+from atwood.errors import DeclarationError, ParameterError
 from atwood.model.values.units import Exponents, Unit, unit_of
 
 if TYPE_CHECKING:
@@ -49,6 +49,19 @@ class ParameterExpression:
         """Return the value within an enclosing model; deferred again if that is only declared so far."""
         values = [one.value_in(model) if isinstance(one, ParameterExpression) else one for one in self.arguments]
         return OPERATIONS[self.operation](*values)
+
+    def worked_out(self, model: Component, where: str) -> Any:
+        """Return the same.
+
+        Raises
+        ------
+        ParameterError
+            If there is no value, as of a division by zero; it names `where`.
+        """
+        try:
+            return self.value_in(model)
+        except (ArithmeticError, TypeError) as error:
+            raise ParameterError(f"its value {self!r} cannot be worked out ({error})", where=where) from None
 
     def __repr__(self) -> str:
         return f"{self.operation}({', '.join(map(repr, self.arguments))})"

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from atwood.expr import Expression, Graph
 from atwood.late import dataclass
-from atwood.model.declare.component import Binding
+from atwood.model.declare.binding import Binding
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.joint_coordinates import (

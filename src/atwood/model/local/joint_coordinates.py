@@ -8,7 +8,7 @@ from typing import Any
 from atwood.errors import DeclarationError
 from atwood.expr import Expression, Graph, live, tan
 from atwood.late import dataclass
-from atwood.model.declare.component import bind
+from atwood.model.declare.binding import bind
 from atwood.model.declare.law import ConstraintOptions, Law
 from atwood.model.local.flatten import Part
 from atwood.model.local.joint_references import JointCoordinateUse

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 from atwood.errors import AtwoodError, DeclarationError, UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, depends_on, live
 from atwood.late import dataclass, replace
+from atwood.model.declare.binding import Binding, bind
 from atwood.model.declare.carried_inertia import Asked, Carried
-from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.law import Law
 from atwood.model.declare.laws import scalars

@@ -9,7 +9,7 @@ from typing import Any
 from atwood.errors import AtwoodError, DeclarationError, ParameterError
 from atwood.expr import Expression, Graph, Scalar
 from atwood.late import dataclass
-from atwood.model.declare.component import Binding, bind
+from atwood.model.declare.binding import Binding, bind
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.states import state_values

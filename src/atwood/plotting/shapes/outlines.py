@@ -7,8 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.model.declare.binding import Binding
-from atwood.model.declare.component import bind
+from atwood.model.declare.binding import Binding, bind
 from atwood.model.local.laws import LocalPart
 from atwood.model.values.outline import Outline
 from atwood.plotting.shapes.meshes import Mesh, box, revolved

@@ -19,7 +19,7 @@ from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.forces import local_map
-from atwood.model.declare.component import bind
+from atwood.model.declare.binding import bind
 from atwood.model.declare.contributions import CoordinateLoad, Load
 from atwood.model.declare.laws import scalars
 from atwood.model.local.laws import LocalPart

@@ -16,8 +16,8 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, SolveError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.model.declare.binding import Binding
-from atwood.model.declare.component import Component, bind
+from atwood.model.declare.binding import Binding, bind
+from atwood.model.declare.component import Component
 from atwood.model.declare.law import Law
 
 if TYPE_CHECKING:
