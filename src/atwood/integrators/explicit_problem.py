@@ -296,13 +296,16 @@ LOOSEST = 1e-3
 """The largest relative tolerance that steps are chosen by: longer steps gain energy unseen, until chains fly apart."""
 
 
+_TINY = float(np.finfo(float).tiny)
+
+
 def absolute_tolerances(options: SolverOptions, size: int) -> FloatArray:
     """Return the absolute tolerance of each unknown; nothing is divided by zero where it is zero."""
     if isinstance(options.absolute_tolerances, float):
-        return np.full(size, max(options.absolute_tolerances, float(np.finfo(float).tiny)))
+        return np.full(size, max(options.absolute_tolerances, _TINY))
     try:
         given = np.broadcast_to(np.asarray(options.absolute_tolerances, dtype=np.float64), (size,))
-        return np.maximum(given, np.finfo(float).tiny)
+        return np.maximum(given, _TINY)
     except ValueError:
         raise UsageError(f"give one absolute tolerance, or one for each of the {size} unknowns") from None
 

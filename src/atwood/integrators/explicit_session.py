@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import cache
-from math import inf
+from math import inf, isfinite
 from typing import Literal, Protocol, cast, runtime_checkable
 
 import numpy as np
@@ -247,7 +247,8 @@ class ExplicitSession:
         values = np.array(y, dtype=np.float64)
         if values.shape != (self._size,):
             raise UsageError(f"the state has {self._size} unknowns, but was given values of shape {values.shape}")
-        if not (np.isfinite(t) and np.isfinite(values).all()):
+        # The square is not finite either where values are very large; then each is looked at.
+        if not (isfinite(t) and (isfinite(values.dot(values)) or np.isfinite(values).all())):
             raise StartError(f"the start values at t = {t} are not all finite numbers")
         if not self._stepper.start(float(t), values):
             raise StartError(f"the right-hand side has no finite value at the start, t = {t:.9g}")

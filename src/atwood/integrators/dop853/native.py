@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
+from functools import cache
 from itertools import accumulate
 from math import inf
 from typing import TYPE_CHECKING
@@ -87,13 +88,13 @@ class CompiledAccelerations:
         derived, scratch = np.empty(len(self.program.prologue)), np.empty(self._built.scratch)
         self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
 
-        function, place = self._built.code.addresses["rates"], derived.ctypes.data
+        function, place, room = self._built.code.addresses["rates"], derived.ctypes.data, 2 + len(scratch)
 
         def rates() -> CompiledRates:
             # The pointers to derived values and scratch, and then the scratch itself.
-            own = np.empty(2 + len(scratch))
+            own = np.empty(room)
             data = own.ctypes.data
-            own[:2].view(np.uint64)[:] = place, data + 16
+            own.view(np.int64)[:2] = place, data + 16
             return CompiledRates(function, data, (self._built, derived, own))
 
         return rates
@@ -149,25 +150,26 @@ class CompiledStepper:
         self._restart: Callable[[float], None] | None = None
         rates = self._in_python(problem) if problem.compiled is None else problem.compiled()
         self._keep = rates.keep
-        self._absolute = absolute_tolerances(options, problem.size)
-        n, padded = problem.size, -(-problem.size // WIDTH) * WIDTH
+        n, absolute = problem.size, absolute_tolerances(options, problem.size)
+        padded, ends = _layout(n)
         # All memory is one piece, since looking up an address takes longer than a step.
-        ends = list(accumulate((ROWS["all"] * padded, len(NUMBERS), len(COUNTS), len(POINTERS), n, n)))
-        self._memory = np.zeros(ends[-1])
-        base = self._memory.ctypes.data
-        arrays, self._numbers, counts, pointers, self._y, self._yp = np.split(self._memory, ends[:-1])
-        self._arrays = arrays.reshape(ROWS["all"], padded)
-        self._counts, self._pointers = counts.view(np.int64), pointers.view(np.uint64)
-        self._arrays[ROWS["absolute"]] = 1.0
-        self._arrays[ROWS["absolute"], :n] = self._absolute
+        self._memory = memory = np.zeros(ends[-1])
+        base = memory.ctypes.data
+        self._arrays = arrays = memory[: ends[0]].reshape(-1, padded)
+        self._numbers = memory[ends[0] : ends[1]]
+        whole = memory.view(np.int64)
+        self._counts, self._pointers = whole[ends[1] : ends[2]], whole[ends[2] : ends[3]]
+        self._y, self._yp = memory[ends[3] : ends[4]], memory[ends[4] :]
+        arrays[ROWS["absolute"]] = 1.0
+        arrays[ROWS["absolute"], :n] = absolute
         self._counts[:2] = n, padded
-        self._numbers[_R] = options.relative_tolerance
-        self._numbers[_LONGEST] = options.max_step or inf
-        self._numbers[_HORIZON], self._numbers[_FIRST] = options.horizon, options.first_step or 0.0
+        longest = options.max_step or inf
+        # From the relative tolerance on, numbers are those of the options.
+        self._numbers[_R : _FIRST + 1] = options.relative_tolerance, longest, options.horizon, options.first_step or 0.0
         self._pointers[:5] = rates.function, rates.data, base + 8 * ends[0], base + 8 * ends[1], base
         self._pointers[_PROJECT : _PROJECT + 2] = rates.project, rates.project_data
-        self._session = c_void_p(base + 8 * ends[2])
-        self._places = c_void_p(base + 8 * ends[3]), c_void_p(base + 8 * ends[4])
+        self._session = base + 8 * ends[2]
+        self._places = base + 8 * ends[3], base + 8 * ends[4]
         self._run, self._interpolate, self._sample, self._begin = functions()
 
     def batch_places(self) -> BatchPlaces:
@@ -177,7 +179,7 @@ class CompiledStepper:
         begin, sample = (_code().code.addresses[name] for name in ("begin", "sample"))
         limit, steps, filled = (self._counts[k:].ctypes.data for k in (_LIMIT, _STEPS, _FILLED))
         tolerance = self._arrays[ROWS["absolute"]].ctypes.data
-        places = begin, sample, self._session.value or 0, limit, steps, filled, tolerance, _COUNTED
+        places = begin, sample, self._session, limit, steps, filled, tolerance, _COUNTED
         return BatchPlaces(*places, keep=self)
 
     @property
@@ -292,6 +294,15 @@ class CompiledStepper:
 
 
 _COUNTED = len(names_of(Counts))
+
+
+@cache
+def _layout(size: int) -> tuple[int, tuple[int, ...]]:
+    """Return how long rows are, and where each array of a session ends, for so many unknowns."""
+    padded = -(-size // WIDTH) * WIDTH
+    lengths = ROWS["all"] * padded, len(NUMBERS), len(COUNTS), len(POINTERS), size, size
+    return padded, tuple(accumulate(lengths))
+
 
 _T, _STOP, _R, _LONGEST, _HORIZON, _FIRST = map(NUMBERS.index, ("t", "stop", "relative", "longest", "horizon", "first"))
 _T_OLD = NUMBERS.index("t_old")

@@ -60,6 +60,7 @@ class CompiledRecurrences:
         parts = [Part("start", programs.start), order]
         self.built = build_code(parts, replace(default_options(parts), contract=True))
         self.addresses = self.built.code.addresses
+        self.layout = _Layout(self)
 
     def bind(self, parameter_values: ArrayLike) -> FloatArray:
         """Return what depends on parameters alone."""
@@ -71,6 +72,69 @@ class CompiledRecurrences:
         prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self.addresses["start_prologue"])
         prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
         return derived
+
+
+class _Layout:
+    """Where each array of a session stands, from the beginning of its memory.
+
+    Parameters
+    ----------
+    recurrences
+        What a session is of.
+
+    Attributes
+    ----------
+    places, size, padded
+        In numbers of 8 bytes: where arrays begin, how many there are in all, and in a row of unknowns.
+    tables
+        What the tables of pointers hold, in bytes from the beginning.
+    pointers, is_own
+        The pointers of a session, and which of them are such distances; addresses of functions are not.
+    """
+
+    def __init__(self, recurrences: CompiledRecurrences) -> None:
+        programs, n = recurrences.programs, recurrences.size
+        self.padded = -(-n // WIDTH) * WIDTH
+        known = len(programs.order.parameters)
+        pairs, squares = -(-programs.pairs // LANES), -(-programs.squares // LANES)
+        lengths = {
+            "pointers": len(POINTERS),
+            "numbers": len(NUMBERS),
+            "counts": len(COUNTS),
+            "tables": 16,
+            "values": 2 * n,
+            "known": known,
+            "spare": known,
+            "derived": len(programs.order.prologue),
+            "scratch": recurrences.built.scratch,
+            "arrays": ROWS["all"] * self.padded,
+            "pair_sums": pairs * LANES,
+            "square_sums": squares * LANES,
+            "table": (2 * pairs + squares) * STRIDE,
+        }
+        ends = [0, *accumulate(-(-length // _LINE) * _LINE for length in lengths.values())]
+        self.places, self.size = dict(zip(lengths, ends, strict=False)), ends[-1]
+        far = {name: 8 * at for name, at in self.places.items()}
+
+        def row(name: str) -> int:
+            return far["arrays"] + 8 * self.padded * ROWS[name]
+
+        def number(name: str) -> int:
+            return far["numbers"] + 8 * NUMBERS.index(name)
+
+        pairs_of_tables = (
+            *(number("t_new"), row("new"), row("new_rates"), far["known"]),
+            *(number("time"), row("trial"), row("trial_rates"), far["spare"]),
+            *(far["pair_sums"], far["square_sums"], far["numbers"]),
+        )
+        self.tables = np.array(pairs_of_tables, dtype=np.int64)
+        names = ("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out")
+        far |= {name: far["tables"] + 8 * at for name, at in zip(names, (0, 2, 4, 6, 8, 12), strict=True)}
+        code = recurrences.addresses
+        given = {"start": code["start"], "prologue": code["order_prologue"], "recurrence": code["order"]}
+        given["start_derived"] = 0  # of each session
+        self.pointers = np.array([{**far, **given}[name] for name in POINTERS], dtype=np.int64)
+        self.is_own = np.array([name not in given for name in POINTERS], dtype=np.int64)
 
 
 class CompiledStepper:
@@ -113,59 +177,25 @@ class CompiledStepper:
         self._run, self._interpolate, self._sample, self._begin = _functions()
 
     def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray) -> None:
-        """Find a place for everything, in one piece of memory, and write down where it is."""
-        programs, n = recurrences.programs, self._size
-        padded = -(-n // WIDTH) * WIDTH
-        known = len(programs.order.parameters)
-        pairs, squares = -(-programs.pairs // LANES), -(-programs.squares // LANES)
-        lengths = {
-            "pointers": len(POINTERS),
-            "numbers": len(NUMBERS),
-            "counts": len(COUNTS),
-            "tables": 16,
-            "values": 2 * n,
-            "known": known,
-            "spare": known,
-            "derived": len(programs.order.prologue),
-            "scratch": recurrences.built.scratch,
-            "arrays": ROWS["all"] * padded,
-            "pair_sums": pairs * LANES,
-            "square_sums": squares * LANES,
-            "table": (2 * pairs + squares) * STRIDE,
-        }
-        ends = [0, *accumulate(-(-length // _LINE) * _LINE for length in lengths.values())]
-        memory = np.zeros(ends[-1] + _LINE)
+        """Find a place for everything, in one piece of memory that begins with a cache line."""
+        layout, n = recurrences.layout, self._size
+        memory = np.zeros(layout.size + _LINE)
+        skipped = -(memory.ctypes.data // 8) % _LINE
+        memory = memory[skipped:]
         base = memory.ctypes.data
-        skipped = -(base // 8) % _LINE
-        memory, base = memory[skipped:], base + 8 * skipped
-        pieces = {name: memory[at : at + length] for (name, length), at in zip(lengths.items(), ends, strict=False)}
-        places = {name: base + 8 * at for name, at in zip(lengths, ends, strict=False)}
-        self._numbers, self._counts = pieces["numbers"], pieces["counts"].view(np.int64)
-        self._arrays = pieces["arrays"].reshape(ROWS["all"], padded)
-        self._values = pieces["values"].reshape(2, n)
-        self._table = pieces["table"]
-
-        def row(name: str) -> int:
-            return places["arrays"] + 8 * padded * ROWS[name]
-
-        def number(name: str) -> int:
-            return places["numbers"] + 8 * NUMBERS.index(name)
-
-        tables = pieces["tables"].view(np.uint64)
-        tables[0:2] = number("t_new"), row("new")
-        tables[2:4] = row("new_rates"), places["known"]
-        tables[4:6] = number("time"), row("trial")
-        tables[6:8] = row("trial_rates"), places["spare"]
-        tables[8:11] = places["pair_sums"], places["square_sums"], places["numbers"]
-        names = ("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out")
-        places |= {name: places["tables"] + 8 * at for name, at in zip(names, (0, 2, 4, 6, 8, 12), strict=True)}
-        code = recurrences.addresses
-        places |= {"start": code["start"], "prologue": code["order_prologue"], "recurrence": code["order"]}
-        places["start_derived"] = derived.ctypes.data
-        pieces["pointers"].view(np.uint64)[:] = [places[name] for name in POINTERS]
-        self._session = c_void_p(places["pointers"])
-        self._parameters = code["start_prologue"], derived.ctypes.data, places["scratch"]
-        self._outputs = c_void_p(places["values"]), c_void_p(places["values"] + 8 * n)
+        at = layout.places
+        whole = memory.view(np.int64)
+        self._numbers = memory[at["numbers"] : at["numbers"] + len(NUMBERS)]
+        self._counts = whole[at["counts"] : at["counts"] + len(COUNTS)]
+        self._arrays = memory[at["arrays"] : at["arrays"] + ROWS["all"] * layout.padded].reshape(-1, layout.padded)
+        self._values = memory[at["values"] : at["values"] + 2 * n].reshape(2, n)
+        whole[at["tables"] : at["tables"] + len(layout.tables)] = layout.tables + base
+        pointers = whole[at["pointers"] : at["pointers"] + len(POINTERS)]
+        pointers[:] = layout.pointers + base * layout.is_own
+        pointers[POINTERS.index("start_derived")] = derived.ctypes.data
+        self._session = base + 8 * at["pointers"]
+        self._parameters = recurrences.addresses["start_prologue"], derived.ctypes.data, base + 8 * at["scratch"]
+        self._outputs = base + 8 * at["values"], base + 8 * (at["values"] + n)
 
     def batch_places(self) -> BatchPlaces:
         """Return the addresses with which many runs can be made in one call.
@@ -177,7 +207,7 @@ class CompiledStepper:
         begin, sample = (_code().code.addresses[name] for name in ("begin", "sample"))
         limit, steps, filled = (self._counts[COUNTS.index(name) :].ctypes.data for name in ("limit", "steps", "filled"))
         floors = self._arrays[ROWS["floors"]].ctypes.data
-        places = begin, sample, self._session.value or 0, limit, steps, filled, floors, _COUNTED
+        places = begin, sample, self._session, limit, steps, filled, floors, _COUNTED
         return BatchPlaces(*places, self._parameters, 1.0 / self._options.relative_tolerance, self)
 
     @property

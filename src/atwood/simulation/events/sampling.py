@@ -274,8 +274,9 @@ def find_sampler(assembly: Assembly, start: float, end: float, moments: FloatArr
 
 def _updates(assembly: Assembly) -> Iterable[_Update]:
     for path, part in assembly.flat.parts.items():
-        specs = part.component.state_specs()
-        for law in part.component.laws("update"):
+        laws = part.component.laws("update")
+        specs = part.component.state_specs() if laws else {}
+        for law in laws:
             options = law.options
             sets = tuple(f"{path}.{own}" for name in options.sets for own in specs[name].names(part.values))
             reads = tuple(part.signals) if options.reads is None else options.reads

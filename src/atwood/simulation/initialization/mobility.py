@@ -139,10 +139,13 @@ def refuse_immobile(assembly: Assembly, freedom: int, start: Start) -> None:
     )
 
 
+_OTHER_KINDS = tuple(kind for kind in get_args(Kind) if kind != "joint")
+
+
 def _only_holds(component: Component) -> bool:
     """Return whether all that a component does is to fix frames in the world."""
     fixes = all(law.options.a == "world" and law.options.rigid for law in component.laws("joint"))
-    return fixes and not any(component.laws(kind) for kind in get_args(Kind) if kind != "joint")
+    return fixes and not any(component.laws(kind) for kind in _OTHER_KINDS)
 
 
 def _name(assembly: Assembly, one: Constraint) -> str:

@@ -144,8 +144,12 @@ class Recorder:
 
     def take_many(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_]) -> None:
         """Record states of the solver after the last sample, one row each."""
+        pending = self._samples[1]
+        if len(t) and pending:  # projected together
+            t = np.concatenate([[one[0] for one in pending], t])
+            y = np.concatenate([[one[1] for one in pending], y])
+            shown = np.concatenate([[one[2] for one in pending], shown])
         if len(t):
-            self.settle()
             self._finish(t, y, shown)
 
     def pass_over(self, crossing: SingularCrossing, t: FloatArray, shown: NDArray[np.bool_]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -79,6 +80,12 @@ def _state_for(solver: str, plan: Plan, t: float, q: FloatArray, u: FloatArray) 
     return pack_state(plan, t, q, u) if solver.startswith("ida") else (np.concatenate([q, u]), np.zeros(0))
 
 
+@cache
+def _fills_tables(kind: type) -> bool:
+    """Return whether sessions of a kind are `SamplingSession`; to ask that of each takes longer than a session."""
+    return hasattr(kind, "sample")
+
+
 class _Runner:
     """The way through one stretch, with whatever solves it."""
 
@@ -98,8 +105,8 @@ class _Runner:
         try:
             session = self._open(t, y, yp)
             while True:
-                if isinstance(session, SamplingSession) and (self.monitor is None or self.monitor.next == np.inf):
-                    done, step_result = self._sample_watched(session, done)
+                if _fills_tables(type(session)) and (self.monitor is None or self.monitor.next == np.inf):
+                    done, step_result = self._sample_watched(cast("SamplingSession", session), done)
                     session = self.session or session
                 else:
                     done, step_result = self._advance(session, done)
