@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
 
-from atwood.integrators.protocol import StepResult
-from atwood.simulation.events.modes import EventProbe
+from atwood.integrators.protocol import FloatArray, StepResult
+from atwood.late import replace
 
 __all__ = ["without_margin"]
 
@@ -16,7 +16,9 @@ _LONGEST = 0.1
 """Share of that time by which an event may be brought forward, by one Euler step back."""
 
 
-def without_margin(probe: EventProbe, step: StepResult, began: float) -> StepResult:
+def without_margin(
+    values: Callable[[float, FloatArray], FloatArray], shift: FloatArray, step: StepResult, began: float
+) -> StepResult:
     """Return an event at the time at which its value was zero.
 
     What starts at zero has to pass it by ten times the tolerance, lest errors of a step set it off.
@@ -25,8 +27,8 @@ def without_margin(probe: EventProbe, step: StepResult, began: float) -> StepRes
 
     Parameters
     ----------
-    probe
-        The events of the mode.
+    values, shift
+        ``values(t, y)``: the events of the mode with what is added to those that start at zero.
     step
         Where the solver stopped at an event.
     began
@@ -34,13 +36,12 @@ def without_margin(probe: EventProbe, step: StepResult, began: float) -> StepRes
     """
     fired = [i for i, sign in enumerate(step.events) if sign]
     since = step.t - began
-    if len(fired) != 1 or not probe.shift[fired[0]] or not since > 0.0:
+    if len(fired) != 1 or not shift[fired[0]] or not since > 0.0:
         return step
-    number, margin = fired[0], float(probe.shift[fired[0]])
+    number, margin = fired[0], float(shift[fired[0]])
 
     def value(earlier: float) -> float:
-        coordinates, speeds = probe.plan.program.split(step.y - earlier * step.yp)
-        return float(probe.values(step.t - earlier, coordinates, speeds)[number]) - margin
+        return float(values(step.t - earlier, step.y - earlier * step.yp)[number]) - margin
 
     now, short = value(0.0), _SHORT * since
     rate = (now - value(short)) / short

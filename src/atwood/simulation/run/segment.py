@@ -168,7 +168,8 @@ class _Runner:
         if step_result.status is Status.EVENT:
             from atwood.simulation.events.margins import without_margin
 
-            step_result = without_margin(self.segment.probe, step_result, self.began)
+            probe, split = self.segment.probe, self.segment.plan.program.split
+            step_result = without_margin(lambda t, y: probe.values(t, *split(y)), probe.shift, step_result, self.began)
             self.recorder.rewind(step_result.t)
             event = self.segment.probe.name(step_result)
             assert event is not None, "what changes nothing has been noted"

@@ -16,11 +16,12 @@ from atwood.forms.shared import decisions_of
 from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents
 from atwood.integrators.explicit_session import ExplicitSession, open_explicit
-from atwood.integrators.protocol import Budget, SolverOptions, Statistics, StepResult
+from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status, StepResult
 from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.dynamics.scales import total_masses
+from atwood.simulation.events.margins import without_margin
 from atwood.simulation.events.modes import EventProbe, EventRecord
 from atwood.simulation.problem.explicit_scene import explicit_problem_of, own_rates
 from atwood.simulation.problem.preparation import make_plan
@@ -168,6 +169,10 @@ class SweepMode:
             self.events.fill(self.event_data, given, shift)
         self.session.begin_again(t, y, end - t, budget, None, end, absolute)
         found, _, result = self.session.sample(times)
+        if result.status is Status.EVENT and self.event_data is not None:
+            watched = self.event_data.function()
+            result = without_margin(lambda t, y: watched(t, y, y), shift, result, t)
+            found = found[: np.searchsorted(times[: len(found)], result.t, side="right")]
         return found, result, self.session.statistics
 
     def event(self, result: StepResult) -> EventFunction | None:
