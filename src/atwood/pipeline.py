@@ -48,6 +48,7 @@ from atwood.simulation.problem.arguments import (
     LIMITS,
     MONITOR,
     NAME,
+    NOMINAL,
     ORDER,
     ORIENTATION,
     OUTPUTS,
@@ -60,7 +61,7 @@ from atwood.simulation.problem.arguments import (
     refuse_idle_settings,
     refuse_two_accuracies,
 )
-from atwood.simulation.problem.conditions import Condition
+from atwood.simulation.problem.conditions import conditions_of
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.run import run, run_out_of_time
@@ -198,6 +199,7 @@ def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str |
     record=CONDITIONS,
     accuracy=ACCURACY,
     monitor=MONITOR,
+    nominal=NOMINAL,
     **LIMITS,
 )
 def simulate(
@@ -223,6 +225,7 @@ def simulate(
     record: Any = None,
     accuracy: float | None = None,
     monitor: Any = None,
+    nominal: Mapping[str, Any] | None = None,
 ) -> Result:
     """Simulate a scene from its start to its end.
 
@@ -282,6 +285,10 @@ def simulate(
     monitor
         What `atwood.conserved(scene)` returns: `Result.conserved` then has these quantities along the run, and by how
         much they drift.
+    nominal
+        Sizes of quantities by path, such as ``{"slider.displacement": "1 mm"}``, in place of the scene's own. `atol` is
+        a share of them for coordinates, and what is linear in these, and their rates; errors are relative to them in
+        `accuracy`, in which other quantities, such as forces, then count too.
 
     Returns
     -------
@@ -321,10 +328,8 @@ def simulate(
                 step=step,
                 samples=samples,
                 structure=structure,
-                conditions=(
-                    *(Condition(one, "stop") for one in _listed(until)),
-                    *(Condition(one, "") for one in _listed(record)),
-                ),
+                conditions=conditions_of(until, record),
+                nominal=_sizes(assembly, nominal),
             )
             made, second = _solve_to(accuracy, assembly, options, clock)
     made = replace(made, timings=stopwatch.in_order())
@@ -355,16 +360,17 @@ def _solve_to(accuracy: float | None, assembly: Assembly, options: RunOptions, c
     return accurate_run(lambda given: _solve(assembly, given, clock), options, accuracy, by_ida)
 
 
+def _sizes(assembly: Assembly, nominal: Mapping[str, Any] | None) -> Mapping[str, float]:
+    if not nominal:
+        return {}
+    from atwood.simulation.problem.nominal import read_nominal
+
+    return read_nominal(assembly, nominal)
+
+
 def _share(begin: float, end: float, t: float) -> tuple[float, str]:
     """Return how much of a run is done at a time, and where it is in words."""
     return (t - begin) / (end - begin), f"t = {t:.3g} of {end:g} s"
-
-
-def _listed(conditions: Any) -> list[Any]:
-    """Return conditions as a list."""
-    if conditions is None:
-        return []
-    return [conditions] if callable(conditions) or isinstance(conditions, str) else list(conditions)
 
 
 def _refuse_contradictions(assembly: Assembly, given: Mapping[str, str]) -> None:

@@ -168,6 +168,12 @@ def info_command(
     type=click.FloatRange(min=1e-15, max=0.1),
     help="Largest error of the motion, of positions relative to the scene's extent and of angles; tolerances follow.",
 )
+@click.option(
+    "--nominal",
+    multiple=True,
+    metavar="PATH=SIZE",
+    help="Size beside which errors of a quantity are small, such as slider.displacement='1 mm'. Can be repeated.",
+)
 @click.option("--conserved", is_flag=True, help="Show by how much what the scene conserves drifts along the run.")
 @click.option(
     "--energy",

@@ -12,7 +12,7 @@ import click
 
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, warn
-from atwood.cli.scenes import check_applies, prepare
+from atwood.cli.scenes import check_applies, pairs, prepare
 from atwood.errors import AtwoodError, UsageError
 from atwood.late import dataclass
 from atwood.stages import watching
@@ -51,6 +51,7 @@ class RunRequest:
     conserved: bool = False
     energy: str = "total"
     accuracy: float | None = None
+    nominal: tuple[str, ...] = ()
     plot: Path | None = None
     draw: Path | None = None
     view: str | None = None
@@ -115,6 +116,7 @@ def _run(request: RunRequest) -> Result:
                 until=request.until or None,
                 record=request.record or None,
                 accuracy=request.accuracy,
+                nominal=dict(pairs(request.nominal, "--nominal")) or None,
                 monitor=monitor,
                 solver=request.solver,
                 order=None if request.order is None else int(request.order),

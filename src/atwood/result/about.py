@@ -97,6 +97,7 @@ def describe_run(result: Result) -> dict[str, Any]:
             "max_steps": options.max_steps,
             "max_seconds": options.max_seconds,
             "max_step": options.max_step,
+            "nominal": dict(options.nominal),
             "start": dict(flat.start),
             "guess": dict(flat.guess),
         },

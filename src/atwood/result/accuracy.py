@@ -28,8 +28,8 @@ class Accuracy:
     asked
         The largest error that was asked for; None if none was.
     reached
-        The estimated error of positions, relative to the extent of the scene, and of angles, rad: the largest over all
-        outputs.
+        The estimated error of positions, relative to the extent of the scene, of angles, rad, and of quantities with
+        nominal sizes, relative to these: the largest over all outputs.
     path
         Which quantity it is of.
     until
@@ -131,8 +131,10 @@ def estimate_accuracy(first: Run, second: Run, time: FloatArray, error: Callable
     """
     asked, known = first.options.accuracy, first.assembly.observables
     length = first.start.length if first.start is not None else 1.0
-    paths = [path for path in compared_paths(first.assembly) if path in second.assembly.observables]
-    scales = {path: length if known[path].unit == "m" else 1.0 for path in paths}
+    compared = dict.fromkeys([*compared_paths(first.assembly), *first.options.nominal])
+    paths = [path for path in compared if path in second.assembly.observables]
+    usual = {path: length if known[path].unit == "m" else 1.0 for path in paths}
+    scales = {path: first.options.nominal.get(path, size) for path, size in usual.items()}
     worst, path, limit = 0.0, "", _LOST if asked is None else asked
     late = len(time)
     for one, scale in scales.items():

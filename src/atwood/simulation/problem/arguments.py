@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ __all__ = [
     "LIMITS",
     "MONITOR",
     "NAME",
+    "NOMINAL",
     "ORDER",
     "ORIENTATION",
     "OUTPUTS",
@@ -80,6 +82,12 @@ def _monitor(value: Any) -> Any:
     if value is not None and not callable(getattr(value, "along", None)):
         raise Refused
     return value
+
+
+def _nominal(value: Any) -> Any:
+    if not isinstance(value, Mapping) or not all(isinstance(one, (str, float, int)) for one in value.values()):
+        raise Refused
+    return {str(path): size for path, size in value.items()}
 
 
 def _condition(value: Any) -> str:
@@ -131,6 +139,7 @@ ORDER = optional(Kind(f"one of {', '.join(map(str, _ORDERS))}", _order))
 STRUCTURE = FLAG
 PROGRESS = optional(either(FLAG, CALLBACK))
 MONITOR = Kind("what `atwood.conserved(scene)` returns", _monitor)
+NOMINAL = optional(Kind("sizes by the path of a quantity, such as {'slider.displacement': '1 mm'}", _nominal))
 _WATCHED = "a condition such as 'rod1.angle crosses 0', a function of quantities, or a list of these"
 _ONE = either(Kind(_WATCHED, _condition), CALLBACK)
 CONDITIONS = optional(Kind(_WATCHED, lambda value: either(CALLBACK, each(_ONE, _WATCHED)).read(value)))

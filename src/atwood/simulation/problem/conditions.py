@@ -14,7 +14,7 @@ from atwood.late import dataclass
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.model.values.units import parse_quantity, parse_unit
 
-__all__ = ["Condition", "Quantities", "condition_functions"]
+__all__ = ["Condition", "Quantities", "condition_functions", "conditions_of"]
 
 _CONDITIONS: Key[tuple[EventFunction, ...]] = Key("event functions of conditions")
 
@@ -170,3 +170,15 @@ _PLAIN = (
     "Write it in plain arithmetic with Atwood's functions: lambda q: q['bob.position.z'] + 1.0 stops where that passes "
     "zero, lambda q: q['bob.position.z'] < -1.0 where it becomes true."
 )
+
+
+def conditions_of(until: Any, record: Any) -> tuple[Condition, ...]:
+    """Return what a run stops at, and what it notes: conditions, or lists of these."""
+    return (*(Condition(one, "stop") for one in _listed(until)), *(Condition(one, "") for one in _listed(record)))
+
+
+def _listed(conditions: Any) -> list[Any]:
+    """Return conditions as a list."""
+    if conditions is None:
+        return []
+    return [conditions] if callable(conditions) or isinstance(conditions, str) else list(conditions)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,8 @@ class RunOptions:
         Of a method with fixed steps: its order, and the step, s.
     accuracy
         The error of the motion that was asked for; tolerances are chosen for it.
+    nominal
+        Sizes of quantities by path, in place of the scene's own: their errors are relative to these.
     """
 
     t_end: float
@@ -83,6 +86,7 @@ class RunOptions:
     order: int | None = None
     step: float | None = None
     accuracy: float | None = None
+    nominal: Mapping[str, float] = field(default_factory=dict)
 
     def out_of_time(self, t: float) -> str:
         """Return what is said of a run that its limit of time ended, at a time of its own."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
@@ -316,16 +316,27 @@ class Plan:
         """Unknowns that are angles, whose size does not say how accurate they must be."""
         return tuple(i for i, one in enumerate(self.assembly.own_equations.names) if one.unit == "rad")
 
-    def tolerances(self, relative: float) -> FloatArray:
+    def tolerances(self, relative: float, nominal: Mapping[str, float]) -> FloatArray:
         """Return the absolute tolerance of each unknown; multipliers are kept out of the error test.
 
         Those of the stabilised form move points by speeds, and turn bodies by speeds over arms.
+
+        Parameters
+        ----------
+        relative
+            Share of the sizes.
+        nominal
+            Sizes of quantities that were given, by path.
         """
         program, scales = self.program, self.scales
         forces = np.full(program.multipliers, 1e3 * scales.force)
         shifts = np.full(program.extra, 1e3 * max(scales.length, 1.0 / scales.length) / scales.time)
-        motion = relative * self.coordinate_sizes, relative * (self.sizes / scales.time)
-        return np.concatenate([*motion, forces, shifts])
+        motion = self.coordinate_sizes, self.sizes / scales.time
+        if nominal:
+            from atwood.simulation.problem.nominal import with_nominal
+
+            motion = with_nominal(self.assembly, self.assembly.own_equations, motion, nominal)
+        return np.concatenate([*(relative * one for one in motion), forces, shifts])
 
 
 def _restored(

@@ -205,7 +205,7 @@ class ClosedLoopSession:
         if self._solver in FIXED_STEPS:
             from atwood.simulation.problem.gauss_scene import GaussSettings, open_gauss
 
-            asked, sizes = request.options, solved.reduced(request.plan.tolerances(1.0))
+            asked, sizes = request.options, solved.reduced(request.plan.tolerances(1.0, request.options.nominal))
             steps = GaussSettings(self._solver, asked.order, asked.step, request.end, sizes)
             return open_gauss(assembly, problem, settings, steps, t, y, budget, solved)
         from atwood.integrators.explicit_session import open_explicit

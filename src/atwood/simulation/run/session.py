@@ -62,7 +62,9 @@ class SolverRequest:
         relative = min(options.relative_tolerance, loosest)
         return SolverOptions(
             relative_tolerance=relative,
-            absolute_tolerances=self.plan.tolerances(min(options.absolute_tolerance or relative, loosest)),
+            absolute_tolerances=self.plan.tolerances(
+                min(options.absolute_tolerance or relative, loosest), options.nominal
+            ),
             max_step=options.max_step,
             max_order=options.max_order,
             horizon=self.horizon(t),
@@ -273,7 +275,9 @@ def _open_fixed(request: SolverRequest, solver: str, t: float, y: FloatArray) ->
     from atwood.simulation.problem.gauss_scene import GaussSettings, open_gauss
 
     options = request.options
-    settings = GaussSettings(solver, options.order, options.step, request.end, request.plan.tolerances(1.0))
+    settings = GaussSettings(
+        solver, options.order, options.step, request.end, request.plan.tolerances(1.0, request.options.nominal)
+    )
     problem = _explicit_problem(request, solver)
     return open_gauss(request.plan.assembly, problem, request.settings(t), settings, t, y, request.budget)
 
