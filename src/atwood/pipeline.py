@@ -62,6 +62,7 @@ from atwood.simulation.problem.arguments import (
     refuse_two_accuracies,
 )
 from atwood.simulation.problem.conditions import conditions_of
+from atwood.simulation.problem.nominal import read_nominal
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.run import run, run_out_of_time
@@ -329,7 +330,7 @@ def simulate(
                 samples=samples,
                 structure=structure,
                 conditions=conditions_of(until, record),
-                nominal=_sizes(assembly, nominal),
+                nominal=read_nominal(assembly, nominal),
             )
             made, second = _solve_to(accuracy, assembly, options, clock)
     made = replace(made, timings=stopwatch.in_order())
@@ -358,14 +359,6 @@ def _solve_to(accuracy: float | None, assembly: Assembly, options: RunOptions, c
 
     by_ida = assembly.form == "dae" or bool(assembly.own_equations.constraints) or options.solver.startswith("ida")
     return accurate_run(lambda given: _solve(assembly, given, clock), options, accuracy, by_ida)
-
-
-def _sizes(assembly: Assembly, nominal: Mapping[str, Any] | None) -> Mapping[str, float]:
-    if not nominal:
-        return {}
-    from atwood.simulation.problem.nominal import read_nominal
-
-    return read_nominal(assembly, nominal)
 
 
 def _share(begin: float, end: float, t: float) -> tuple[float, str]:
