@@ -62,7 +62,6 @@ from atwood.simulation.problem.arguments import (
     refuse_two_accuracies,
 )
 from atwood.simulation.problem.conditions import conditions_of
-from atwood.simulation.problem.nominal import read_nominal
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.run import run, run_out_of_time
@@ -312,6 +311,8 @@ def simulate(
     refuse_two_accuracies(accuracy, rtol, atol, step)
     with watching() as stopwatch:
         assembly = assembly_of(scene, form=form, level=level, orientation=orientation)
+        if nominal:
+            from atwood.simulation.problem.nominal import read_nominal
         flat = assembly.flat
         end = flat.t_end if t_end is None else float(t_end)
         with told(progress, flat.name, partial(_share, flat.t_start, end)) as watch:
@@ -330,7 +331,7 @@ def simulate(
                 samples=samples,
                 structure=structure,
                 conditions=conditions_of(until, record),
-                nominal=read_nominal(assembly, nominal),
+                nominal=read_nominal(assembly, nominal) if nominal else {},
             )
             made, second = _solve_to(accuracy, assembly, options, clock)
     made = replace(made, timings=stopwatch.in_order())
