@@ -48,9 +48,19 @@ def lines_of(case: Case, reached: Sequence[Reached]) -> list[str]:
     return [*found, "", f"Better: {case.better}", ""]
 
 
+def overview(reached: dict[str, list[Reached]]) -> list[str]:
+    """Return a table of the kinds: how many cases there are, and how many ways meet what is asked."""
+    text = ["| kind | cases | ways that meet what is asked |", "|---|---|---|"]
+    for kind, cases in groupby(CASES, key=lambda case: case.kind):
+        solved = [case for case in cases if case.name in reached]
+        ways = [one.error <= case.limit(one.way) for case in solved for one in reached[case.name]]
+        text.append(f"| [{kind}](#{kind.replace(' ', '-')}) | {len(solved)} | {sum(ways)} of {len(ways)} |")
+    return [*text, ""]
+
+
 def page(reached: dict[str, list[Reached]]) -> str:
     """Return the page of the cases that were solved."""
-    text = [HEAD]
+    text = [HEAD, *overview(reached)]
     for kind, cases in groupby(CASES, key=lambda case: case.kind):
         text.append(f"## {kind[0].upper()}{kind[1:]}\n")
         for case in cases:

@@ -16,7 +16,7 @@ from atwood.expr import (
     OutputGroup,
     Program,
     cos,
-    depends_on,
+    dependencies,
     jacobian,
     live,
     sin,
@@ -112,7 +112,7 @@ def closed_form(
     cut = len(looked_at) - len(beside)
     watched = OutputGroup("ahead", tuple(looked_at[:cut])), OutputGroup("beside", tuple(looked_at[cut:]))
     dependent = [*(one for i, one in enumerate(q) if i not in free), *(one for i, one in enumerate(u) if i not in free)]
-    if any(depends_on(one, dependent) for one in (*found, *places.values(), *speeds.values(), *looked_at)):
+    if any(dependencies((*found, *places.values(), *speeds.values(), *looked_at), dependent)):
         return None
     title = f"{name} (closed form)"
     values, conditions = loops.values()

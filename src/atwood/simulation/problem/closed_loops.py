@@ -21,7 +21,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import check_time
 from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError
-from atwood.expr import DivisionByExactZeroError, Expression, Program, depends_on
+from atwood.expr import DivisionByExactZeroError, Expression, Program, dependencies
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.loops.assur_groups import Loops
@@ -312,8 +312,8 @@ def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArr
     least, steepest = _least(solved, t, y)
     if not (margin > _START or least):
         return None
-    rests = not any(depends_on(one, [plan.assembly.reduced.time]) for one in form.watched.results)
-    return replace(solved, margin=margin, least=least, is_clear=rests and least > steepest)
+    is_clear = least > steepest and not any(dependencies(form.watched.results, [plan.assembly.reduced.time]))
+    return replace(solved, margin=margin, least=least, is_clear=is_clear)
 
 
 def _branches(assembly: Assembly, form: ClosedForm, t: float, q: FloatArray) -> dict[Expression, float] | None:
