@@ -51,7 +51,8 @@ def distance(
 ) -> Callable[[Result], float]:
     """Return the largest distance of quantities from their known values, over a scale.
 
-    The outputs of the run are to be the times of the values.
+    A quantity whose largest known value is above one is compared as a share of that. The outputs of the run are to be
+    the times of the values.
     """
     values = known(problem, case, until)
 
@@ -59,6 +60,8 @@ def distance(
         if not np.array_equal(result.time, list(values)):
             return np.inf
         expected = {name: np.array([row[name] for row in values.values()]) for name in quantities}
-        return max(float(np.max(np.abs(found(result) - expected[name]))) for name, found in quantities.items()) / scale
+        sizes = {name: max(1.0, float(np.max(np.abs(value)))) for name, value in expected.items()}
+        apart = {name: np.max(np.abs(found(result) - expected[name])) for name, found in quantities.items()}
+        return max(float(value) / sizes[name] for name, value in apart.items()) / scale
 
     return error
