@@ -56,6 +56,8 @@ class Heading:
     lead
         By how much one wave is larger than all others together: positive where the direction cannot turn away. None
         where that is counted.
+    most
+        The longest that the direction can be; None where that is not known.
     """
 
     phase: Expression
@@ -65,6 +67,7 @@ class Heading:
     beside: Expression | None = None
     values: Mapping[Expression, Expression] = field(default_factory=dict)
     lead: Expression | None = None
+    most: Expression | None = None
 
     @property
     def symbols(self) -> tuple[Expression, ...]:

@@ -52,7 +52,9 @@ class ConstraintShapes:
         self._shares = random.uniform(-1.0, 1.0, (2, WAYS))
 
     def may_be(self, ks: tuple[int, ...], unknowns: Mapping[int, bool], nested: float = 0.0) -> bool:
-        """Return whether constraints may be sums of a constant and of first harmonics, or multiples, of each unknown.
+        """Return whether constraints may be sums of a constant and of first harmonics, or powers, of each unknown.
+
+        One length may stand in second degree; beside one angle, also in products with its harmonics.
 
         Parameters
         ----------
@@ -66,13 +68,45 @@ class ConstraintShapes:
         at, basis, moved = self._at.copy(), [np.ones(WAYS)], []
         for share, is_angle in zip(self._shares, unknowns.values(), strict=False):
             moved.append(np.pi * share if is_angle else self._place.length * share)
-            basis += [np.cos(moved[-1]), np.sin(moved[-1])] if is_angle else [moved[-1]]
+            basis += [np.cos(moved[-1]), np.sin(moved[-1])] if is_angle else [moved[-1] / self._place.length]
+        if len(basis) == 2:
+            basis.append(basis[1] ** 2)
+        elif len(basis) == 4:  # an angle and a length, in whichever order
+            waves, length = (basis[1:3], basis[3]) if next(iter(unknowns.values())) else (basis[2:], basis[1])
+            basis += [length * wave for wave in waves]
         if nested:
             moved[0] = moved[0] - nested * moved[1]
         for number, values in zip(unknowns, moved, strict=True):
             at[self._rows[self._coordinates[number]]] = values
         found = self._program(ks)(np.array(list(self._place.parameters.values())), at)
         return _is_combination(found, np.array(basis))
+
+    def turns_about(self, ks: tuple[int, ...], number: int, others: Sequence[int]) -> bool:
+        """Return whether an angle may turn three constraints about an axis that does not depend on other unknowns.
+
+        Parameters
+        ----------
+        ks
+            Numbers of the constraints.
+        number, others
+            Numbers of the angle and of the other unknowns.
+        """
+        axes = []
+        for share in (0.3, -0.4):
+            at = self._at.copy()
+            for other in others:
+                at[self._rows[self._coordinates[other]]] = share * self._place.length
+            angle = np.pi * self._shares[0]
+            at[self._rows[self._coordinates[number]]] = angle
+            found = self._program(ks)(np.array(list(self._place.parameters.values())), at)
+            basis = np.array([np.ones(WAYS), np.cos(angle), np.sin(angle)])
+            if not np.all(np.isfinite(found)):
+                return True
+            if not _is_combination(found, basis):
+                return False
+            _, p, q = np.linalg.lstsq(basis.T, found.T, rcond=None)[0]
+            axes.append(np.cross(p, q) / max(float(p @ p), np.finfo(float).tiny))
+        return bool(np.max(np.abs(axes[0] - axes[1])) <= _LEFT)
 
     def _program(self, ks: tuple[int, ...]) -> RoughProgram:
         if ks not in self._programs:

@@ -1,0 +1,167 @@
+"""The constraints of one joint with two unknown coordinates: groups of two links, as in a plane.
+
+With angles x and y of whole links (so that no product of both is left) and a length s, what a joint holds together is
+
+- ``e + P (cos x, sin x) + Q (cos y, sin y) = 0`` between two links that turn (RRR),
+- ``e + P (cos x, sin x) + k s = 0`` between a link that turns and one that slides on what is known (RRP, PRP),
+- ``e + (P + s K) (cos x, sin x) = 0`` of a slide that turns (RPR),
+- ``e + k s + l z = 0`` between two that slide,
+
+where e, P, Q, K, k and l are known. The two columns of P are at a right angle and of equal length, and Q, K and k lie
+in their plane, whichever plane of space that is.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from atwood.expr import Expression, atan2, cos, jvp, sin, sqrt, substitute
+from atwood.forms.loops.branches import Group
+from atwood.forms.loops.harmonics import at, harmonics
+from atwood.forms.loops.roots import Root, Vector, arm_margin, dot, total
+
+if TYPE_CHECKING:
+    from atwood.forms.loops.assur_groups import Loops
+
+__all__ = ["two_unknowns"]
+
+
+def two_unknowns(loops: Loops, ks: tuple[int, ...], unknowns: tuple[int, ...]) -> tuple[Group, ...]:
+    """Return the group of a joint's constraints with two unknowns; nothing where it is of no known form.
+
+    Parameters
+    ----------
+    loops
+        The loops.
+    ks, unknowns
+        Numbers of the constraints and of the coordinates.
+    """
+    i, j = unknowns
+    angles = loops.is_angle[i], loops.is_angle[j]
+    if all(angles):
+        ways = ((i, j, 0.0), (i, j, 1.0), (i, j, -1.0), (j, i, 1.0), (j, i, -1.0))
+        fitting = (way for way in ways if loops.shapes.may_be(ks, {way[0]: True, way[1]: True}, nested=way[2]))
+        made = (_two_links(loops, ks, *way) for way in fitting)
+        found = next((one for one in made if one is not None), None)
+    elif not loops.shapes.may_be(ks, {i: angles[0], j: angles[1]}):
+        found = None
+    elif not any(angles):
+        found = _two_slides(loops, ks, i, j)
+    else:
+        i, j = (i, j) if angles[0] else (j, i)
+        found = _link_and_slide(loops, ks, i, j) or _slide_that_turns(loops, ks, i, j)
+    return () if found is None else (found,)
+
+
+def _two_links(loops: Loops, ks: tuple[int, ...], i: int, j: int, nested: float) -> Group | None:
+    """Solve for two angles; with `nested`, the first is counted from so many times the second."""
+    x, y = loops.q[i], loops.q[j]
+    g = [loops.values[k] for k in ks]
+    g = substitute(g, {x: x - nested * y}) if nested else g  # from here on x is the angle of a link
+    e, p, q = harmonics(g, x)
+    e, r, s = harmonics(e, y)
+    if not loops.agree(g, total(e, (p, cos(x)), (q, sin(x)), (r, cos(y)), (s, sin(y)))):
+        return None
+    own, other = dot(p, p), dot(r, r)
+    flat = [dot(p, q), own - dot(q, q), dot(r, s), other - dot(s, s)]
+    flat.append(other * own - _square(dot(r, p)) - _square(dot(r, q)))
+    if not loops.vanish(flat):
+        return None
+    ends = dot(e, p), dot(e, q), dot(e, r), dot(e, s)
+    px, qx, py, qy = (2.0 * one for one in ends)
+    root = Root(loops, i, px, qx, other - own - dot(e, e), x + nested * y)
+    cy = -(ends[2] + root.c * dot(r, p) + root.s * dot(r, q)) / other
+    sy = -(ends[3] + root.c * dot(s, p) + root.s * dot(s, q)) / other
+    first, second = loops.heading(i, px, qx), loops.heading(j, py, qy)
+    angle = second[0] + atan2(py * sy - qy * cy, py * cy + qy * sy)
+    outer = root.angle(first[0]) - nested * angle
+    turns = loops.turn(i), loops.turn(j)
+    cx = root.c * cy + nested * (root.s * sy) if nested else root.c
+    sx = root.s * cy - nested * (root.c * sy) if nested else root.s
+    places = {cos(x): cx, sin(x): sx, x: outer + turns[0], cos(y): cy, sin(y): sy, y: angle + turns[1]}
+    margin = root.rest / (4.0 * own * other)
+    values = {turns[0]: x - outer, turns[1]: y - angle}
+    headings = (*first[1:], *second[1:])
+    return Group((i, j), ks, _along(loops, ks, p, q), places, (margin,), root.sign, values, headings)
+
+
+def _link_and_slide(loops: Loops, ks: tuple[int, ...], i: int, j: int) -> Group | None:
+    """Solve for an angle and a length along what is known."""
+    x, y = loops.q[i], loops.q[j]
+    g = [loops.values[k] for k in ks]
+    k = at(jvp(g, {y: 1.0}), {y: 0.0, x: 0.0})
+    e, p, q = harmonics(at(g, {y: 0.0}), x)
+    if not loops.agree(g, total(e, (p, cos(x)), (q, sin(x)), (k, y))):
+        return None
+    own, size = dot(p, p), dot(k, k)
+    a, b = -dot(k, q), dot(k, p)  # across the slide, times the lengths of both
+    if not loops.vanish([dot(p, q), own - dot(q, q), size * own - a * a - b * b]):
+        return None
+    root = Root(loops, i, a * own, b * own, -(a * dot(p, e) + b * dot(q, e)), x)
+    direction, heading = loops.heading(i, a, b)
+    angle, turn = root.angle(direction), loops.turn(i)
+    length = -(dot(k, e) + root.c * b - root.s * a) / size
+    places = {cos(x): root.c, sin(x): root.s, x: angle + turn, y: length}
+    margins = (root.rest / root.square,)
+    return Group((i, j), ks, _along(loops, ks, p, q), places, margins, root.sign, {turn: x - angle}, (heading,))
+
+
+def _slide_that_turns(loops: Loops, ks: tuple[int, ...], i: int, j: int) -> Group | None:
+    """Solve for an angle and a length along what turns by it.
+
+    With d along the slide and n across it, ``e + (a + s) d + b n = 0``, where d and n turn with the angle: so that
+    ``(a + s)^2 = e^2/d^2 - b^2``, and the angle is what turns ``(a + s, b)`` into -e.
+    """
+    x, y = loops.q[i], loops.q[j]
+    g = [loops.values[k] for k in ks]
+    e, p, q = harmonics(at(g, {y: 0.0}), x)
+    k, c, s = harmonics(at(jvp(g, {y: 1.0}), {y: 0.0}), x)
+    moving = total(p, (c, y)), total(q, (s, y))
+    if not (loops.vanish(k) and loops.agree(g, total(e, (moving[0], cos(x)), (moving[1], sin(x))))):
+        return None
+    size, far = dot(c, c), dot(e, e)
+    a, b = dot(p, c) / size, dot(p, s) / size
+    ex, ey = dot(e, c), dot(e, s)
+    flat = [dot(c, s), size - dot(s, s), size * far - ex * ex - ey * ey]
+    flat += [one - (a * other + b * across) for one, other, across in zip(p, c, s, strict=True)]
+    flat += [one - (a * other - b * across) for one, other, across in zip(q, s, c, strict=True)]
+    if not loops.vanish(flat):
+        return None
+    sign = loops.graph.parameter(f"branch:{loops.equations.names[j].name}")
+    square = far / size
+    rest = square - b * b
+    along = sign * sqrt(rest)
+    over = size * square
+    cx, sx = -(ex * along + ey * b) / over, (ex * b - ey * along) / over
+    direction, heading = loops.heading(i, -ex, -ey)
+    angle, turn = direction - atan2(b, along), loops.turn(i)
+    places = {cos(x): cx, sin(x): sx, x: angle + turn, y: along - a}
+    margins = (
+        (rest / square,) if heading.most is None else (rest / square, arm_margin(square * size * size, heading.most))
+    )
+    values = {turn: x - angle}
+    return Group((i, j), ks, _along(loops, ks, c, s), places, tuple(margins), {sign: a + y}, values, (heading,))
+
+
+def _two_slides(loops: Loops, ks: tuple[int, ...], i: int, j: int) -> Group | None:
+    """Solve for two lengths in the plane in which they are."""
+    x, y = loops.q[i], loops.q[j]
+    g = [loops.values[k] for k in ks]
+    e = at(g, {x: 0.0, y: 0.0})
+    k, m = (at(jvp(g, {one: 1.0}), {x: 0.0, y: 0.0}) for one in (x, y))
+    if not loops.agree(g, total(e, (k, x), (m, y))):
+        return None
+    kk, mm, km, ke, me = dot(k, k), dot(m, m), dot(k, m), dot(k, e), dot(m, e)
+    det = kk * mm - km * km
+    places = {x: (km * me - mm * ke) / det, y: (km * ke - kk * me) / det}
+    return Group((i, j), ks, _along(loops, ks, k, m), places, (det / (kk * mm),))
+
+
+def _along(loops: Loops, ks: tuple[int, ...], p: Vector, q: Vector) -> tuple[tuple[Expression, ...], ...]:
+    """Return two directions in the plane of a group, in which its constraints are taken for the speeds."""
+    one, zero = loops.graph.one, loops.graph.zero
+    return ((one, zero), (zero, one)) if len(ks) == 2 else (tuple(p), tuple(q))
+
+
+def _square(a: Expression) -> Expression:
+    return a * a
