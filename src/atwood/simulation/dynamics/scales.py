@@ -45,6 +45,12 @@ class Scales:
     time: float
     force: float
 
+    def of(self, unit: str) -> float:
+        """Return the size of a quantity by the powers of mass, length and time in its SI unit; of an angle, one."""
+        masses, lengths, times, _ = parse_unit(unit).exponents
+        mass = self.force * self.time**2 / self.length
+        return mass**masses * self.length**lengths * self.time**times
+
 
 def scene_length(assembly: Assembly) -> float:
     """Return the extent of a scene, from its parameters and start values that are lengths; 1 m if it has none.

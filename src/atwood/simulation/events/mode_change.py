@@ -25,7 +25,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
 )
 from atwood.simulation.dynamics.rank import least_norm
 from atwood.simulation.dynamics.reactions import maximal_state
-from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
@@ -241,7 +241,7 @@ def generalized_state(
         if orientation.body in turned:
             q[list(orientation.coordinates)] = maximal[0][turned[orientation.body]]
     q = reduced_map.normalized(q)
-    scales = motion_scales(after.maximal, length)
+    scales, own_scales = motion_scales(after.maximal, length), motion_scales(equations, length)
     matrix = np.zeros((len(scales), len(still)))
     for _ in range(30):
         now, _, entries = kernel([t], q, still)
@@ -249,7 +249,8 @@ def generalized_state(
         miss = maximal_map.difference(t, maximal_map.normalized(np.asarray(now)), maximal[0]) / scales
         step = least_norm(matrix / scales[:, None], miss)
         q = reduced_map.moved(t, q, step)
-        if float(np.max(np.abs(step), initial=0.0)) < 1e-14 * max(1.0, float(np.max(np.abs(q), initial=0.0))):
+        far = np.max(np.abs(q) / coordinate_scales(equations, length), initial=1.0)
+        if np.max(np.abs(step) / own_scales, initial=0.0) < 1e-14 * far:
             break
     return q, generalized_speeds(after, t, q, maximal[1], scales), miss
 

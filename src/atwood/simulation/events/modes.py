@@ -132,9 +132,7 @@ class EventProbe:
             if self.event_functions
             else None
         )
-        scales = plan.scales
-        sizes = {"m": scales.length, "N": scales.force, "m/s": scales.length / scales.time}
-        small = [10.0 * tolerance * sizes.get(one.unit, 1.0) for one in self.event_functions]
+        small = [10.0 * tolerance * plan.scales.of(one.unit) for one in self.event_functions]
         self.shift = np.zeros(len(small))
         values = np.asarray(self.values(t, q, u)) if self.event_functions else np.zeros(0)
         self.broken = next(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from atwood.errors import SolveError
 from atwood.integrators.protocol import Statistics
 from atwood.late import dataclass
@@ -13,10 +11,7 @@ from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.choice import Choice
 from atwood.simulation.run.session import KeptSession
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["Outcome", "Segment"]
+__all__ = ["Outcome", "Segment", "shortest_mode"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,3 +81,19 @@ class Outcome:
     event: EventRecord | None = None
     error: SolveError | None = None
     noted: tuple[EventRecord, ...] = ()
+
+
+def shortest_mode(plan: Plan, options: RunOptions, began: float) -> float:
+    """Return a time within which only errors, and margins of events, change a mode and change it back, s.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    options
+        What the run was asked for.
+    began
+        When it began, s.
+    """
+    margin = min(20.0 * options.relative_tolerance, 1e-5) * plan.scales.time
+    return max(1e-9 * (options.t_end - began), margin)

@@ -34,7 +34,7 @@ from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.choice import Choice, check_solver, choose
 from atwood.simulation.run.made import Run, as_asked
-from atwood.simulation.run.outcome import Outcome, Segment
+from atwood.simulation.run.outcome import Outcome, Segment, shortest_mode
 from atwood.simulation.run.record import Recorder, SegmentRecord
 from atwood.simulation.run.segment import run_segment
 from atwood.simulation.run.session import KeptSession
@@ -196,7 +196,8 @@ class _Walk:
             recorder, outcome = self._segment()
             self.t = outcome.t
             self.events += outcome.noted
-            chatter = chatter + 1 if outcome.t - before < 1e-9 * (self.options.t_end - self.start.time) else 0
+            is_short = outcome.t - before < shortest_mode(recorder.plan, self.options, self.start.time)
+            chatter = chatter + 1 if is_short else 0
             if outcome.event is None:
                 if outcome.status == "finished" and outcome.t < self.options.t_end:
                     _, self.q, self.u, _ = recorder.last()
