@@ -45,7 +45,7 @@ _STEPS = 12
 _EXACT = 1e-14
 """States that miss all constraints by less, in the units of their rows, are left as they are: formulas gave them."""
 
-_FEW = 12
+_FEW, _MANY = 12, 100
 """Of so many entries for each state the largest is found one after another."""
 
 _CHUNK = 4_000_000
@@ -231,7 +231,7 @@ def _normal(plan: Plan) -> Normal | None:
 
 def _largest_entry(values: FloatArray) -> FloatArray:
     """Return the size of the largest of the entries along the last axis; of few in turn, which is faster."""
-    if not 0 < values.shape[-1] <= _FEW:
+    if not 0 < values.shape[-1] <= _FEW or len(values) < _MANY:
         return np.asarray(np.max(np.abs(values), axis=-1))
     found: FloatArray = np.abs(values[..., 0])
     for k in range(1, values.shape[-1]):

@@ -43,7 +43,10 @@ _PATIENCE = 8
 _CLOSE = 3e-2
 """Once a sweep changes less, one Newton step is enough to project what it gave."""
 
-_SETTLED = 1e-14
+_SETTLED = 3e-13
+"""Relative to the scene's sizes: ten times what the next sweep would change must be less. Near singular positions
+rounding leaves 1e-12 of what forces are asked for, and further sweeps would only stir it."""
+
 _ROUNDED = 1e-8
 """Relative to the scene's sizes: changes that are smaller and do not shrink any more are those of rounding."""
 
