@@ -4,8 +4,8 @@ The augmented system ``M a - G^T lambda = -bias``, ``G a = -gamma`` is eliminate
 one constraint after the other (Featherstone, Rigid Body Dynamics Algorithms, 2008, sections 3.2 and 8.5). What is left
 of the masses is ``G M^-1 G^T``, in which joints meet their neighbours alone; both parts are positive definite, so that
 no pivot is searched for.  Where something has no inertia of its own but is held, ``M + sum s_k G_k^T G_k`` takes the
-place of M: the constraints make the addition ``-s_k G_k^T gamma_k``, which goes to the other side (M. Fortin and
-R. Glowinski, Augmented Lagrangian Methods, 1983, chapter I).
+place of M, with the constraints that touch it: they make the addition ``-s_k G_k^T gamma_k``, which goes to the other
+side (M. Fortin and R. Glowinski, Augmented Lagrangian Methods, 1983, chapter I).
 
 A state is projected by the shortest displacement along the speeds, each measured by its size:
 ``d = -W G^T (G W G^T)^-1 g`` with ``W = diag(sizes^2)`` (Hairer, Lubich and Wanner, Geometric Numerical Integration,
@@ -63,7 +63,7 @@ def constrained_program(
     parameters: Sequence[Expression],
     rows: Sequence[Expression],
     kept: Sequence[int],
-    is_massive: bool,
+    light: Sequence[int],
 ) -> ConstrainedProgram:
     """Return accelerations and projections of a mechanism whose constraints stay.
 
@@ -79,8 +79,8 @@ def constrained_program(
         The equations' rows, perhaps rewritten.
     kept
         Numbers of the constraints that are independent.
-    is_massive
-        Whether everything that moves has inertia of its own.
+    light
+        Numbers of the speeds of what has no inertia of its own in each of its directions.
     """
     graph = equations.graph
     sizes = tuple(graph.symbol(f"size of {one.name}") for one in equations.speed_names)
@@ -88,9 +88,9 @@ def constrained_program(
     read = [getattr(held, one) for one in names_of(Equations) if one not in _NOT_READ]
 
     def derive() -> tuple[str, list[Expression]]:
-        return "augmented", [*_accelerations(held, rows, sizes, is_massive), *_projection(held, sizes)]
+        return "augmented", [*_accelerations(held, rows, sizes, light), *_projection(held, sizes)]
 
-    _, found = derive_once("constrained", graph, (read, tuple(rows), parameters, sizes, is_massive), derive)
+    _, found = derive_once("constrained", graph, (read, tuple(rows), parameters, sizes, tuple(light)), derive)
     n, m = len(equations.coordinates), len(equations.speeds)
     groups, known = state_groups(equations), (*parameters, *sizes)
     outputs: tuple[OutputGroup, ...] = (OutputGroup("accelerations", tuple(found[:m])),)
@@ -105,7 +105,7 @@ def constrained_program(
 
 
 def _accelerations(
-    equations: Equations, rows: Sequence[Expression], sizes: Sequence[Expression], is_massive: bool
+    equations: Equations, rows: Sequence[Expression], sizes: Sequence[Expression], light: Sequence[int]
 ) -> list[Expression]:
     n, constraints = len(equations.speeds), equations.constraints
     at_rest = dict.fromkeys(equations.accelerations, 0.0)
@@ -114,8 +114,10 @@ def _accelerations(
     slopes = _slopes(equations, range(len(constraints)))
     bias = substitute(list(rows), at_rest)
     gamma = substitute([one.second for one in constraints], at_rest)
-    if not is_massive:
-        bias = _stiffen(entries, bias, slopes, gamma, sizes)
+    bare = set(light)
+    carrying = [k for k, row in enumerate(slopes) if not bare.isdisjoint(row)]
+    if carrying:
+        bias = _stiffen(entries, bias, [slopes[k] for k in carrying], [gamma[k] for k in carrying], sizes)
     places = {(c, n + k): e for k, row in enumerate(slopes) for c, e in row.items()}
     right = [-one for one in (*bias, *gamma)]
     signs = [1] * n + [-1] * len(constraints)
@@ -240,23 +242,32 @@ def _solved_by_loops(system: SymmetricSystem) -> list[Expression]:
 
 
 def _order(places: Sequence[Place], signs: Sequence[int]) -> list[int]:
-    """Return an order of elimination that adds few entries: masses first, always what has the fewest neighbours."""
+    """Return an order of elimination that adds few entries: always what has the fewest neighbours.
+
+    A constraint can have its turn once all masses that it touches have had theirs: what is left of it by these is then
+    positive, as long as constraints are independent.
+    """
     touching: dict[int, set[int]] = {i: set() for i in range(len(signs))}
     for i, j in places:
         if i != j:
             touching[i].add(j)
             touching[j].add(i)
-    heap = [(-signs[i], len(around), i) for i, around in touching.items()]
+    waiting = {i: sum(signs[j] > 0 for j in around) for i, around in touching.items() if signs[i] < 0}
+    meets = {i: [j for j in around if signs[j] < 0] for i, around in touching.items() if signs[i] > 0}
+    heap = [(len(around), i) for i, around in touching.items() if not waiting.get(i)]
     heapq.heapify(heap)
     order: list[int] = []
     while heap:
-        _, degree, i = heapq.heappop(heap)
+        degree, i = heapq.heappop(heap)
         if i not in touching or degree != len(touching[i]):
             continue
         around = touching.pop(i)
         order.append(i)
+        for a in meets.get(i, ()):
+            waiting[a] -= 1
         for a in around:
             touching[a] |= around
             touching[a] -= {a, i}
-            heapq.heappush(heap, (-signs[a], len(touching[a]), a))
+            if not waiting.get(a):
+                heapq.heappush(heap, (len(touching[a]), a))
     return order

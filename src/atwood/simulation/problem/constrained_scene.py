@@ -30,7 +30,7 @@ __all__ = ["constrained_problem"]
 
 _PROGRAM: Key[ConstrainedProgram] = Key("accelerations and projections")
 _COMPILED: Key[CompiledConstraints | None] = Key("machine code of accelerations and projections")
-_MASSIVE: Key[bool] = Key("whether everything has inertia of its own")
+_LIGHT: Key[tuple[int, ...]] = Key("what has no inertia of its own")
 
 _LEAST = 1e-9
 """Of a body's inertia in one direction, relative to that in others, in units of the diagonal."""
@@ -80,18 +80,21 @@ def constrained_problem(
 
 def _program(plan: Plan, t: float, y: FloatArray) -> ConstrainedProgram:
     assembly, kept = plan.assembly, plan.finding.kept
-    is_massive = assembly.kept.get(_MASSIVE, lambda: _is_massive(plan, t, y))
+    light = assembly.kept.get(_LIGHT, lambda: _light_speeds(plan, t, y))
     rows = assembly.rows if assembly.form == "reduced" else assembly.maximal.rows
     name = f"{assembly.flat.name} ({assembly.form})"
 
     def make() -> ConstrainedProgram:
-        return constrained_program(name, assembly.own_equations, assembly.parameters, rows, kept, is_massive)
+        return constrained_program(name, assembly.own_equations, assembly.parameters, rows, kept, light)
 
-    return assembly.shared.get(_PROGRAM, make, assembly.form, kept, is_massive)
+    return assembly.shared.get(_PROGRAM, make, assembly.form, kept, light)
 
 
-def _is_massive(plan: Plan, t: float, y: FloatArray) -> bool:
-    """Return whether each body has inertia in every direction, whatever holds it: then any mass matrix is definite."""
+def _light_speeds(plan: Plan, t: float, y: FloatArray) -> tuple[int, ...]:
+    """Return the speeds of what has no inertia of its own in each of its directions, whatever holds it.
+
+    In generalized coordinates these are all as soon as there is such a body: any mass matrix may then be singular.
+    """
     assembly = plan.assembly
     q, u = plan.program.split(y)
     if assembly.form == "reduced":
@@ -100,15 +103,22 @@ def _is_massive(plan: Plan, t: float, y: FloatArray) -> bool:
     entries = assembly.kernel(program.program)([t], q, u)[0]
     places = list(zip(program.mass_rows.tolist(), program.mass_columns.tolist(), strict=True))
     value = dict(zip(places, entries, strict=True))
+    found: list[int] = []
     for group in connected_groups(range(program.speeds), places):
         block = np.array([[value.get((i, j), 0.0) for j in group] for i in group])
-        own = np.diag(block)
-        if not np.all(own > 0.0):
-            return False
-        even = block / np.sqrt(own[:, None] * own[None, :])
-        if not np.linalg.eigvalsh(even)[0] > _LEAST:
-            return False
-    return True
+        if not _is_definite(block):
+            found += group
+    if assembly.form == "reduced":
+        return tuple(range(plan.program.speeds)) if found else ()
+    return tuple(sorted(found))
+
+
+def _is_definite(block: FloatArray) -> bool:
+    """Return whether there is inertia in each direction, in units of that along each speed."""
+    own = np.diag(block)
+    if not np.all(own > 0.0):
+        return False
+    return bool(np.linalg.eigvalsh(block / np.sqrt(own[:, None] * own[None, :]))[0] > _LEAST)
 
 
 def _projected(nearer: BoundKernel, t: float, y: FloatArray, coordinates: int) -> FloatArray:
