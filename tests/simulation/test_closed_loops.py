@@ -18,7 +18,7 @@ from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.closed_loops import Solved, solve_at
 from atwood.simulation.problem.preparation import make_plan
 from atwood_library import Ground, Link, Pivot
-from atwood_library.scenes import AndrewsSqueezer, Bricard, FourBar, SliderCrank, Strandbeest
+from atwood_library.scenes import AndrewsSqueezer, Bricard, FourBar, FourBarRow, SliderCrank, Strandbeest
 
 from ..scenes import test_turned_mechanisms as turned
 
@@ -375,6 +375,17 @@ def test_formulas_go_on_behind_a_singular_position(rtol: float) -> None:
 
 
 @needs_sundials
+def test_two_links_that_fold_on_each_other_are_near_a_dead_centre() -> None:
+    """What joins two unknowns vanishes where links of one length fold: the angle between them then says nothing."""
+    flat, spatial = (
+        simulate(FourBarRow(windows=1, space=space), rtol=1e-10, t_end=1.6, max_steps=20_000)
+        for space in ("plane", "space")
+    )
+    assert spatial.status == "finished"
+    for path in ("crank[0].position.x", "crank[1].position.z"):
+        assert_allclose(spatial[path], flat[path], atol=1e-7)
+
+
 def test_outputs_do_not_tell_when_formulas_go_on() -> None:
     few, many = (simulate(parallelogram(), t_end=1.5, rtol=1e-8, outputs=outputs) for outputs in (2, 400))
     assert len(few.run.choices) == len(many.run.choices) == 9

@@ -182,6 +182,11 @@ class Loops:
         is_all = waves and self.agree((p, q), sum_of_waves(waves, angles, self.graph.zero))
         return (angles, waves) if is_all else None
 
+    def largest(self, square: Expression) -> Expression | None:
+        """Return the most that the square of a length can be; None if it does not move, or not with angles alone."""
+        found = None if square.is_parametric else self._waves(square, self.graph.zero)
+        return _sum_of_sizes(found[1]) if found is not None and found[0] else None
+
     def _followed(
         self,
         phase: Expression,

@@ -10,7 +10,7 @@ from atwood.late import replace
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.session import SolverRequest, open_implicit_session
 
-__all__ = ["allowed", "too_tight"]
+__all__ = ["allowed", "raised", "too_tight"]
 
 LEAST = 1e-15
 """The least relative tolerance: a few times the relative error of one operation."""
@@ -67,9 +67,31 @@ def too_tight(request: SolverRequest, solver: str, failed: StepResult) -> SolveE
         except AtwoodError:
             continue
         if found.status is not Status.FAILED and found.t - t >= _ENOUGH * (request.end - t):
-            return SolveError(
+            error = SolveError(
                 f"the relative tolerance, {asked:g}, is below what rounding allows here: {failed.message}",
                 where=request.plan.assembly.flat.name,
                 advice=f"Give rtol={factor * asked:g}, with which it goes on from there.",
             )
+            error.tolerance = factor * asked  # type: ignore[attr-defined]
+            return error
     return None
+
+
+def raised(options: RunOptions, error: SolveError) -> RunOptions | None:
+    """Return options with the tolerance that would do where a run failed, which a warning says; None if none is known.
+
+    Parameters
+    ----------
+    options
+        What was asked for.
+    error
+        How the run ended.
+    """
+    tolerance: float | None = getattr(error, "tolerance", None)
+    if tolerance is None:
+        return None
+    warnings.warn(
+        f"rtol = {options.relative_tolerance:g} is below what rounding allows here: {tolerance:g} is taken instead",
+        stacklevel=5,
+    )
+    return replace(options, relative_tolerance=tolerance)
