@@ -11,7 +11,7 @@ import pytest
 
 from atwood import Result, Scene, assemble, clock as clock_module, simulate, sweep
 from atwood.clock import Clock, TimeIsUp, check_time, more_time, time_left, within_time
-from atwood.errors import ResultError, SolveError
+from atwood.errors import ResultError
 from atwood.integrators import explicit_session
 from atwood.integrators.ida import native as ida_native
 from atwood.simulation.initialization import massless as massless_directions
