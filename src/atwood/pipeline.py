@@ -25,7 +25,7 @@ from typing import Any
 
 from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
-from atwood.errors import SolveError, StartError, UsageError
+from atwood.errors import StartError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import check_level
 from atwood.forms.reassembly import modes_of
@@ -65,7 +65,7 @@ from atwood.simulation.problem.conditions import conditions_of
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.run import run, run_out_of_time
-from atwood.simulation.run.tolerances import raised
+from atwood.simulation.run.tolerances import raised_where_too_tight
 from atwood.stages import stage, watching
 from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import Orientation, check_orientation
@@ -356,23 +356,11 @@ def _solve(assembly: Assembly, options: RunOptions, clock: Clock) -> Run:
 def _solve_to(accuracy: float | None, assembly: Assembly, options: RunOptions, clock: Clock) -> tuple[Run, Run | None]:
     """Run an assembly, with tolerances for the accuracy that was asked for, if any; and the second solution, if any."""
     if accuracy is None:
-        return _solve_as_tightly_as_may_be(assembly, options, clock), None
+        return raised_where_too_tight(lambda given: _solve(assembly, given, clock), assembly, options), None
     from atwood.result.accurate import accurate_run
 
     by_ida = assembly.form == "dae" or bool(assembly.own_equations.constraints) or options.solver.startswith("ida")
     return accurate_run(lambda given: _solve(assembly, given, clock), options, accuracy, by_ida)
-
-
-def _solve_as_tightly_as_may_be(assembly: Assembly, options: RunOptions, clock: Clock) -> Run:
-    """Run an assembly; from the start again, with a warning, where its tolerance is below what rounding allows."""
-    try:
-        return _solve(assembly, options, clock)
-    except SolveError as error:
-        # Functions of people that make states would be called again for times that they have seen.
-        looser = None if assembly.discrete_states else raised(options, error)
-        if looser is None:
-            raise
-    return _solve_as_tightly_as_may_be(assembly, looser, clock)
 
 
 def _share(begin: float, end: float, t: float) -> tuple[float, str]:

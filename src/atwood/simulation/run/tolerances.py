@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 
 from atwood.errors import AtwoodError, SolveError
+from atwood.forms.assembly import Assembly
 from atwood.integrators.protocol import Budget, Status, StepResult
 from atwood.late import replace
 from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.run.made import Run
 from atwood.simulation.run.session import SolverRequest, open_implicit_session
 
-__all__ = ["allowed", "raised", "too_tight"]
+__all__ = ["allowed", "raised_where_too_tight", "too_tight"]
 
 LEAST = 1e-15
 """The least relative tolerance: a few times the relative error of one operation."""
@@ -77,21 +80,31 @@ def too_tight(request: SolverRequest, solver: str, failed: StepResult) -> SolveE
     return None
 
 
-def raised(options: RunOptions, error: SolveError) -> RunOptions | None:
-    """Return options with the tolerance that would do where a run failed, which a warning says; None if none is known.
+def raised_where_too_tight(solve: Callable[[RunOptions], Run], assembly: Assembly, options: RunOptions) -> Run:
+    """Return a run, made again with a warning where its tolerance is below what rounding allows.
 
     Parameters
     ----------
-    options
-        What was asked for.
-    error
-        How the run ended.
+    solve
+        Makes the run.
+    assembly, options
+        The scene, and what was asked for.
+
+    Raises
+    ------
+    SolveError
+        If it fails otherwise, or has states that functions of people make, which would be called again for times that
+        they have seen.
     """
-    tolerance: float | None = getattr(error, "tolerance", None)
-    if tolerance is None:
-        return None
-    warnings.warn(
-        f"rtol = {options.relative_tolerance:g} is below what rounding allows here: {tolerance:g} is taken instead",
-        stacklevel=5,
-    )
-    return replace(options, relative_tolerance=tolerance)
+    while True:
+        try:
+            return solve(options)
+        except SolveError as error:
+            tolerance: float | None = getattr(error, "tolerance", None)
+            if tolerance is None or assembly.discrete_states:
+                raise
+        warnings.warn(
+            f"rtol = {options.relative_tolerance:g} is below what rounding allows here: {tolerance:g} is taken instead",
+            stacklevel=5,
+        )
+        options = replace(options, relative_tolerance=tolerance)
