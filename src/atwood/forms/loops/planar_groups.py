@@ -15,10 +15,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from atwood.expr import Expression, atan2, cos, jvp, minimum, sin, sqrt, substitute
+from atwood.expr import Expression, atan2, cos, jvp, sin, sqrt, substitute
 from atwood.forms.loops.branches import Group
 from atwood.forms.loops.harmonics import at, harmonics
-from atwood.forms.loops.roots import FAR, Root, Vector, arm_margin, dot, total
+from atwood.forms.loops.roots import Root, Vector, arm_margin, dot, total
 
 if TYPE_CHECKING:
     from atwood.forms.loops.assur_groups import Loops
@@ -79,12 +79,12 @@ def _two_links(loops: Loops, ks: tuple[int, ...], i: int, j: int, nested: float)
     cx = root.c * cy + nested * (root.s * sy) if nested else root.c
     sx = root.s * cy - nested * (root.c * sy) if nested else root.s
     places = {cos(x): cx, sin(x): sx, x: outer + turns[0], cos(y): cy, sin(y): sy, y: angle + turns[1]}
-    # What joins the two may be links in line itself, whose angle means nothing where they fold on each other.
-    folded = [FAR * one / most for one in (own, other) if (most := loops.largest(one)) is not None]
-    margins = (root.rest / (4.0 * own * other), *(minimum(1.0, one) for one in folded))
+    # Measured by the most that both can be: links in line themselves vanish where they fold, whatever the angle is.
+    most = [one if (found := loops.largest(one)) is None else found for one in (own, other)]
+    margin = root.rest / (4.0 * most[0] * most[1])
     values = {turns[0]: x - outer, turns[1]: y - angle}
     headings = (*first[1:], *second[1:])
-    return Group((i, j), ks, _along(loops, ks, p, q), places, margins, root.sign, values, headings)
+    return Group((i, j), ks, _along(loops, ks, p, q), places, (margin,), root.sign, values, headings)
 
 
 def _link_and_slide(loops: Loops, ks: tuple[int, ...], i: int, j: int) -> Group | None:

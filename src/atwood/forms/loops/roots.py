@@ -12,11 +12,11 @@ from atwood.forms.loops.harmonics import at, harmonics
 if TYPE_CHECKING:
     from atwood.forms.loops.assur_groups import Loops
 
-__all__ = ["FAR", "Root", "Vector", "arm_margin", "dot", "one_unknown", "solved_for", "total"]
+__all__ = ["Root", "Vector", "arm_margin", "dot", "one_unknown", "solved_for", "total"]
 
 Vector = Sequence[Expression]
 
-FAR = 100.0
+_FAR = 100.0
 """Where the arm that an angle is found from is a tenth of the longest that it can be, it counts as no dead centre."""
 
 
@@ -38,7 +38,7 @@ def total(start: Vector, *terms: tuple[Vector, Expression]) -> list[Expression]:
 
 def arm_margin(square: Expression, most: Expression) -> Expression:
     """Return how far it is from where an arm vanishes that an angle is found from, given its square and its most."""
-    found: Expression = minimum(1.0, FAR * square / (most * most))
+    found: Expression = minimum(1.0, _FAR * square / (most * most))
     return found
 
 
