@@ -3,7 +3,8 @@
 These are the assemblies of a universal joint, a ball and one joint more (USR, USP and UPS in Modelica's names). From
 the cross, with its axis a, to the ball is ``w = a (z + t) + P cos x + Q sin x``, where x is the angle about a, and P, Q
 and z depend on the other angle y and perhaps on the length s of the leg; t is constant. The ball is to be at V, seen
-from the cross. What does not depend on the angles leaves three equations, each with one unknown more:
+from the cross. All of it may turn with what the cross is on. What does not depend on the angles leaves three equations,
+each with one unknown more:
 
 - ``w^2 = V^2``, for the length of the leg, or for the coordinate on which V depends,
 - ``z + t = a . V``, for the angle y,
@@ -74,7 +75,7 @@ def three_unknowns(loops: Loops, ks: tuple[int, ...], unknowns: tuple[int, ...])
     for i, j in itertools.permutations(unknowns, 2):
         if loops.is_angle[i] and loops.is_angle[j]:
             (k,) = set(unknowns) - {i, j}
-            if not loops.shapes.turns_about(ks, i, (j, k)):
+            if not loops.shapes.turns_about(ks, i, (j,) if loops.is_angle[k] else (j, k)):
                 continue
             cross = _cross(loops, ks, i, j, k)
             found = () if cross is None else _groups(loops, ks, cross, i, j, k)
@@ -92,21 +93,22 @@ def _cross(loops: Loops, ks: tuple[int, ...], i: int, j: int, k: int) -> _Cross 
         return None
     if not loops.vanish([dot(p, q), dot(p, p) - dot(q, q)]):
         return None
-    here = _somewhere(loops, p, y, z)
+    here = _somewhere(loops, p, y, None if loops.is_angle[k] else z)
     if here is None:
         return None
-    first, second = at(p, here), at(q, here)
+    # A length of the leg is put aside too; what turns the cross, or moves the ball, is not.
+    is_leg = z in here and not loops.vanish([*jvp(p, {z: 1.0}), *jvp(q, {z: 1.0})])
+    aside = here if is_leg else {y: here[y]}
+    first, second, base = at(p, aside), at(q, aside), at(e, aside)
     square = dot(first, first)
     axis = [one / square for one in _cross_product(first, second)]
-    base = at(e, {y: here[y]})  # of the place of the ball alone, or of the length alone
-    is_place = loops.vanish([*jvp(p, {z: 1.0}), *jvp(q, {z: 1.0})])
-    base = base if is_place else at(base, {z: here[z]})
     rise = dot(axis, [one - other for one, other in zip(e, base, strict=True)])
     straight = [one - other - along * rise for one, other, along in zip(e, base, axis, strict=True)]
-    flat = [*straight, dot(axis, p), dot(axis, q), *(jvp([rise], {z: 1.0}) if is_place else ())]
+    flat = [*straight, dot(axis, p), dot(axis, q)]
+    flat += [] if is_leg else jvp([rise, dot(p, p)], {z: 1.0})
     if not loops.vanish(flat):
         return None
-    offset = _offset(loops, square, p, rise, here, y, z)
+    offset = _offset(loops, square, p, rise, aside, y)
     if offset is None:
         return None
     place = [offset * along - one for along, one in zip(axis, base, strict=True)]
@@ -118,13 +120,12 @@ def _offset(
     square: Expression,
     p: Vector,
     rise: Expression,
-    here: Mapping[Expression, float],
+    aside: Mapping[Expression, float],
     y: Expression,
-    z: Expression,
 ) -> Expression | None:
     """Return t, for which the square of w does not depend on the second angle; None if there is none."""
     known = {**loops.place.parameters, **loops.place.here}
-    ways = [at([rise, dot(p, p)], {y: quarter, z: here[z]}) for quarter in _QUARTERS]
+    ways = [at([rise, dot(p, p)], {**aside, y: quarter}) for quarter in _QUARTERS]
     risen, across = max(ways, key=lambda one: abs(evaluate([one[0]], known)[0]))
     if not abs(evaluate([risen], known)[0]) > _LEAST * loops.place.length:
         return None
@@ -133,11 +134,13 @@ def _offset(
     return offset if loops.vanish(jvp([whole], {y: 1.0})) else None
 
 
-def _somewhere(loops: Loops, p: Vector, y: Expression, z: Expression) -> dict[Expression, float] | None:
-    """Return values of the other two unknowns at which the arm about the first axis is long."""
+def _somewhere(loops: Loops, p: Vector, y: Expression, z: Expression | None) -> dict[Expression, float] | None:
+    """Return values of the second angle, and of a length, at which the arm about the first axis is long."""
     known, length = {**loops.place.parameters, **loops.place.here}, loops.place.length
-    ways = [{y: quarter, z: aside} for quarter in _QUARTERS for aside in (0.0, loops.place.here[z], length)]
-    (square,) = (dot(p, p),)
+    ways: list[dict[Expression, float]] = [{y: quarter} for quarter in _QUARTERS]
+    if z is not None:
+        ways = [{**way, z: aside} for way in ways for aside in (0.0, loops.place.here[z], length)]
+    square = dot(p, p)
     best = max(ways, key=lambda one: evaluate([square], {**known, **one})[0])
     return best if evaluate([square], {**known, **best})[0] > (_LEAST * length) ** 2 else None
 
@@ -149,7 +152,10 @@ def _groups(loops: Loops, ks: tuple[int, ...], cross: _Cross, i: int, j: int, k:
     square, far = dot(p, p) + cross.along * cross.along, dot(place, place)
     # The square of w does not depend on the second angle, so that any value of it will do.
     (square,) = substitute([square], {loops.q[j]: 0.0})
-    third = solved_for(loops, square - far, k, ks, tuple(place), size=_longer(loops, square, far, k))
+    if loops.vanish(jvp([square], {loops.q[k]: 1.0})):  # the coordinate moves the place of the ball
+        third = solved_for(loops, far - square, k, ks, tuple(place), size=square)
+    else:
+        third = solved_for(loops, square - far, k, ks, tuple(place), size=far)
     second = solved_for(loops, cross.along - dot(axis, place), j, ks, tuple(axis))
     if third is None or second is None:
         return ()
@@ -161,11 +167,6 @@ def _groups(loops: Loops, ks: tuple[int, ...], cross: _Cross, i: int, j: int, k:
     places = {cos(x): c / arm, sin(x): s / arm, x: direction + turn}
     first = Group((i,), ks, (circle,), places, turns={turn: x - direction}, headings=(heading,))
     return third, second, first
-
-
-def _longer(loops: Loops, square: Expression, far: Expression, k: int) -> Expression:
-    """Return which of both squares does not depend on a coordinate."""
-    return square if loops.vanish(jvp([square], {loops.q[k]: 1.0})) else far
 
 
 def _cross_product(a: Vector, b: Vector) -> list[Expression]:
