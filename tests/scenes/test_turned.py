@@ -335,7 +335,7 @@ def test_a_plate_that_turns_may_stand_a_little_turned(form: str, angle: float) -
     assert (found.freedom, len(found.redundant)) == (1, 3 if form == "dae" else len(found.redundant))
 
 
-@pytest.mark.parametrize("angle", [5.899870841674139e-09, -3e-7])
+@pytest.mark.parametrize("angle", [5.899870841674139e-09, -3e-7, 1.4930834352789646e-11, 2.8886809636387453e-12])
 def test_starts_on_a_plate_that_is_turned_by_next_to_nothing_meet_their_speeds(angle: float) -> None:
     """Rows that are a billionth of others are known no better than what the drive prescribes in them rounds."""
     assembly = assemble(driven(Stand(angle)))

@@ -116,7 +116,9 @@ class RowErrors:
             tangent = np.maximum(tangent, self._tangent)
         self._values, self._entries, self._tangent = values, entries, tangent
 
-    def of_jacobian(self, t: float, q: FloatArray, scales: FloatArray, miss: float = 0.0) -> FloatArray:
+    def of_jacobian(
+        self, t: float, q: FloatArray, scales: FloatArray, miss: float = 0.0, of_rates: bool = False
+    ) -> FloatArray:
         """Return how far rounding can take slopes at a place that is known no better than the values, shape (rows,).
 
         Parameters
@@ -125,10 +127,14 @@ class RowErrors:
             See `near`.
         miss
             By how much the place misses what it was to meet, relative to the scales.
+        of_rates
+            Whether values are rates, which do not say where the place is.
         """
         tangent = self._kinematic_matrix(t, q)
         values, found, _ = self._rough(t, q, scales, 1.0)
         errors = self._of_rows(_spread(found), tangent, scales)
+        if of_rates:
+            return self._shared(errors)
         sizes = np.maximum(self._of_rows(np.max(np.abs(found), axis=1), tangent, scales), errors / ROUGHNESS)
         unknown = np.divide(_spread(values), sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
         # A row that says no more of the place than that is followed by no step to it, and is no row here either.

@@ -104,7 +104,7 @@ def solve_speeds(
         residual, matrix = rough.at(t, q, u)
         u = u - scales * least_norm(scaled(matrix, scales), residual)
     system = System(assembly, equations, level.fixed, True, of_speeds=True)
-    errors = system.errors.of_jacobian(t, q, scales)
+    errors = system.errors.of_jacobian(t, q, scales, of_rates=True)
     prescribed = system.errors.of_values(t, q, scales) if system.errors.moves_by_itself else np.zeros_like(errors)
     for _ in range(3):  # linear: the second pass takes out rounding
         residual, matrix = system.at(t, q, u)
