@@ -19,13 +19,14 @@ how long each stage of `atwood.stages` took.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
 from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
-from atwood.errors import StartError, UsageError
+from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import check_level
 from atwood.forms.reassembly import modes_of
@@ -37,8 +38,7 @@ from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.progress import told
 from atwood.result.result import Result
-from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
-from atwood.simulation.initialization.start import Start, find_places, find_start
+from atwood.simulation.initialization.start import find_places, start_with_line_signs
 from atwood.simulation.problem.arguments import (
     ACCURACY,
     ATOL,
@@ -63,17 +63,14 @@ from atwood.simulation.problem.arguments import (
 )
 from atwood.simulation.problem.conditions import conditions_of
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.run.made import Run
-from atwood.simulation.run.run import run, run_out_of_time
+from atwood.simulation.run.made import Run, run_out_of_time
+from atwood.simulation.run.run import choice_at_start, run
 from atwood.simulation.run.tolerances import raised_where_too_tight
 from atwood.stages import stage, watching
 from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import Orientation, check_orientation
 
-__all__ = ["Assembly", "assemble", "assemble_flat", "assembly_of", "simulate"]
-
-_SIGNS_TRIED = 4
-"""So many starts are found with signs of their own, one after the other: more than two are hardly ever needed."""
+__all__ = ["Assembly", "assemble", "assemble_flat", "assembly_of", "simulate", "solve_as_asked"]
 
 SCENE = instance("a scene, or an assembly of one", Model, Assembly)
 
@@ -334,7 +331,9 @@ def simulate(
                 conditions=conditions_of(until, record),
                 nominal=read_nominal(assembly, nominal) if nominal else {},
             )
-            made, second = _solve_to(accuracy, assembly, options, clock)
+            made, second, said = _solve_to(accuracy, assembly, options, clock)
+    if said:
+        warnings.warn(f"{flat.name}: {said}", stacklevel=3)
     made = replace(made, timings=stopwatch.in_order())
     result = Result(made, second=second)
     if monitor is not None and made.segments:
@@ -346,21 +345,36 @@ def _solve(assembly: Assembly, options: RunOptions, clock: Clock) -> Run:
     """Find the start of an assembly, and run it from there."""
     try:
         with clock.kept(GRACE), stage("start"):
-            assembly, start = _with_line_signs(assembly)
+            assembly, start = start_with_line_signs(assembly)
     except TimeIsUp:
         return run_out_of_time(assembly, None, options)
     with stage("integration"):
         return run(assembly, start, options, assembly.other_mode, clock)
 
 
-def _solve_to(accuracy: float | None, assembly: Assembly, options: RunOptions, clock: Clock) -> tuple[Run, Run | None]:
-    """Run an assembly, with tolerances for the accuracy that was asked for, if any; and the second solution, if any."""
-    if accuracy is None:
-        return raised_where_too_tight(lambda given: _solve(assembly, given, clock), assembly, options), None
-    from atwood.result.accurate import accurate_run
+def solve_as_asked(assembly: Assembly, options: RunOptions) -> tuple[Result, str]:
+    """Run an assembly as accurately as its options ask; with what is to be said where that was not reached."""
+    made, second, said = _solve_to(options.accuracy, assembly, options, Clock(options.max_seconds))
+    return Result(made, second=second), said
 
-    by_ida = assembly.form == "dae" or bool(assembly.own_equations.constraints) or options.solver.startswith("ida")
-    return accurate_run(lambda given: _solve(assembly, given, clock), options, accuracy, by_ida)
+
+def _solve_to(
+    accuracy: float | None, assembly: Assembly, options: RunOptions, clock: Clock
+) -> tuple[Run, Run | None, str]:
+    """Run an assembly, with tolerances for the accuracy that was asked for, if any; see `accurate_run`."""
+    if accuracy is None:
+        return raised_where_too_tight(lambda given: _solve(assembly, given, clock), assembly, options), None, ""
+    from atwood.result.accurate import accurate_run
+    from atwood.simulation.events.sampling import refuse_updates
+
+    refuse_updates(assembly)
+    try:
+        with clock.kept(GRACE):
+            signed, start = start_with_line_signs(assembly)
+            solver = choice_at_start(signed, start, options, signed.other_mode).solver
+    except TimeIsUp:
+        return run_out_of_time(assembly, None, options), None, ""
+    return accurate_run(lambda given: _solve(assembly, given, clock), options, accuracy, solver)
 
 
 def _share(begin: float, end: float, t: float) -> tuple[float, str]:
@@ -379,22 +393,3 @@ def _refuse_contradictions(assembly: Assembly, given: Mapping[str, str]) -> None
                 where=assembly.flat.name,
                 advice=f"Leave {name} out, or assemble the scene with it.",
             )
-
-
-def _with_line_signs(assembly: Assembly) -> tuple[Assembly, Start]:
-    """Return an assembly whose lengths on a line are signed as at the start, and the start.
-
-    Signs are assumed from the values that were given. A start that contradicts them is found again with its own, in
-    generalized coordinates, as all starts are.
-    """
-    for _ in range(_SIGNS_TRIED):
-        start = find_start(assembly)
-        actual = actual_line_signs(assembly, start.time, start.coordinates, start.speeds, "reduced")
-        if not line_signs_differ(assembly, actual):
-            return assembly, start
-        assembly = assembly.other_mode(assembly.modes, actual)  # the same modes with other signs
-    raise StartError(
-        "it depends on the signs of lengths where things start, and on where they start, which signs these are",
-        where=assembly.flat.name,
-        advice="Give start positions instead of guesses, so that it is clear what is on which side.",
-    )

@@ -169,6 +169,19 @@ def test_stiff_runs_are_made_by_themselves(monkeypatch: pytest.MonkeyPatch) -> N
         assert_allclose(found[path], single[path], rtol=1e-11, atol=1e-11)
 
 
+def test_each_run_is_as_accurate_as_was_asked() -> None:
+    """The reference is far more accurate; one of the runs is chaotic, and says what it reached."""
+    options = {"start": {"rod1.angle": [0.2, 0.4]}, "t_end": 5.0, "quantities": ["rod1.angle", "rod2.angle"]}
+    asked, exact = sweep(DoublePendulum(), accuracy=1e-7, **options), sweep(DoublePendulum(), rtol=1e-13, **options)
+    assert "accuracy" in asked.statistics.why_single
+    assert not asked.messages
+    for path in exact.paths:
+        assert np.max(np.abs(asked[path] - exact[path])) < 1e-6
+    chaotic = sweep(DoublePendulum(), start={"rod1.angle": [2.5]}, t_end=60.0, accuracy=1e-9)
+    assert chaotic.status == ("finished",)
+    assert "was asked for" in chaotic.messages[0]
+
+
 def test_threads_change_nothing() -> None:
     options = {**CASES["starts"], "t_end": 1.0}
     alone, together = (sweep(DoublePendulum(), **options, threads=n) for n in (1, 3))
@@ -250,6 +263,7 @@ def test_a_list_takes_values_together() -> None:
         ({"vary": {"mass1": [1.0]}, "solver": "explict"}, UsageError, "explicit"),
         ({"vary": {"mass1": [1.0]}, "solver": "taylor", "form": "dae"}, UsageError, "reduced form"),
         ({"vary": {"mass1": [1.0]}, "rtol": 2.0}, UsageError, "between 0 and 1"),
+        ({"vary": {"mass1": [1.0]}, "rtol": 1e-6, "accuracy": 1e-6}, UsageError, "two things"),
         ({}, UsageError, "nothing is varied"),
     ],
 )

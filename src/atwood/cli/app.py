@@ -252,6 +252,7 @@ def compare_command(scene: str, as_json: bool, **options: Any) -> None:
     "--rtol", type=float, default=tolerances.RTOL, show_default=True, help="Relative tolerance of the solver."
 )
 @click.option("--solver", type=SOLVER, default="auto", show_default=True, help="As for `atwood run`.")
+@click.option("--accuracy", type=click.FloatRange(min=1e-15, max=0.1), help="Largest error of each motion, as for run.")
 @click.option("--outputs", type=click.IntRange(min=2), help="Number of output times; the end alone if not given.")
 @click.option("--max-steps", type=click.IntRange(min=1), help="Stop a run after so many steps.")
 @click.option("--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop a run after so many seconds.")

@@ -48,6 +48,7 @@ class SweepRequest:
     level: str = "ggl"
     t_end: float | None = None
     rtol: float = tolerances.RTOL
+    accuracy: float | None = None
     solver: str = "auto"
     outputs: int | None = None
     max_steps: int | None = None
@@ -92,6 +93,7 @@ def sweep_scene(request: SweepRequest) -> None:
             form=request.form,
             level=request.level,
             rtol=request.rtol,
+            accuracy=request.accuracy,
             solver=request.solver,
             max_steps=request.max_steps,
             max_seconds=request.max_seconds,

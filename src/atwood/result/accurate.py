@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 
 from atwood.errors import SolveError
@@ -27,8 +26,8 @@ _LEAST, _RUNS = 3e-15, 6
 
 
 def accurate_run(
-    solve: Callable[[RunOptions], Run], options: RunOptions, accuracy: float, by_ida: bool
-) -> tuple[Run, Run | None]:
+    solve: Callable[[RunOptions], Run], options: RunOptions, accuracy: float, solver: str
+) -> tuple[Run, Run | None, str]:
     """Solve a scene so that the error of its motion, by a second solution, is below a limit.
 
     Parameters
@@ -39,16 +38,16 @@ def accurate_run(
         What else was asked for.
     accuracy
         The limit: of positions relative to the extent of the scene, and of angles, rad.
-    by_ida
-        Whether IDA will solve it.
+    solver
+        What solves the scene at first, a key of `SOLVERS`.
 
     Returns
     -------
     tuple
-        The run with the loosest of the tolerances that were tried which meets it; else the most accurate one, with a
-        warning that says what was reached and until when. And the second solution.
+        The run with the loosest of the tolerances that were tried which meets it, else the most accurate one; the
+        second solution; and, where the limit is not met, what was reached and until when, in words.
     """
-    rtol = min(1e-2, accuracy * (_FIRST_BY_IDA if by_ida else 1.0))
+    rtol = min(1e-2, accuracy * (_FIRST_BY_IDA if solver.startswith("ida") else 1.0))
     best: Result | None = None
     failure = ""
     for _ in range(_RUNS):
@@ -62,15 +61,14 @@ def accurate_run(
             break
         result = Result(run)
         if not run.segments:
-            return run, None
+            return run, None, ""
         if best is None or result.accuracy.reached < best.accuracy.reached:
             best = result
         if result.accuracy.is_met or run.status not in ("finished", "stopped"):
-            return run, result.second.run
+            return run, result.second.run, ""
         if rtol <= _LEAST:
             break
         rtol *= min(0.1, max(_MOST, _SHARE * accuracy / result.accuracy.reached))
     assert best is not None
     said = f" (with smaller tolerances: {failure})" if failure else ""
-    warnings.warn(f"{best.assembly.flat.name}: {best.accuracy.describe()}{said}", stacklevel=4)
-    return best.run, best.second.run
+    return best.run, best.second.run, f"{best.accuracy.describe()}{said}"

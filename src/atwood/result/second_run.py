@@ -14,7 +14,7 @@ from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.late import replace
-from atwood.simulation.events.sampling import find_sampler
+from atwood.simulation.events.sampling import refuse_updates
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.run import run
@@ -50,14 +50,7 @@ def second_run(first: Run, times: FloatArray) -> Run:
     where = first.assembly.flat.name
     if first.start is None or not first.segments:
         raise UsageError("there is nothing in the run, and so no error", where=where)
-    begin, end = first.start.time, first.options.t_end
-    if find_sampler(first.assembly, begin, end, times).updates:
-        raise UsageError(
-            "its parts call functions at sample times, which may remember what they were called with: it is not "
-            "solved twice",
-            where=where,
-            advice="Run it again with a smaller rtol, and compare.",
-        )
+    refuse_updates(first.assembly)
     found, failure = None, ""
     for assembly, options in _attempts(first, times):
         try:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.errors import AtwoodError, DeclarationError, ParameterError, SolveError
+from atwood.errors import AtwoodError, DeclarationError, ParameterError, SolveError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.declare.binding import Binding, bind
@@ -225,6 +225,29 @@ def _flat(value: Any) -> list[float]:
     if isinstance(value, Iterable) and not isinstance(value, str):
         return [number for one in value for number in _flat(one)]
     return [float(value)]
+
+
+def refuse_updates(assembly: Assembly) -> None:
+    """Refuse to solve a scene twice whose parts call functions at sample times.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+
+    Raises
+    ------
+    UsageError
+        If it has such parts: what they call may remember what it was called with.
+    """
+    for path, part in assembly.flat.parts.items():
+        if part.component.laws("update"):
+            raise UsageError(
+                "it calls functions at sample times, which may remember what they were called with: the scene is not "
+                "solved twice, and so has no estimated error",
+                where=path,
+                advice="Run it again with a smaller rtol, and compare.",
+            )
 
 
 def find_sampler(assembly: Assembly, start: float, end: float, moments: FloatArray) -> Sampler:

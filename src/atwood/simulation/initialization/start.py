@@ -18,6 +18,7 @@ from atwood.forms.places import to_maximal
 from atwood.forms.starting import starting
 from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
+from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
 from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble, from_regular, own_names, switch_coordinates
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, scene_length
@@ -27,7 +28,7 @@ from atwood.simulation.initialization.speeds import solve_speeds
 from atwood.simulation.initialization.targets import sort_targets
 from atwood.tolerances import tolerances
 
-__all__ = ["Start", "find_places", "find_start", "maximal_state", "own_state", "settle"]
+__all__ = ["Start", "find_places", "find_start", "maximal_state", "own_state", "settle", "start_with_line_signs"]
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,8 @@ class Start:
 
 
 _START: Key[Start] = Key("start")
+_SIGNS_TRIED = 4
+"""So many starts are found with signs of their own, one after the other: more than two are hardly ever needed."""
 _INTEGRAL_GRADIENTS: Key[list[SparseMatrix]] = Key("gradients of integrals")
 
 
@@ -108,6 +111,25 @@ def find_start(assembly: Assembly) -> Start:
         If a start value names no quantity, or they contradict each other or the constraints.
     """
     return assembly.kept.get(_START, lambda: _find(assembly))
+
+
+def start_with_line_signs(assembly: Assembly) -> tuple[Assembly, Start]:
+    """Return an assembly whose lengths on a line are signed as at the start, and the start.
+
+    Signs are assumed from the values that were given. A start that contradicts them is found again with its own, in
+    generalized coordinates, as all starts are.
+    """
+    for _ in range(_SIGNS_TRIED):
+        start = find_start(assembly)
+        actual = actual_line_signs(assembly, start.time, start.coordinates, start.speeds, "reduced")
+        if not line_signs_differ(assembly, actual):
+            return assembly, start
+        assembly = assembly.other_mode(assembly.modes, actual)  # the same modes with other signs
+    raise StartError(
+        "it depends on the signs of lengths where things start, and on where they start, which signs these are",
+        where=assembly.flat.name,
+        advice="Give start positions instead of guesses, so that it is clear what is on which side.",
+    )
 
 
 def _find(assembly: Assembly) -> Start:

@@ -24,7 +24,7 @@ from atwood.simulation.run.record import SegmentRecord
 if TYPE_CHECKING:
     from atwood.simulation.singular.crossing import SingularCrossing
 
-__all__ = ["Run", "as_asked"]
+__all__ = ["Run", "as_asked", "run_out_of_time"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,3 +113,15 @@ def as_asked(segments: Sequence[SegmentRecord], outputs: int | FloatArray) -> tu
     if made and not any(one.shown.any() for one in made):
         made[0].shown[-1] = True
     return tuple(reversed(made))
+
+
+def run_out_of_time(assembly: Assembly, start: Start | None, options: RunOptions) -> Run:
+    """Return a run whose time was used up before its start was recorded.
+
+    Parameters
+    ----------
+    assembly, start, options
+        As of `atwood.simulation.run.run.run`; no start where it was not found.
+    """
+    message = f"the limit of {options.max_seconds:g} s was used up before the start was found"
+    return Run(assembly, (), (), Statistics(), "time_limit", message, start, options, ())

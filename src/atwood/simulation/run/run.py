@@ -33,7 +33,7 @@ from atwood.simulation.problem.options import RunOptions, Samples, sample_times
 from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.choice import Choice, check_solver, choose
-from atwood.simulation.run.made import Run, as_asked
+from atwood.simulation.run.made import Run, as_asked, run_out_of_time
 from atwood.simulation.run.outcome import Outcome, Segment, shortest_mode
 from atwood.simulation.run.record import Recorder, SegmentRecord
 from atwood.simulation.run.segment import run_segment
@@ -42,7 +42,7 @@ from atwood.simulation.run.tolerances import allowed
 from atwood.stages import stage
 from atwood.topology.orientation_coordinates import Orientation
 
-__all__ = ["run", "run_out_of_time"]
+__all__ = ["choice_at_start", "run"]
 
 
 _CHATTER = 50
@@ -88,6 +88,11 @@ def run(
         return walk.go()
 
 
+def choice_at_start(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reassemble) -> Choice:
+    """Return what solves a scene at first, and why; what is made for it is kept for the run. Arguments as of `run`."""
+    return _prepared(assembly, start, reassemble, allowed(options), np.zeros(0)).choice
+
+
 def _prepared(
     assembly: Assembly,
     start: Start,
@@ -120,18 +125,6 @@ def _again(
     between: FloatArray,
 ) -> Run:
     return _prepared(assembly, start, reassemble, options, between, log).go()
-
-
-def run_out_of_time(assembly: Assembly, start: Start | None, options: RunOptions) -> Run:
-    """Return a run whose time was used up before its start was recorded.
-
-    Parameters
-    ----------
-    assembly, start, options
-        As of `run`; no start where it was not found.
-    """
-    message = f"the limit of {options.max_seconds:g} s was used up before the start was found"
-    return Run(assembly, (), (), Statistics(), "time_limit", message, start, options, ())
 
 
 class _Walk:

@@ -17,9 +17,9 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, ResultError, UsageError, suggestion_in_parts
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.model.local.flatten import flatten
-from atwood.pipeline import simulate
+from atwood.pipeline import simulate, solve_as_asked
 from atwood.result.result import Result
 from atwood.simulation.problem.options import RunOptions
 from atwood.study.sweeps.cases import Cases
@@ -210,23 +210,11 @@ def _closing(pool: ThreadPoolExecutor, stop: threading.Event) -> Iterator[Thread
 
 
 def _run(request: SweepRequest, records: Records, structures: _Structures, run: int) -> None:
-    options = request.options
     try:
         assembly, reason = structures.assembly(*request.cases.of(run))
         if reason:
             records.reassembled[run] = reason
-        # Angles count their turns, and a drifting form is brought back, at samples on the way.
-        samples = 400 if request.has_turns or assembly.level == "index1-projected" else 1
-        result = simulate(
-            assembly,
-            t_end=options.t_end,
-            rtol=options.relative_tolerance,
-            outputs=2 if request.only_end else request.times,
-            max_steps=options.max_steps,
-            max_seconds=options.max_seconds,
-            solver=options.solver,
-            samples=samples,
-        )
+        result, said = _simulated(request, assembly)
     except UsageError:  # what was asked for makes no sense, for this run and all others
         raise
     except AtwoodError as error:
@@ -236,8 +224,8 @@ def _run(request: SweepRequest, records: Records, structures: _Structures, run: 
             _take(request, records, run, Result(before))
         return
     records.status[run] = result.status
-    if result.message:
-        records.messages[run] = result.message
+    if result.message or said:
+        records.messages[run] = result.message or said
     if result.status == "interrupted":
         raise KeyboardInterrupt
     if not result.run.segments:  # there was no time to find its start
@@ -246,6 +234,19 @@ def _run(request: SweepRequest, records: Records, structures: _Structures, run: 
         _take(request, records, run, result)
     except AtwoodError as error:
         records.fail(run, error)
+
+
+def _simulated(request: SweepRequest, assembly: Assembly) -> tuple[Result, str]:
+    """Return a run, and what is to be said of it where it is less accurate than was asked."""
+    # Angles count their turns, and a drifting form is brought back, at samples on the way.
+    samples = 400 if request.has_turns or assembly.level == "index1-projected" else 1
+    outputs = 2 if request.only_end else request.times
+    options = replace(request.options, outputs=outputs, samples=samples)
+    if options.accuracy is not None:
+        return solve_as_asked(assembly, options)
+    asked = {"max_steps": options.max_steps, "max_seconds": options.max_seconds, "solver": options.solver}
+    given: dict[str, Any] = {"rtol": options.relative_tolerance, "outputs": outputs, "samples": samples, **asked}
+    return simulate(assembly, t_end=options.t_end, **given), ""
 
 
 def _take(request: SweepRequest, records: Records, run: int, result: Result) -> None:
@@ -318,6 +319,7 @@ def _packed(request: SweepRequest, runs: NDArray[np.intp]) -> tuple[Any, ...]:
         "solver": options.solver,
         "max_steps": options.max_steps,
         "max_seconds": options.max_seconds,
+        "accuracy": options.accuracy,
         "name": assembly.flat.name,
     }
     return assembly.source.scene, axes, given

@@ -20,6 +20,7 @@ from atwood.model.declare.quantities import PATHS
 from atwood.pipeline import SCENE, assembly_of
 from atwood.progress import told
 from atwood.simulation.problem.arguments import (
+    ACCURACY,
     FORM,
     LEVEL,
     LIMITS,
@@ -30,6 +31,7 @@ from atwood.simulation.problem.arguments import (
     SOLVER,
     T_END,
     check_span,
+    refuse_two_accuracies,
 )
 from atwood.simulation.problem.options import RunOptions, sample_times
 from atwood.simulation.run.choice import check_solver
@@ -62,6 +64,7 @@ _TRIALS = 20
     executor=optional(instance("an executor of concurrent.futures", Executor)),
     progress=PROGRESS,
     name=NAME,
+    accuracy=ACCURACY,
     **LIMITS,
 )
 def sweep(
@@ -83,6 +86,7 @@ def sweep(
     executor: Executor | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
     name: str | None = None,
+    accuracy: float | None = None,
 ) -> Sweep:
     """Run a scene with many values of its parameters and of its start.
 
@@ -119,6 +123,9 @@ def sweep(
         Called with the number of runs done, and of how many; True for a line on standard error.
     name
         What to call the scene.
+    accuracy
+        The largest error of the motion of each run, as for `simulate`, in place of `rtol`; `Sweep.messages` says which
+        runs did not reach it. Such runs are made one by one, each about four times.
 
     Returns
     -------
@@ -132,6 +139,7 @@ def sweep(
     """
     began = time.perf_counter()
     check_solver(solver)
+    refuse_two_accuracies(accuracy, rtol, None, None)
     assembly = assembly_of(scene, name, form=form, level=level)
     source = assembly.source.scene if assembly.source is not None else None
     if source is None:
@@ -145,7 +153,7 @@ def sweep(
         expand_paths(first, quantities),
         _times(first, end, outputs),
         outputs is None,
-        RunOptions(end, rtol, max_steps=max_steps, max_seconds=max_seconds, solver=solver),
+        RunOptions(end, rtol, max_steps=max_steps, max_seconds=max_seconds, solver=solver, accuracy=accuracy),
     )
     records = Records.empty(request)
     count = _threads(threads)
