@@ -47,7 +47,7 @@ class Prepared:
     def settings(self, rtol: float) -> SolverOptions:
         """Return the options that a run gives its solver."""
         return SolverOptions(
-            relative_tolerance=rtol, absolute_tolerances=self.plan.tolerances(rtol), horizon=self.mechanism.t_end
+            relative_tolerance=rtol, absolute_tolerances=self.plan.tolerances(rtol, {}), horizon=self.mechanism.t_end
         )
 
     def at_end(self, y: FloatArray) -> FloatArray:

@@ -75,7 +75,7 @@ def hand_measure(prepared: Prepared, rtol: float, flags: str) -> Measure:
         prepared.mechanism,
         (prepared.y, prepared.yp),
         rtol,
-        prepared.plan.tolerances(rtol),
+        prepared.plan.tolerances(rtol, {}),
         flags,
         tuning=tuned(6 * prepared.mechanism.links),
         band=prepared.mechanism.links > 2,
@@ -83,7 +83,7 @@ def hand_measure(prepared: Prepared, rtol: float, flags: str) -> Measure:
     mechanism = prepared.mechanism
     with ida_session(prepared, rtol)() as session:
         ours = prepared.at_end(session.advance(mechanism.t_end).y)
-    tight = IdaRun(mechanism, (prepared.y, prepared.yp), 1e-10, prepared.plan.tolerances(1e-10), flags)()[1]
+    tight = IdaRun(mechanism, (prepared.y, prepared.yp), 1e-10, prepared.plan.tolerances(1e-10, {}), flags)()[1]
     own, by_c = mechanism.error(ours, tight), mechanism.error(run()[1], tight)
     if by_c > 100.0 * own + 1e-9 or (rtol <= 1e-6 and mechanism.links == 1 and by_c > 1e-3):
         raise SystemExit(f"{mechanism.name}: the C by hand has an error of {by_c:.1e}, Atwood {own:.1e}")

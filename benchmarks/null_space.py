@@ -66,7 +66,7 @@ def runs_of(scene: Scene, t_end: float, rtol: float) -> dict[str, Callable[[], t
 
     def prepared() -> tuple[Plan, SolverOptions, Any, Any]:
         plan = make_plan(segment.assembly, 0.0, q, u, length, t_end)
-        settings = SolverOptions(relative_tolerance=rtol, absolute_tolerances=plan.tolerances(rtol), horizon=t_end)
+        settings = SolverOptions(relative_tolerance=rtol, absolute_tolerances=plan.tolerances(rtol, {}), horizon=t_end)
         return plan, settings, *pack_state(plan, 0.0, q, u)
 
     def native(compiled: bool) -> tuple[Statistics, Plan]:

@@ -52,7 +52,7 @@ def ways(mechanism: Mechanism, flags: str, quick: bool) -> dict[str, tuple[list[
     fine, coarse = powers(1.5, 14, 0.5), powers(2, 12)
     found: dict[str, tuple[list[float], Make]] = {}
     if hand.by_hand.compiler():
-        absolute = dae.plan.tolerances(1.0)
+        absolute = dae.plan.tolerances(1.0, {})
         links = slice(4 * mechanism.links, None)
 
         def ida_by_hand(rtol: float, tuning: hand.Tuning, band: bool) -> Run:

@@ -304,8 +304,8 @@ def absolute_tolerances(options: SolverOptions, size: int) -> FloatArray:
     if isinstance(options.absolute_tolerances, float):
         return np.full(size, max(options.absolute_tolerances, _TINY))
     try:
-        given = np.broadcast_to(np.asarray(options.absolute_tolerances, dtype=np.float64), (size,))
-        return np.maximum(given, _TINY)
+        given = np.asarray(options.absolute_tolerances, dtype=np.float64)
+        return np.maximum(given if given.shape == (size,) else np.broadcast_to(given, (size,)), _TINY)
     except ValueError:
         raise UsageError(f"give one absolute tolerance, or one for each of the {size} unknowns") from None
 

@@ -162,27 +162,21 @@ class CompiledStepper:
         self._arrays[ROWS["floors"]] = 1.0
         self._arrays[ROWS["floors"], :n] = absolute_tolerances(options, n) / options.relative_tolerance
         programs = recurrences.programs
-        self._set_count("size", n)
-        self._set_count("padded", self._arrays.shape[1])
-        self._set_count("order", chosen)
-        self._set_count("pair_blocks", -(-programs.pairs // LANES))
-        self._set_count("square_blocks", -(-programs.squares // LANES))
-        self._set("share", log2(share_of_radius(chosen, options.relative_tolerance)))
-        self._set("allowed", DEFECT * options.relative_tolerance + FLOOR)
-        self._set("longest", options.max_step or inf)
-        self._set("horizon", options.horizon)
-        self._set("stop_time", problem.stop_time)
-        self._set("reach", problem.reach)
-        self._set("first", options.first_step or 0.0)
+        pairs, squares = -(-programs.pairs // LANES), -(-programs.squares // LANES)
+        self._counts[: COUNTS.index("limit")] = n, self._arrays.shape[1], chosen, pairs, squares
+        share = log2(share_of_radius(chosen, options.relative_tolerance))
+        allowed = DEFECT * options.relative_tolerance + FLOOR
+        limits = allowed, options.max_step or inf, options.horizon, problem.reach
+        self._numbers[_FIRST:] = options.first_step or 0.0, 0.0, problem.stop_time, share, *limits
         self._run, self._interpolate, self._sample, self._begin = _functions()
 
     def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray) -> None:
         """Find a place for everything, in one piece of memory that begins with a cache line."""
         layout, n = recurrences.layout, self._size
         memory = np.zeros(layout.size + _LINE)
-        skipped = -(memory.ctypes.data // 8) % _LINE
-        memory = memory[skipped:]
-        base = memory.ctypes.data
+        begins: int = memory.ctypes.data
+        skipped = -(begins // 8) % _LINE
+        memory, base = memory[skipped:], begins + 8 * skipped
         at = layout.places
         whole = memory.view(np.int64)
         self._numbers = memory[at["numbers"] : at["numbers"] + len(NUMBERS)]
@@ -257,7 +251,7 @@ class CompiledStepper:
 
 
 _COUNTED = len(names_of(Counts))
-_T, _STEPS = NUMBERS.index("t"), COUNTS.index("steps")
+_T, _FIRST, _STEPS = NUMBERS.index("t"), NUMBERS.index("first"), COUNTS.index("steps")
 
 
 @once
