@@ -95,6 +95,7 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "report of a loop": atwood.report(FourBar()),
         "report in space": atwood.report(DoublePendulum(space="space")),
         "comparison": atwood.compare(FourBar(), rtols=[1e-4, 1e-6], t_end=0.2),
+        "long comparison": atwood.compare_long(SimplePendulum(), periods=10, period=2.0),
         "sweep": atwood.sweep(scene, start=angles, t_end=0.1, outputs=30),
         "check": atwood.check(Rod),
         "equations": (atwood.equations(DoublePendulum()), atwood.equations(DoublePendulum()).terms("bob1")),
@@ -185,6 +186,7 @@ SAID = {
     "loop": ("Result of FourBar", "dae form (ggl)"),
     "report": ("MechanismReport of Chain", "30 degrees of freedom", "30 bodies"),
     "comparison": ("Comparison of FourBar", "10 runs"),
+    "long comparison": ("LongComparison of SimplePendulum", "10 periods"),
     "sweep": ("Sweep of Chain", "40 runs", "rod[0].angle 0 to 1 rad", "40 finished"),
 }
 

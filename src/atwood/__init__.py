@@ -94,7 +94,9 @@ if TYPE_CHECKING:
     from atwood.reporting import MechanismReport, report
     from atwood.result.files import SavedResult, load_result, save_result
     from atwood.result.result import Result
-    from atwood.study.comparison.compare import Comparison, ComparisonRow, compare
+    from atwood.study.comparison.compare import compare
+    from atwood.study.comparison.found import Comparison, ComparisonRow
+    from atwood.study.comparison.long_runs import LongComparison, compare_long
     from atwood.study.sweeps.files import load_sweep
     from atwood.study.sweeps.sweep import Sweep, sweep
     from atwood.theory.action import (
@@ -181,6 +183,7 @@ __all__ += [
     "Sweep",
     "assemble",
     "compare",
+    "compare_long",
     "load_result",
     "load_sweep",
     "report",
@@ -206,6 +209,7 @@ __all__ += [
     "Hamiltonian",
     "JoiningMotion",
     "LinearModel",
+    "LongComparison",
     "LyapunovExponents",
     "NormalModes",
     "PartOfEquations",
@@ -314,6 +318,7 @@ _ROOMS = {
     "atwood.result.files": ("SavedResult", "load_result", "save_result"),
     "atwood.result.result": ("Result",),
     "atwood.study": ("Comparison", "ComparisonRow", "Sweep", "compare", "load_sweep", "sweep"),
+    "atwood.study.comparison.long_runs": ("LongComparison", "compare_long"),
     "atwood.theory.action": (
         "Action", "ActionAngle", "JoiningMotion", "SeparatedMotion", "Separation", "Variation",
         "action", "action_angle", "motions_between", "separation",

@@ -9,7 +9,17 @@ from typing import Any
 import click
 
 from atwood.cli.errors import FAILED, reporting_errors
-from atwood.cli.options import FILE, FORM, LEVEL, ORIENTATION, SCENE_HELP, SOLVER, scene_options
+from atwood.cli.options import (
+    DIRECTORY,
+    FILE,
+    FORM,
+    LEVEL,
+    ORIENTATION,
+    SCENE_HELP,
+    SOLVER,
+    options_of_any_scene,
+    scene_options,
+)
 from atwood.errors import near_matches
 from atwood.tolerances import tolerances
 
@@ -199,7 +209,7 @@ def run_command(scene: str, as_json: bool, **options: Any) -> None:
 
 
 @main.command("compare", short_help="Compare what each form costs for which error.", epilog=SCENE_HELP)
-@scene_options
+@options_of_any_scene
 @click.option("--t-end", type=float, help="Time of the end, s; the scene's own if not given.")
 @click.option(
     "--rtol", "rtols", type=float, multiple=True, help="Relative tolerance; can be repeated.  [default: 1e-4 to 1e-10]"
@@ -208,9 +218,23 @@ def run_command(scene: str, as_json: bool, **options: Any) -> None:
     "--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Give up a run after so many seconds."
 )
 @click.option("--plot", type=FILE, help="Save a work-precision diagram; the suffix says how (.png, .svg, .pdf).")
+@click.option("--save", type=FILE, help="Save all figures, and on what they were measured (.csv).")
+@click.option(
+    "--long",
+    "periods",
+    type=click.IntRange(min=10, max=1_000_000),
+    metavar="PERIODS",
+    help="Compare instead how energy and what else is conserved drift over so many periods, by method.",
+)
+@click.option("--all", "every", is_flag=True, help="Compare all scenes of the installed libraries, one after another.")
+@click.option(
+    "--html",
+    type=DIRECTORY,
+    help="Write a page with tables and pictures within it, and all figures as CSV, to this directory.",
+)
 @click.option("--progress/--no-progress", default=True, help="Show progress where there is a terminal.")
 @reporting_errors
-def compare_command(scene: str, as_json: bool, **options: Any) -> None:
+def compare_command(scene: str | None, as_json: bool, **options: Any) -> None:
     """Run SCENE in both forms, at several tolerances, against a far more accurate reference."""
     from atwood.cli.comparing import CompareRequest, compare_scene
 

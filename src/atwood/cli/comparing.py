@@ -8,15 +8,17 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from atwood.cli.output import console, print_json
-from atwood.cli.scenes import prepare
+from atwood.cli.output import console, print_json, warn
+from atwood.cli.scenes import bundled_scenes, prepare
+from atwood.errors import AtwoodError, UsageError
 from atwood.late import dataclass
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from atwood.study import Comparison, ComparisonRow
-from atwood.study.comparison.compare import RELATIVE
+    from atwood.model.compose.composite import Model
+    from atwood.study import Comparison
+from atwood.study.comparison.found import HEADINGS, RELATIVE
 
 __all__ = ["CompareRequest", "compare_scene"]
 
@@ -25,13 +27,17 @@ __all__ = ["CompareRequest", "compare_scene"]
 class CompareRequest:
     """What was asked for on the command line; see the options of `atwood compare`."""
 
-    scene: str
+    scene: str | None
     settings: tuple[str, ...] = ()
     starts: tuple[str, ...] = ()
     t_end: float | None = None
     rtols: tuple[float, ...] = ()
     max_seconds: float | None = None
     plot: Path | None = None
+    save: Path | None = None
+    every: bool = False
+    html: Path | None = None
+    periods: int | None = None
     progress: bool = True
     as_json: bool = False
 
@@ -44,30 +50,146 @@ def compare_scene(request: CompareRequest) -> None:
     request
         What was asked for.
     """
-    if request.plot is not None:
-        from atwood.plotting.canvas import check_picture
-
-        check_picture(request.plot)
+    _check_files(request)
+    if request.every:
+        _compare_all(request)
+        return
+    if request.scene is None:
+        raise UsageError("which scene?", advice="Name one (see `atwood list`), or give --all.")
     scene, name = prepare(request.scene, request.settings, request.starts)
-    from atwood.study.comparison.compare import TOLERANCES, compare
-
+    if request.periods is not None:
+        _compare_long(request, scene, name)
+        return
     with _progress(request.progress) as progress:
-        found = compare(
-            scene,
-            t_end=request.t_end,
-            rtols=request.rtols or TOLERANCES,
-            max_seconds=request.max_seconds,
-            name=name,
-            progress=progress,
-        )
+        found = _compared(request, scene, name, progress)
     if request.plot is not None:
         found.plot(request.plot)
+    if request.save is not None:
+        found.save(request.save)
+    if request.html is not None:
+        from atwood.plotting.comparison_page import write_page
+
+        write_page([found], {}, request.html)
     if request.as_json:
         print_json(found.to_dict())
         return
     _print(found)
+    for option, file in (("plotted", request.plot), ("saved", request.save), ("written", request.html)):
+        if file is not None:
+            console().print(f"{option}: {file}", style="dim", soft_wrap=True)
+
+
+def _compare_long(request: CompareRequest, scene: Model, name: str) -> None:
+    """Compare methods over many periods."""
+    from atwood.study.comparison.long_runs import compare_long
+
+    with _progress(request.progress) as progress:
+        limit = request.max_seconds or _LONG_RUN
+        found = compare_long(scene, periods=request.periods or 1, max_seconds=limit, name=name, progress=progress)
+    if request.as_json:
+        print_json(found.to_dict())
+        return
+    console().print(str(found), soft_wrap=True)
+
+
+_LONG_RUN = 20.0
+"""Seconds for each method over many periods."""
+
+_EACH, _TOGETHER = 10.0, 90.0
+"""Seconds for each run, and for all runs of a scene, where all scenes are compared."""
+
+
+def _compared(
+    request: CompareRequest,
+    scene: Model,
+    name: str,
+    progress: Callable[[str, int, int], object] | None,
+) -> Comparison:
+    from atwood.study.comparison.compare import TOLERANCES, compare
+
+    return compare(
+        scene,
+        t_end=request.t_end,
+        rtols=request.rtols or TOLERANCES,
+        max_seconds=request.max_seconds or (_EACH if request.every else None),
+        total_seconds=_TOGETHER if request.every else None,
+        name=name,
+        progress=progress,
+    )
+
+
+def _check_files(request: CompareRequest) -> None:
+    """Refuse what contradicts, and files that could not be written, before any work is done."""
     if request.plot is not None:
-        console().print(f"plotted: {request.plot}", style="dim", soft_wrap=True)
+        from atwood.plotting.canvas import check_picture
+
+        check_picture(request.plot)
+    if request.save is not None:
+        from atwood.study.comparison.found import check_rows_file
+
+        check_rows_file(request.save)
+    if request.html is not None:
+        from atwood.plotting.comparison_page import check_page
+
+        check_page(request.html)
+    if request.periods is not None:
+        idle = {"--all": request.every, "--rtol": request.rtols, "--t-end": request.t_end}
+        idle |= {"--plot": request.plot, "--save": request.save, "--html": request.html}
+        for option in (name for name, given in idle.items() if given):
+            raise UsageError("it means nothing over many periods", where=option, advice="Leave it or --long out.")
+    if not request.every:
+        return
+    changed = {"SCENE": request.scene, "--set": request.settings, "--start": request.starts}
+    for option in (name for name, given in changed.items() if given):
+        raise UsageError("--all takes all scenes as they are", where=option, advice="Leave one of the two out.")
+    if request.plot is not None:
+        raise UsageError("--all has a picture for each scene", where="--plot", advice="Give --html DIR instead.")
+
+
+def _compare_all(request: CompareRequest) -> None:
+    """Compare the forms of all scenes of the installed libraries, one after another."""
+    from atwood.study.comparison.found import write_rows
+
+    found: list[Comparison] = []
+    failed: dict[str, str] = {}
+    names = list(bundled_scenes())
+    with _progress(request.progress) as progress:
+        for number, name in enumerate(names):
+            watch = None if progress is None else _within(progress, number, len(names), name)
+            try:
+                scene, _ = prepare(name, (), ())
+                found.append(_compared(request, scene, name, watch))
+            except AtwoodError as error:
+                failed[name] = error.message
+            except KeyboardInterrupt:
+                warn("Interrupted: what was found so far is kept.")
+                break
+            if progress is None and request.progress:
+                told = failed[name] if name in failed else found[-1].verdict
+                warn(f"{number + 1} of {len(names)}, {name}: {told}")
+    if request.save is not None:
+        write_rows(found, request.save)
+    if request.html is not None:
+        from atwood.plotting.comparison_page import write_page
+
+        write_page(found, failed, request.html)
+    if request.as_json:
+        print_json({"comparisons": [one.to_dict() for one in found], "failed": failed})
+        return
+    for one in found:
+        console().print(f"{one.scene}: {one.verdict}", soft_wrap=True)
+    for name, reason in failed.items():
+        console().print(f"{name}: no answer: {reason}", soft_wrap=True)
+    for option, file in (("saved", request.save), ("written", request.html)):
+        if file is not None:
+            console().print(f"{option}: {file}", style="dim", soft_wrap=True)
+
+
+def _within(
+    progress: Callable[[str, int, int], object], number: int, count: int, name: str
+) -> Callable[[str, int, int], object]:
+    """Return what shows the progress of one scene among all."""
+    return lambda what, done, of: progress(f"{name} ({number + 1} of {count}): {what}", number * of + done, count * of)
 
 
 def _print(found: Comparison) -> None:
@@ -92,7 +214,7 @@ def _table(found: Comparison) -> Table:
 
     table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
     table.add_column("form", no_wrap=True, min_width=22)
-    for heading in ("rtol", "error", "time, ms", "steps", "energy drift", "constraint drift"):
+    for heading in ("rtol", *HEADINGS):
         table.add_column(heading, justify="right", no_wrap=True)
     shown = ""
     for row in found.rows:
@@ -101,20 +223,13 @@ def _table(found: Comparison) -> Table:
         if row.reason:
             table.add_row(row.label, f"{row.rtol:.0e}", "failed")
         else:
-            table.add_row(row.label if row.label != shown else "", f"{row.rtol:.0e}", *_numbers(row))
+            table.add_row(row.label if row.label != shown else "", f"{row.rtol:.0e}", *row.cells())
         shown = row.label
     failed = [row for row in found.rows if row.reason]
     if failed:
         table.caption = "\n".join(f"{row.label} at {row.rtol:.0e} failed: {row.reason}" for row in failed)
         table.caption_justify = "left"
     return table
-
-
-def _numbers(row: ComparisonRow) -> list[str]:
-    error, wall = row.error or 0.0, row.wall_s or 0.0
-    mark = "*" if row.within_reference else " "
-    drifts = [f"{drift or 0.0:.1e}" for drift in (row.energy_drift, row.constraint_drift)]
-    return [f"{error:.1e}{mark}", f"{1e3 * wall:.3g}", str(row.steps), *drifts]
 
 
 @contextlib.contextmanager

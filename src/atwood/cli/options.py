@@ -8,7 +8,17 @@ from typing import Any, TypeVar
 
 import click
 
-__all__ = ["FILE", "FORM", "LEVEL", "ORIENTATION", "SCENE_HELP", "SOLVER", "scene_options"]
+__all__ = [
+    "DIRECTORY",
+    "FILE",
+    "FORM",
+    "LEVEL",
+    "ORIENTATION",
+    "SCENE_HELP",
+    "SOLVER",
+    "options_of_any_scene",
+    "scene_options",
+]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -27,10 +37,20 @@ FORM = click.Choice(["reduced", "dae"])
 LEVEL = click.Choice(["ggl", "index1", "index1-projected"])
 SOLVER = click.Choice(["auto", "ida", "ida-sundae", "explicit", "taylor", "gauss", "composition"])
 FILE = click.Path(dir_okay=False, path_type=Path)
+DIRECTORY = click.Path(file_okay=False, path_type=Path)
 
 
 def scene_options(function: F) -> F:
     """Add the scene, and what changes it."""
+    return _with_scene(function, True)
+
+
+def options_of_any_scene(function: F) -> F:
+    """Add the same where the scene may be left out."""
+    return _with_scene(function, False)
+
+
+def _with_scene(function: F, required: bool) -> F:
     for option in (
         click.option("--json", "as_json", is_flag=True, help="Write JSON, and nothing else, to standard output."),
         click.option(
@@ -41,7 +61,7 @@ def scene_options(function: F) -> F:
             "--set", "settings", multiple=True, metavar="PATH=VALUE",
             help="Parameter, such as rod1.length='30 cm'. Can be repeated.",
         ),
-        click.argument("scene"),
+        click.argument("scene", required=required),
     ):  # fmt: skip
         function = option(function)
     return function

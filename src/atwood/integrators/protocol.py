@@ -262,7 +262,9 @@ class Statistics:
     reinitializations
         Restarts of the method.
     seconds
-        Time spent inside `Session.advance`.
+        Time spent inside `Session.advance`, and in looking out for singular positions between steps.
+    monitor_seconds
+        What of it went into the latter; looks in machine code take at most half a step each, and are not told apart.
     error_test_failures, convergence_failures
         Steps that were repeated; `None` where a driver cannot tell.
     """
@@ -274,6 +276,7 @@ class Statistics:
     undefined_values: int = 0
     reinitializations: int = 0
     seconds: float = 0.0
+    monitor_seconds: float = 0.0
     error_test_failures: int | None = None
     convergence_failures: int | None = None
 

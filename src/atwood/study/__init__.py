@@ -1,6 +1,8 @@
 """Studies: many runs of one scene, and what they say together."""
 
-from atwood.study.comparison.compare import Comparison, ComparisonRow, Reference, compare
+from atwood.study.comparison.compare import compare
+from atwood.study.comparison.found import Comparison, ComparisonRow
+from atwood.study.comparison.reference import Reference
 from atwood.study.sweeps.files import load_sweep
 from atwood.study.sweeps.sweep import Sweep, SweepStatistics, sweep
 

@@ -3,19 +3,36 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
-from atwood.study.comparison.compare import Comparison, ComparisonRow
+from atwood.study.comparison.found import Comparison, ComparisonRow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_comparison"]
+__all__ = ["plot_comparison", "style_of"]
 
-_MARKERS = ("o", "s", "D", "^", "v")
+_STYLES = {
+    "reduced": (COLOURS[0], "o"),
+    "reduced, explicit": (COLOURS[2], "s"),
+    "reduced, gauss": (COLOURS[4], "P"),
+    "dae (ggl)": (COLOURS[1], "D"),
+    "dae (index1-projected)": (COLOURS[3], "^"),
+    "dae (index1)": (COLOURS[6], "v"),
+}
+"""Colour and marker of each form and method, the same in all pictures; others have what is left."""
+
+_OTHERS = ((COLOURS[5], "X"), (COLOURS[7], "*"), (INK, "<"), (GREY, ">"))
+
+
+def style_of(label: str, labels: Iterable[str]) -> tuple[str, str]:
+    """Return colour and marker of a form among all that are shown."""
+    others = [one for one in dict.fromkeys(labels) if one not in _STYLES]
+    return _STYLES[label] if label in _STYLES else _OTHERS[others.index(label) % len(_OTHERS)]
 
 
 @takes(comparison=instance("a Comparison, as compare returns it", Comparison), file=optional(FILE))
@@ -40,7 +57,8 @@ def plot_comparison(comparison: Comparison, file: str | os.PathLike[str] | None 
     for row in comparison.rows:
         if not row.reason:
             curves.setdefault(row.label, []).append(row)
-    for (label, rows), colour, marker in zip(curves.items(), COLOURS, _MARKERS, strict=False):
+    for label, rows in curves.items():
+        colour, marker = style_of(label, curves)
         errors = [max(row.error or 0.0, 1e-16) for row in rows]
         style = {"color": colour, "marker": marker, "markersize": 5.5, "linewidth": 1.6, "label": label}
         left.plot([1e3 * (row.wall_s or 0.0) for row in rows], errors, **style)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import Any
@@ -13,18 +15,21 @@ from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.canonical import is_canonical
 from atwood.forms.dae import LEVELS
-from atwood.late import dataclass
+from atwood.integrators.protocol import Statistics
+from atwood.late import replace
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import flatten
 from atwood.pipeline import assemble_flat
 from atwood.progress import told
-from atwood.showing import count_of, fitted, html_table
+from atwood.result.result import Result
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRESS, RTOL, T_END, check_span
 from atwood.simulation.problem.closed_loops import solve_at
 from atwood.simulation.problem.options import SOLVERS
 from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.run.choice import implicit_solver
+from atwood.study.comparison.environment import environment
+from atwood.study.comparison.found import Comparison, ComparisonRow
 from atwood.study.comparison.reference import (
     Assembled,
     Reference,
@@ -33,156 +38,10 @@ from atwood.study.comparison.reference import (
     scaled_difference,
     table_at,
 )
-from atwood.study.comparison.verdict import judge
 
-__all__ = ["RELATIVE", "Comparison", "ComparisonRow", "Reference", "compare"]
-
-RELATIVE = (
-    "Errors and constraint drifts are relative to the size of the scene, or in rad; energy drifts to what it exchanges."
-)
-"""What the figures of a comparison are relative to."""
+__all__ = ["compare"]
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
-
-
-@dataclass(frozen=True)
-class ComparisonRow:
-    """One run of a comparison.
-
-    Attributes
-    ----------
-    form, level
-        Form, and level of the dae form.
-    solver
-        Name of the solver.
-    rtol
-        Relative tolerance.
-    error
-        Largest scaled difference from the reference, in positions of bodies and angles.
-    wall_s
-        Time spent integrating, without outputs on the way, s: the least of three runs.
-    steps
-        Steps of the solver.
-    energy_drift
-        Error of the energy, relative to what the scene exchanges; see `atwood.result.energy.EnergyLedger`.
-    constraint_drift
-        By how much the constraints are missed by what the run gives, relative to the scene's sizes.
-    constraint_held
-        The same for the solver's own states, before projection.
-    within_reference
-        Whether the error is not larger than ten times the reference's own.
-    reason
-        Why there are no numbers; empty if there are.
-    """
-
-    form: str
-    level: str
-    solver: str
-    rtol: float
-    error: float | None = None
-    wall_s: float | None = None
-    steps: int | None = None
-    energy_drift: float | None = None
-    constraint_drift: float | None = None
-    constraint_held: float | None = None
-    within_reference: bool = False
-    reason: str = ""
-
-    @property
-    def label(self) -> str:
-        """Form and level in words, and the method where it is not the one that both forms share."""
-        form = f"{self.form} ({self.level})" if self.level else self.form
-        other = next((key for key in ("explicit", "gauss") if self.solver == SOLVERS[key]), "")
-        return f"{form}, {other}" if other else form
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """What each form costs for which error.
-
-    Attributes
-    ----------
-    scene
-        Name of the scene.
-    t_end
-        Time of the end, s.
-    reference
-        What the errors are measured against.
-    rows
-        One for each form, level and tolerance.
-    """
-
-    scene: str
-    t_end: float
-    reference: Reference
-    rows: tuple[ComparisonRow, ...]
-
-    @property
-    def verdict(self) -> str:
-        """What the comparison says, in one line."""
-        return judge((row.label, row.error, row.wall_s) for row in self.rows if not row.reason)
-
-    def __str__(self) -> str:
-        head = f"{'form':<24}{'rtol':>8}{'error':>10}{'ms':>10}{'steps':>8}{'energy':>10}{'constraint':>12}"
-        lines = [f"{self.scene} to t = {self.t_end:g} s, against {self.reference.description}", "", head]
-        for row in self.rows:
-            if row.reason:
-                lines.append(f"{row.label:<24}{row.rtol:>8.0e}  {row.reason}")
-                continue
-            numbers = (row.error, 1e3 * (row.wall_s or 0.0), row.steps, row.energy_drift, row.constraint_drift)
-            error, wall, steps, energy, drift = (float(number or 0.0) for number in numbers)
-            mark = "*" if row.within_reference else " "
-            lines.append(
-                f"{row.label:<24}{row.rtol:>8.0e}{error:>9.1e}{mark}{wall:>10.3g}{steps:>8.0f}{energy:>10.1e}{drift:>12.1e}"
-            )
-        return "\n".join([*lines, RELATIVE, "", self.verdict])
-
-    def __repr__(self) -> str:
-        runs = f"{count_of(len(self.rows), 'run')} to t = {self.t_end:g} s, against {self.reference.description}"
-        failed = sum(bool(row.reason) for row in self.rows)
-        lines = [f"<Comparison of {self.scene}: {runs}>", self.verdict, *([f"{failed} without numbers"] * bool(failed))]
-        return fitted("\n    ".join(line for line in lines if line))
-
-    def _repr_html_(self) -> str:
-        heads = ("form", "rtol", "error", "ms", "steps", "energy drift", "constraint drift", "")
-        cells = []
-        for row in self.rows:
-            wall = None if row.wall_s is None else 1e3 * row.wall_s
-            numbers = (row.error, wall, row.steps, row.energy_drift, row.constraint_drift)
-            shown = ("" if one is None else one if isinstance(one, int) else f"{one:.3g}" for one in numbers)
-            note = row.reason or ("as accurate as the reference" if row.within_reference else "")
-            cells.append((row.label, f"{row.rtol:.0e}", *shown, note))
-        title = f"{self.scene} to t = {self.t_end:g} s, against {self.reference.description}"
-        return html_table(title, heads, cells, f"{RELATIVE} {self.verdict}")
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the comparison as plain data."""
-        reference = self.reference
-        return {
-            "scene": self.scene,
-            "t_end": self.t_end,
-            "reference": {
-                "kind": reference.kind,
-                "description": reference.description,
-                "error": reference.error,
-                "note": reference.note,
-                "quantities": list(reference.quantities),
-            },
-            "rows": [dict(vars(row)) for row in self.rows],
-            "verdict": self.verdict,
-        }
-
-    def plot(self, file: Any = None) -> Any:
-        """Draw the work-precision diagram, and return the figure.
-
-        Parameters
-        ----------
-        file
-            Where to save it; its suffix says how.
-        """
-        from importlib import import_module  # views stand above studies, and are looked up when one is wanted
-
-        return import_module("atwood.plotting.plots.precision").plot_comparison(self, file)
 
 
 @takes(
@@ -193,6 +52,7 @@ class Comparison:
     levels=each(LEVEL, f"some of {', '.join(map(repr, LEVELS))}", 1),
     outputs=whole("a whole number of output times, 2 to 1,000,000", 2, 1_000_000),
     max_seconds=LIMITS["max_seconds"],
+    total_seconds=LIMITS["max_seconds"],
     name=NAME,
     progress=PROGRESS,
 )
@@ -205,6 +65,7 @@ def compare(
     levels: Sequence[str] = ("ggl", "index1-projected", "index1"),
     outputs: int = 101,
     max_seconds: float | None = 60.0,
+    total_seconds: float | None = None,
     name: str | None = None,
     progress: Callable[[str, int, int], object] | None = None,
 ) -> Comparison:
@@ -226,6 +87,8 @@ def compare(
         Number of output times at which errors are measured.
     max_seconds
         Limit of each run; the reference may take ten times as long.
+    total_seconds
+        Limit of all runs together; what there is no time left for is in the rows with that reason.
     name
         What to call the scene.
     progress
@@ -251,15 +114,61 @@ def compare(
     check_span(flat.t_start, end)
     patience = None if max_seconds is None else 10.0 * max_seconds
     rows: list[ComparisonRow] = []
+    limits = _Limits(max_seconds, total_seconds)
     with told(progress, flat.name, lambda what, done, of: (done / of, what)) as called:
         watch = called or (lambda what, done, of: None)
-        reference = find_reference(scene, flat, assembled, end, outputs, patience, lambda what: watch(what, 0, total))
+        reference = find_reference(
+            scene, flat, assembled, end, outputs, limits.of_a_run(patience), lambda what: watch(what, 0, total)
+        )
         for form, level, solver in kinds:
+            results: list[Result | None] = []
+            first = len(rows)
             for rtol in sorted(rtols, reverse=True):
                 row = ComparisonRow(form, level, SOLVERS[solver], rtol)
                 watch(f"{row.label} at rtol {rtol:g}", len(rows) + 2, total)
-                rows.append(_measure(assembled, row, solver, reference, max_seconds))
-    return Comparison(flat.name, float(reference.time[-1]), reference, tuple(rows))
+                row, result = _measure(assembled, row, solver, reference, limits)
+                rows.append(row)
+                results.append(result)
+            rows[first:] = _estimated(rows[first:], results, limits)
+    return Comparison(flat.name, float(reference.time[-1]), reference, tuple(rows), environment())
+
+
+class _Limits:
+    """What time there is for a run.
+
+    Parameters
+    ----------
+    each, together
+        Limits of each run, and of all, s.
+    """
+
+    def __init__(self, each: float | None, together: float | None) -> None:
+        self._each, self._end = each, None if together is None else time.monotonic() + together
+
+    def of_a_run(self, most: float | None = None) -> float | None:
+        """Return the limit of a run that begins now; zero where no time is left."""
+        given = self._each if most is None else most
+        left = np.inf if self._end is None else max(0.0, self._end - time.monotonic())
+        return given if left == np.inf else min(given or np.inf, left)
+
+
+def _estimated(rows: Sequence[ComparisonRow], results: Sequence[Result | None], limits: _Limits) -> list[ComparisonRow]:
+    """Return rows with the estimates that runs give of their own errors, by the next more accurate run of their kind.
+
+    The last, which has none, is solved once more, as `Result.accuracy` does.
+    """
+    found = []
+    for row, one, other in zip(rows, results, (*results[1:], None), strict=True):
+        estimate = None
+        if one is not None and (other is not None or (row.wall_s or 0.0) < _LONG) and limits.of_a_run() != 0.0:
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    estimate = Result(one.run, second=None if other is None else other.run).accuracy.reached
+            except AtwoodError:
+                estimate = None  # there is no second solution
+        found.append(replace(row, estimate=estimate))
+    return found
 
 
 def _kinds(assembled: Assembled, forms: Sequence[str], levels: Sequence[str]) -> Iterator[tuple[str, str, str]]:
@@ -292,41 +201,60 @@ def _formulas_solve(assembly: Assembly) -> bool:
 
 
 def _measure(
-    assembled: Assembled, row: ComparisonRow, solver: str, reference: Reference, max_seconds: float | None
-) -> ComparisonRow:
-    """Make one run, and return its row with numbers, or with the reason why there are none."""
-    blank = (row.form, row.level, row.solver, row.rtol)
-    end = float(reference.time[-1])
+    assembled: Assembled, row: ComparisonRow, solver: str, reference: Reference, limits: _Limits
+) -> tuple[ComparisonRow, Result | None]:
+    """Make one run, and return its row with numbers and the run, or with the reason why there are none."""
+    end, limit = float(reference.time[-1]), limits.of_a_run()
+    if limit == 0.0:
+        return replace(row, reason="no time was left"), None
     try:
-        result = run_form(assembled, row.form, row.level or "ggl", row.rtol, end, reference.time, max_seconds, solver)
+        result = run_form(assembled, row.form, row.level or "ggl", row.rtol, end, reference.time, limit, solver)
     except AtwoodError as problem:
-        return ComparisonRow(*blank, reason=problem.message)
+        return replace(row, reason=problem.message), None
     if result.status != "finished":
-        return ComparisonRow(*blank, reason=result.message or result.status.replace("_", " "))
+        return replace(row, reason=result.message or result.status.replace("_", " ")), None
     error = scaled_difference(
         reference.quantities, table_at(result, reference.quantities, reference.time), reference.scales
     )
-    missed = result.constraint_max
+    missed, done = result.constraint_max, result.statistics
     if not np.isfinite(error):
-        return ComparisonRow(*blank, reason="the motion is not finite")
-    return ComparisonRow(
-        *blank,
+        return replace(row, reason="the motion is not finite"), None
+    least, outputs_s = _costs(assembled, row, solver, reference, result)
+    return replace(
+        row,
         error=error,
-        wall_s=_integration_time(assembled, row, solver, end, result.statistics.seconds),
-        steps=result.statistics.steps,
+        wall_s=least.seconds - least.monitor_seconds,
+        steps=done.steps,
+        residuals=done.residual_evaluations,
+        jacobians=done.jacobian_evaluations,
+        monitor_s=least.monitor_seconds,
+        outputs_s=outputs_s,
         energy_drift=result.energy.max_drift,
         constraint_drift=max(missed["position"], missed["velocity"]),
         constraint_held=max(missed["held_position"], missed["held_velocity"]),
         within_reference=error <= 10.0 * reference.error,
-    )
+    ), result
 
 
-def _integration_time(assembled: Assembled, row: ComparisonRow, solver: str, end: float, taken: float) -> float:
-    """Return the time of the integration alone: handing out states can take longer than making them."""
-    if taken > _LONG:
-        return taken
-    runs = (run_form(assembled, row.form, row.level or "ggl", row.rtol, end, 2, None, solver, 1) for _ in range(3))
-    return min(run.statistics.seconds for run in runs)
+def _costs(
+    assembled: Assembled, row: ComparisonRow, solver: str, reference: Reference, taken: Result
+) -> tuple[Statistics, float]:
+    """Return the cost of the integration alone, and the time that outputs take: it can be the longer one."""
+    if taken.statistics.seconds > _LONG:
+        return taken.statistics, _beside(taken)
+
+    def again(outputs: Any, samples: int) -> Result:
+        end = float(reference.time[-1])
+        return run_form(assembled, row.form, row.level or "ggl", row.rtol, end, outputs, None, solver, samples)
+
+    runs = [again(2, 1) for _ in range(3)]
+    least = min((run.statistics for run in runs), key=lambda one: one.seconds - one.monitor_seconds)
+    return least, max(0.0, _beside(again(reference.time, 1)) - min(map(_beside, runs)))
+
+
+def _beside(run: Result) -> float:
+    """Return what a run took beside its integration, s."""
+    return max(0.0, run.timings.get("integration", 0.0) - run.statistics.seconds)
 
 
 _LONG = 0.5

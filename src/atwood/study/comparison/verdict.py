@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-__all__ = ["judge"]
+__all__ = ["cost_at", "judge"]
 
 
 def judge(rows: Iterable[tuple[str, float | None, float | None]]) -> str:
@@ -28,7 +28,8 @@ def judge(rows: Iterable[tuple[str, float | None, float | None]]) -> str:
     if span is None:
         return "The forms reach no error in common: look at the rows."
     target = 10.0 ** round(math.log10(span))
-    costs = sorted((_cost_at(points, target), label) for label, points in curves.items() if _reaches(points, target))
+    found = ((cost_at(points, target), label) for label, points in curves.items())
+    costs = sorted((cost, label) for cost, label in found if cost is not None)
     (least, best), (most, _worst) = costs[0], costs[-1]
     if most < 1.15 * least:
         return f"For an error of {target:.0e} all cost the same, {_said(least)}."
@@ -53,8 +54,18 @@ def _reaches(points: list[tuple[float, float]], error: float) -> bool:
     return min(errors) / 3.0 <= error <= 3.0 * max(errors)
 
 
-def _cost_at(points: list[tuple[float, float]], error: float) -> float:
-    """Return the time at an error, between the runs by logarithms."""
+def cost_at(points: list[tuple[float, float]], error: float) -> float | None:
+    """Return the time at an error, between the runs by logarithms; None if they do not come near it.
+
+    Parameters
+    ----------
+    points
+        Error and time of each run.
+    error
+        The error.
+    """
+    if not _reaches(points, error):
+        return None
     ordered = sorted(points)
     errors, walls = (np.log([point[i] for point in ordered]) for i in (0, 1))
     return float(np.exp(np.interp(math.log(error), errors, walls)))

@@ -1,0 +1,164 @@
+"""Comparisons of many scenes on one page that needs nothing else: tables, and pictures within it."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+
+from atwood.errors import UsageError
+from atwood.files import write_atomically
+from atwood.plotting.canvas import need_matplotlib
+from atwood.plotting.plots.precision import plot_comparison, style_of
+from atwood.study.comparison.found import HEADINGS, RELATIVE, Comparison, write_rows
+from atwood.study.comparison.verdict import cost_at
+
+__all__ = ["check_page", "write_page"]
+
+_ERRORS = (1e-3, 1e-6, 1e-9)
+"""Errors whose costs stand in the table of all scenes."""
+
+
+def check_page(directory: Path) -> None:
+    """Refuse a place where no page can be written, before any work is done."""
+    need_matplotlib()
+    if directory.exists() and not directory.is_dir():
+        raise UsageError("it is a file, and a directory is needed", where=str(directory), advice="Give another name.")
+    if not directory.exists() and not directory.absolute().parent.is_dir():
+        raise UsageError("its parent is no directory", where=str(directory), advice="Make it first.")
+
+
+def write_page(comparisons: Sequence[Comparison], failed: Mapping[str, str], directory: Path) -> Path:
+    """Write ``index.html``, and all rows as ``comparisons.csv`` beside it, and return the page.
+
+    Parameters
+    ----------
+    comparisons
+        What was found, scene by scene.
+    failed
+        Scenes of which nothing was found, and why.
+    directory
+        Where to; it is made if it is not there.
+    """
+    check_page(directory)
+    directory.mkdir(exist_ok=True)
+    labels = list(dict.fromkeys(row.label for one in comparisons for row in one.rows if not row.reason))
+    body = [
+        "<h1>What each form costs for which error</h1>",
+        _environment(comparisons[0].environment if comparisons else {}),
+        f"<p>{escape(RELATIVE)} Times are of the integration alone. * as accurate as the reference itself.</p>",
+        _legend(labels),
+        _overview(comparisons, labels),
+        *(_section(one, labels) for one in comparisons),
+        _failures(failed),
+    ]
+    page = (
+        "<!doctype html><html lang='en'><head><meta charset='utf-8'><title>Atwood: forms compared</title>"
+        f"<style>{_STYLE}</style></head><body>{''.join(body)}</body></html>"
+    )
+    target = directory / "index.html"
+    write_atomically(target, lambda part: part.write_text(page, encoding="utf-8"))
+    write_rows(comparisons, directory / "comparisons.csv")
+    return target
+
+
+def _environment(given: Mapping[str, str]) -> str:
+    rows = "".join(f"<tr><th>{escape(key)}</th><td>{escape(value)}</td></tr>" for key, value in given.items())
+    return f"<table class='environment'>{rows}</table>"
+
+
+def _legend(labels: Sequence[str]) -> str:
+    """Return the colours of the forms, which are the same in all pictures."""
+    marks = (f"<span class='mark' style='background:{style_of(one, labels)[0]}'></span>{escape(one)}" for one in labels)
+    return f"<p class='legend'>{'  '.join(marks)}</p>"
+
+
+def _anchor(name: str) -> str:
+    return "".join(c if c.isalnum() else "-" for c in name)
+
+
+def _overview(comparisons: Sequence[Comparison], labels: Sequence[str]) -> str:
+    """Return the table of all scenes: what each form takes for three errors, the least of a scene marked."""
+    heads = "".join(f"<th>{escape(label)}</th>" for label in labels)
+    rows = [
+        f"<tr><th>scene</th>{heads}</tr>",
+        *(_costs_of(one, labels) for one in comparisons),
+    ]
+    said = ", ".join(f"{error:.0e}" for error in _ERRORS)
+    return f"<h2>All scenes: ms for errors of {said}</h2><table>{''.join(rows)}</table>"
+
+
+def _costs_of(one: Comparison, labels: Sequence[str]) -> str:
+    costs: dict[str, list[float | None]] = {}
+    for label in labels:
+        points = [(max(row.error or 0.0, 1e-16), row.wall_s) for row in one.rows if row.label == label and row.wall_s]
+        costs[label] = [cost_at(points, error) if points else None for error in _ERRORS]
+    least = [min((c[k] or math.inf for c in costs.values()), default=math.inf) for k in range(len(_ERRORS))]
+
+    def text(cost: float | None, best: float) -> str:
+        if cost is None:
+            return "&ndash;"
+        shown = f"{1e3 * cost:.3g}"
+        return f"<b>{shown}</b>" if cost <= 1.05 * best else shown
+
+    cells = "".join(
+        f"<td>{' / '.join(text(c, b) for c, b in zip(found, least, strict=True)) if any(found) else ''}</td>"
+        for found in costs.values()
+    )
+    return f"<tr><th class='scene'><a href='#{_anchor(one.scene)}'>{escape(one.scene)}</a></th>{cells}</tr>"
+
+
+def _section(one: Comparison, labels: Sequence[str]) -> str:
+    """Return what was found of a scene: sentence, picture and table."""
+    stream = io.BytesIO()
+    plot_comparison(one).savefig(stream, format="svg", metadata={"Date": None})
+    picture = base64.b64encode(stream.getvalue()).decode("ascii")
+    note = f"<p>{escape(one.reference.note)}</p>" if one.reference.note else ""
+    return (
+        f"<h2 id='{_anchor(one.scene)}'>{escape(one.scene)}, to t = {one.t_end:g} s</h2>"
+        f"<p><b>{escape(one.verdict)}</b></p><p>Errors are against {escape(one.reference.description)}.</p>{note}"
+        f"<img alt='error against time and steps' src='data:image/svg+xml;base64,{picture}'>{_table(one, labels)}"
+    )
+
+
+def _table(one: Comparison, labels: Sequence[str]) -> str:
+    heads = ("form", "rtol", *HEADINGS, "look-out, ms", "outputs, ms")
+    rows = ["<tr>" + "".join(f"<th>{escape(head)}</th>" for head in heads) + "</tr>"]
+    for row in one.rows:
+        colour = style_of(row.label, labels)[0] if row.label in labels else "#8d99a6"
+        name = f"<td class='form'><span class='mark' style='background:{colour}'></span>{escape(row.label)}</td>"
+        if row.reason:
+            told = f"<td class='reason' colspan='{len(heads) - 2}'>{escape(row.reason)}</td>"
+        else:
+            more = (f"{1e3 * (spent or 0.0):.3g}" for spent in (row.monitor_s, row.outputs_s))
+            told = _cells((*row.cells(), *more))
+        rows.append(f"<tr>{name}<td>{row.rtol:.0e}</td>{told}</tr>")
+    return f"<details><summary>{len(one.rows)} runs</summary><table>{''.join(rows)}</table></details>"
+
+
+def _cells(texts: Iterable[str]) -> str:
+    return "".join(f"<td>{escape(text)}</td>" for text in texts)
+
+
+def _failures(failed: Mapping[str, str]) -> str:
+    if not failed:
+        return ""
+    rows = "".join(
+        f"<tr><th class='scene'>{escape(k)}</th><td class='reason'>{escape(v)}</td></tr>" for k, v in failed.items()
+    )
+    return f"<h2>Without an answer</h2><table>{rows}</table>"
+
+
+_STYLE = """
+body{font:15px/1.45 system-ui,sans-serif;color:#22303c;max-width:1150px;margin:2em auto;padding:0 1em}
+h1{font-size:1.6em}h2{font-size:1.15em;margin-top:2.2em}
+table{border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums}
+td,th{padding:2px 10px;text-align:right;border-bottom:1px solid #e6eaee;white-space:nowrap}
+th{color:#5a6773;font-weight:600}.scene,.form,.environment th,.environment td,.reason{text-align:left}
+.reason,.environment td{white-space:normal}
+.mark{display:inline-block;width:.8em;height:.8em;margin:0 .4em 0 1em;border-radius:2px}
+img{width:100%;max-width:1000px;display:block}a{color:#2a6fbb;text-decoration:none}summary{cursor:pointer;color:#5a6773}
+"""

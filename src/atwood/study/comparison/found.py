@@ -1,0 +1,241 @@
+"""What a comparison found: a row for each run, in text, as data, in files and as pictures."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+from atwood.arguments import FILE, takes
+from atwood.errors import UsageError
+from atwood.files import check_directory, write_atomically
+from atwood.late import dataclass, names_of
+from atwood.showing import count_of, fitted, html_table
+from atwood.simulation.problem.options import SOLVERS
+from atwood.study.comparison.reference import Reference
+from atwood.study.comparison.verdict import judge
+
+__all__ = ["HEADINGS", "RELATIVE", "Comparison", "ComparisonRow", "check_rows_file", "write_rows"]
+
+RELATIVE = (
+    "Errors and constraint drifts are relative to the size of the scene, or in rad; energy drifts to what it exchanges."
+)
+"""What the figures of a comparison are relative to."""
+
+
+HEADINGS = ("error", "estimate", "ms", "steps", "residuals", "Jacobians", "energy", "constraint")
+"""What `ComparisonRow.cells` are."""
+
+
+@dataclass(frozen=True)
+class ComparisonRow:
+    """One run of a comparison.
+
+    Attributes
+    ----------
+    form, level
+        Form, and level of the dae form.
+    solver
+        Name of the solver.
+    rtol
+        Relative tolerance.
+    error
+        Largest scaled difference from the reference, in positions of bodies and angles.
+    estimate
+        The same as the run itself tells it, without the reference: `Result.accuracy`, by the next more accurate run of
+        its kind. None where there is none.
+    wall_s
+        Time spent integrating, s, without outputs on the way and without what looks out for singular positions between
+        steps, which is none of the form's own cost: the least of three runs.
+    steps
+        Steps of the solver.
+    residuals, jacobians
+        Evaluations of the equations, and of their Jacobian with its factorisation.
+    monitor_s
+        Time spent looking out for singular positions, s.
+    outputs_s
+        Time spent on handing out states, s: interpolation, projection onto the constraints, recording.
+    energy_drift
+        Error of the energy, relative to what the scene exchanges; see `atwood.result.energy.EnergyLedger`.
+    constraint_drift
+        By how much the constraints are missed by what the run gives, relative to the scene's sizes.
+    constraint_held
+        The same for the solver's own states, before projection.
+    within_reference
+        Whether the error is not larger than ten times the reference's own.
+    reason
+        Why there are no numbers; empty if there are.
+    """
+
+    form: str
+    level: str
+    solver: str
+    rtol: float
+    error: float | None = None
+    estimate: float | None = None
+    wall_s: float | None = None
+    steps: int | None = None
+    residuals: int | None = None
+    jacobians: int | None = None
+    monitor_s: float | None = None
+    outputs_s: float | None = None
+    energy_drift: float | None = None
+    constraint_drift: float | None = None
+    constraint_held: float | None = None
+    within_reference: bool = False
+    reason: str = ""
+
+    @property
+    def label(self) -> str:
+        """Form and level in words, and the method where it is not the one that both forms share."""
+        form = f"{self.form} ({self.level})" if self.level else self.form
+        other = next((key for key in ("explicit", "gauss") if self.solver == SOLVERS[key]), "")
+        return f"{form}, {other}" if other else form
+
+    def cells(self) -> tuple[str, ...]:
+        """Return error, estimate, ms, steps, residuals, Jacobians, and drifts of energy and constraints as texts."""
+        mark = "*" if self.within_reference else ""
+        numbers = (self.estimate, 1e3 * (self.wall_s or 0.0), self.steps, self.residuals, self.jacobians)
+        estimate, wall, *counts = ("" if one is None else one for one in numbers)
+        drifts = (f"{drift or 0.0:.1e}" for drift in (self.energy_drift, self.constraint_drift))
+        told = estimate if estimate == "" else f"{estimate:.1e}"
+        return (f"{self.error or 0.0:.1e}{mark}", told, f"{wall:.3g}", *(str(one) for one in counts), *drifts)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What each form costs for which error.
+
+    Attributes
+    ----------
+    scene
+        Name of the scene.
+    t_end
+        Time of the end, s.
+    reference
+        What the errors are measured against.
+    rows
+        One for each form, level and tolerance.
+    environment
+        On what it was measured: processor, versions, threads, date.
+    """
+
+    scene: str
+    t_end: float
+    reference: Reference
+    rows: tuple[ComparisonRow, ...]
+    environment: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> str:
+        """What the comparison says, in one line."""
+        return judge((row.label, row.error, row.wall_s) for row in self.rows if not row.reason)
+
+    def __str__(self) -> str:
+        lines = [f"{self.scene} to t = {self.t_end:g} s, against {self.reference.description}", ""]
+        lines.append(f"{'form':<24}{'rtol':>8}" + "".join(f"{head:>11}" for head in HEADINGS))
+        for row in self.rows:
+            shown = f"  {row.reason}" if row.reason else "".join(f"{cell:>11}" for cell in row.cells())
+            lines.append(f"{row.label:<24}{row.rtol:>8.0e}{shown}")
+        return "\n".join([*lines, RELATIVE, "", self.verdict])
+
+    def __repr__(self) -> str:
+        runs = f"{count_of(len(self.rows), 'run')} to t = {self.t_end:g} s, against {self.reference.description}"
+        failed = sum(bool(row.reason) for row in self.rows)
+        lines = [f"<Comparison of {self.scene}: {runs}>", self.verdict, *([f"{failed} without numbers"] * bool(failed))]
+        return fitted("\n    ".join(line for line in lines if line))
+
+    def _repr_html_(self) -> str:
+        heads = ("form", "rtol", *HEADINGS, "")
+        cells = [
+            (row.label, f"{row.rtol:.0e}", *(row.cells() if not row.reason else [""] * len(HEADINGS)), row.reason)
+            for row in self.rows
+        ]
+        title = f"{self.scene} to t = {self.t_end:g} s, against {self.reference.description}"
+        return html_table(title, heads, cells, f"{RELATIVE} {self.verdict}")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the comparison as plain data."""
+        reference = self.reference
+        return {
+            "scene": self.scene,
+            "t_end": self.t_end,
+            "reference": {
+                "kind": reference.kind,
+                "description": reference.description,
+                "error": reference.error,
+                "note": reference.note,
+                "quantities": list(reference.quantities),
+            },
+            "rows": [dict(vars(row)) for row in self.rows],
+            "verdict": self.verdict,
+            "environment": dict(self.environment),
+        }
+
+    @takes(file=FILE)
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Save the rows as CSV, below the environment in lines that begin with ``#``.
+
+        Parameters
+        ----------
+        file
+            Where to; its suffix is ``.csv``.
+
+        Raises
+        ------
+        UsageError
+            If it has another suffix, or cannot be written.
+        """
+        return write_rows([self], file)
+
+    def plot(self, file: Any = None) -> Any:
+        """Draw the work-precision diagram, and return the figure.
+
+        Parameters
+        ----------
+        file
+            Where to save it; its suffix says how.
+        """
+        from importlib import import_module  # views stand above studies, and are looked up when one is wanted
+
+        return import_module("atwood.plotting.plots.precision").plot_comparison(self, file)
+
+
+def write_rows(comparisons: Sequence[Comparison], file: str | os.PathLike[str]) -> Path:
+    """Save the rows of comparisons as one CSV file, and return it; see `Comparison.save`.
+
+    Parameters
+    ----------
+    comparisons
+        Made in one environment.
+    file
+        Where to.
+    """
+    target = check_rows_file(file)
+    names = ["scene", "t_end", *names_of(ComparisonRow)]
+
+    def write(part: Path) -> None:
+        with part.open("w", newline="", encoding="utf-8") as stream:
+            for key, value in (comparisons[0].environment if comparisons else {}).items():
+                stream.write(f"# {key}: {value}\n")
+            table = csv.writer(stream)
+            table.writerow(names)
+            for one in comparisons:
+                for row in one.rows:
+                    cells = (getattr(row, name) for name in names[2:])
+                    table.writerow([one.scene, one.t_end, *("" if cell is None else cell for cell in cells)])
+
+    write_atomically(target, write)
+    return target
+
+
+def check_rows_file(file: str | os.PathLike[str]) -> Path:
+    """Return a file for rows, or refuse one that they cannot be written to."""
+    target = Path(file)
+    if target.suffix.lower() != ".csv":
+        raise UsageError(f"the suffix {target.suffix!r} is not known", where=str(file), advice="Use .csv.")
+    check_directory(target)
+    return target
