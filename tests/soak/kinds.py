@@ -14,6 +14,7 @@ KINDS = {
     "broken": "broken",
     "files": "files",
     "interrupts": "interrupts",
+    "methods": "methods",
     "scenes": "scenes",
     "metamorphic": "metamorphic",
     "memory": "memory",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from . import metamorphic
+from . import metamorphic, methods
 from .draw import draw
 from .oracle import STEP, Oracle
 from .scenes import Way, check_mechanism
@@ -25,6 +25,13 @@ def test_scenes_agree_with_the_oracle(seed: int) -> None:
 @pytest.mark.parametrize("seed", [1, 5, 6, 10, 13, 22])
 def test_relations_hold(seed: int) -> None:
     trial = metamorphic.check(seed)
+    assert any(word.startswith("compared") for word in trial.tried)
+    assert not trial.findings, trial.findings[0].detail
+
+
+@pytest.mark.parametrize("seed", [0, 1, 5])
+def test_methods_agree(seed: int) -> None:
+    trial = methods.check(seed)
     assert any(word.startswith("compared") for word in trial.tried)
     assert not trial.findings, trial.findings[0].detail
 
