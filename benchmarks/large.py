@@ -165,7 +165,12 @@ def others(work: Work) -> dict[str, tuple[float, int, Callable[[], tuple[float, 
     for name, title, make, steps in ways:
         if module := peer(name):
             began = time.perf_counter()
-            run = make(module, work.mechanism, steps)
+            try:
+                run = make(module, work.mechanism, steps)
+                run()
+            except (ArithmeticError, ValueError) as error:
+                print(f"{title}: {str(error).splitlines()[-1]}")
+                continue
             found[title] = time.perf_counter() - began, steps, run
     return found
 
