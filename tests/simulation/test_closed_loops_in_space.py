@@ -19,7 +19,7 @@ from atwood.simulation.problem.closed_loops import solve_at
 from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.problem.projection import misses_of
 from atwood_library import Ground, Pivot, RigidBody, Slider, Spherical, Universal, Weld
-from atwood_library.scenes import SpatialSliderCrank
+from atwood_library.scenes import SpatialSliderCrank, StewartPlatform
 
 from .test_closed_loops import by_formulas, solved, states
 
@@ -53,6 +53,20 @@ def test_the_spatial_slider_crank_moves_as_its_numeric_loop() -> None:
     assert by_formulas(result)
     sizes = np.max(np.abs(states(numeric)), axis=1, keepdims=True)
     assert np.max(np.abs(states(result) - states(numeric)) / sizes) < 1e-7
+
+
+@needs_sundials
+def test_the_legs_of_a_stewart_platform_follow_from_where_it_is() -> None:
+    assembly = assemble(StewartPlatform())
+    result, numeric = (simulate(assembly, rtol=1e-10, t_end=0.5, outputs=20, solver=one) for one in ("auto", "ida"))
+    assert by_formulas(result)
+    found = solved(StewartPlatform())
+    assert found is not None
+    assert [len(group.symbols) for group in found.form.accelerations.program.inputs] == [1, 7, 6]
+    one, other = states(result), states(numeric)
+    assert np.max(np.abs(one - other)) < 1e-6
+    assert max(float(np.max(segment.held)) for segment in result.run.segments) < 1e-12
+    assert result.run.statistics.steps < 0.2 * numeric.run.statistics.steps
 
 
 # -- random assemblies of a cross and a ball, closed by construction ------------------------------------------------

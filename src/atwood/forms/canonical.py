@@ -212,6 +212,9 @@ def _make(assembly: Assembly) -> CanonicalPrograms:
 def _make_closed(assembly: Assembly, form: ClosedForm) -> CanonicalPrograms:
     found, free = lagrangian_along_speeds(assembly, assembly.reduced), form.loops.independent
     _refuse(assembly, found, loops_are_solved=True)
+    if not form.loops.rates_are_speeds:
+        what = "its loops leave orientations free"
+        raise UnsupportedError(what, where=assembly.flat.name, advice="Use the solver 'explicit' or 'ida'.")
     q, u = found.coordinates, found.velocities
     dependent = [one for values in (q, u) for i, one in enumerate(values) if i not in free]
     (lagrangian,) = in_terms_of_independent(form, [found.lagrangian])

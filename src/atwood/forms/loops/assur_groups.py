@@ -13,6 +13,7 @@ constraint at other places: what is left must be rounding (`atwood.mechanics.con
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -62,6 +63,10 @@ class Loops:
         self.equations, self.place = equations, place
         self.graph, self.q = equations.graph, equations.coordinates
         self.is_angle = [one.unit == "rad" for one in equations.names]
+        free = {equations.forest.coordinates[i].name for i in _free_places(equations)}
+        self.is_free_place = [one.name in free for one in equations.names]
+        numbers = {symbol: k for k, symbol in enumerate(equations.speeds)}
+        self.own_speeds = {i: numbers[rate] for i, rate in enumerate(equations.rates) if rate in numbers}
         self.values = [self.graph.zero if one.value is None else one.value for one in equations.constraints]
         self.elsewhere = _elsewhere(equations, place)
         self.reads = self._reads()
@@ -82,7 +87,9 @@ class Loops:
                 return None
             groups += found
             known.update(number for one in found for number in one.unknowns)
-        return ClosedLoops(tuple(independent), tuple(groups))
+        dependent = {self.own_speeds[number] for one in groups for number in one.unknowns}
+        speeds = (k for k in range(len(self.equations.speeds)) if k not in dependent)
+        return ClosedLoops(tuple(independent), tuple(speeds), self.own_speeds, tuple(groups))
 
     def can_be_solved(self, independent: Sequence[int]) -> bool:
         """Return whether there are constraints enough for each group, whatever their form."""
@@ -93,6 +100,13 @@ class Loops:
                 return False
             known.update(ready[1])
         return True
+
+    def choices(self, count: int) -> Iterator[tuple[int, ...]]:
+        """Yield which coordinates may be independent, for so many freedoms: those of orientations always are."""
+        turned = tuple(i for i in range(len(self.q)) if i not in self.own_speeds)
+        plain = sorted(self.own_speeds)
+        for chosen in itertools.combinations(plain, count - (len(self.equations.speeds) - len(plain))):
+            yield tuple(sorted((*chosen, *turned)))
 
     def _candidates(self, known: set[int]) -> Iterator[tuple[Group, ...]]:
         for key in self._ready(known):
@@ -229,6 +243,13 @@ def _sum_of_sizes(waves: Mapping[tuple[int, ...], Wave]) -> Expression:
         found = found + one
     total: Expression = found
     return total
+
+
+def _free_places(equations: Equations) -> Iterator[int]:
+    """Yield the numbers of coordinates that are those of a place in a plane or in space, of nothing but itself."""
+    for one in equations.forest.attachments:
+        if one.joint is None and len(one.coordinates) > 1:
+            yield from one.coordinates
 
 
 def _elsewhere(equations: Equations, place: Place) -> list[dict[Expression, float]]:

@@ -117,12 +117,23 @@ class ClosedLoops:
     ----------
     independent
         Numbers of the independent coordinates.
+    speeds
+        Numbers of the independent speeds.
+    own_speeds
+        The number of the speed that is the rate of a coordinate, for all that have such.
     groups
         What is solved, one after the other.
     """
 
     independent: tuple[int, ...]
+    speeds: tuple[int, ...]
+    own_speeds: Mapping[int, int]
     groups: tuple[Group, ...]
+
+    @property
+    def rates_are_speeds(self) -> bool:
+        """Whether the rate of every independent coordinate is the speed of the same number."""
+        return tuple(self.own_speeds.get(i) for i in self.independent) == self.speeds
 
     @property
     def places(self) -> dict[Expression, Expression]:

@@ -80,7 +80,7 @@ def closed_form(
     name
         Named in messages.
     equations
-        In generalized coordinates, whose rates are speeds.
+        In generalized coordinates.
     parameters
         The symbols of parameters.
     loops
@@ -88,17 +88,18 @@ def closed_form(
     rows
         The equations' rows, perhaps rewritten.
     """
-    free = loops.independent
+    free, moving = loops.independent, loops.speeds
     moved = _Moved(equations, loops)
     q, u = equations.coordinates, equations.speeds
     places = loops.places
     speeds = {u[d]: moved.speed(d) for d in moved.order}
     found = _accelerations(equations, _with_single_angles(list(equations.rows if rows is None else rows)), moved)
-    found, speeds = _with_formulas(found, speeds, places)
+    rates = [] if loops.rates_are_speeds else [equations.rates[i] for i in free]
+    found, speeds = _with_formulas([*rates, *found], speeds, places)
     inputs = (
         InputGroup("t", (equations.time,)),
         InputGroup("q", tuple(q[i] for i in free)),
-        InputGroup("u", tuple(u[i] for i in free)),
+        InputGroup("u", tuple(u[i] for i in moving)),
     )
     known = tuple(parameters) + loops.branches
     states = (
@@ -111,7 +112,10 @@ def closed_form(
     looked_at = substitute(looked_at, places) if places and looked_at else looked_at
     cut = len(looked_at) - len(beside)
     watched = OutputGroup("ahead", tuple(looked_at[:cut])), OutputGroup("beside", tuple(looked_at[cut:]))
-    dependent = [*(one for i, one in enumerate(q) if i not in free), *(one for i, one in enumerate(u) if i not in free)]
+    dependent = [
+        *(one for i, one in enumerate(q) if i not in free),
+        *(one for i, one in enumerate(u) if i not in moving),
+    ]
     if any(dependencies((*found, *places.values(), *speeds.values(), *looked_at), dependent)):
         return None
     title = f"{name} (closed form)"
@@ -122,7 +126,9 @@ def closed_form(
         tuple(parameters),
         (OutputGroup("branches", tuple(values)), OutputGroup("conditions", tuple(conditions))),
     )
-    accelerations = Program(f"{title} accelerations", inputs, known, (OutputGroup("accelerations", tuple(found)),))
+    outputs = (OutputGroup("rates", tuple(found[: len(rates)])),) if rates else ()
+    outputs = (*outputs, OutputGroup("accelerations", tuple(found[len(rates) :])))
+    accelerations = Program(f"{title} accelerations", inputs, known, outputs)
     return ClosedForm(
         loops,
         AccelerationProgram(accelerations, "mass matrix"),
@@ -187,7 +193,7 @@ class _Moved:
     """How dependent coordinates move with independent ones: ``u_d = W u_i + w``, ``a_d = W a_i + c``."""
 
     def __init__(self, equations: Equations, loops: ClosedLoops) -> None:
-        self.graph, self.free = equations.graph, loops.independent
+        self.graph, self.free, self.own = equations.graph, loops.speeds, loops.own_speeds
         self.speeds = equations.speeds
         one = self.graph.one
         self.weights: Matrix = {(i, k): one for k, i in enumerate(self.free)}
@@ -209,7 +215,7 @@ class _Moved:
 
     def _add(self, group: Group) -> None:
         """Solve the rates of a group for the speeds of its unknowns."""
-        unknowns = group.unknowns
+        unknowns = tuple(self.own[number] for number in group.unknowns)
         matrix = [[self._slope(group, row, c) for c in unknowns] for row in group.along]
         for k in range(len(self.free)):
             right = [-self._along(group, row, k) for row in group.along]

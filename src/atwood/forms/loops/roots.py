@@ -120,6 +120,8 @@ def solved_for(
     if not rate.is_zero and loops.agree([g], [constant + rate * x]):
         return Group((number,), ks, (along,), {x: -(constant / rate)})
     curve, half = 0.5 * bend, 0.5 * rate
+    if loops.is_free_place[number]:  # a place on a sphere has no coordinate that does anywhere
+        return None
     if curve.is_zero or not loops.agree([g], [constant + (rate + curve * x) * x]):
         return None
     sign = loops.graph.parameter(f"branch:{loops.equations.names[number].name}")

@@ -27,7 +27,6 @@ from atwood.forms.kept import Key
 from atwood.forms.loops.assur_groups import Loops
 from atwood.forms.loops.branches import Place
 from atwood.forms.loops.closed_form import ClosedForm, closed_form
-from atwood.forms.program import rates_are_speeds
 from atwood.late import dataclass, replace
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
@@ -63,6 +62,9 @@ CLEAR = 0.003
 
 _AMPLE = 0.5
 """Of several independent coordinates, among which none turns fully for all others, a choice so far is good enough."""
+
+_LARGEST = 4000
+"""More products of freedoms and speeds are left to the numeric loop: formulas know of no entry that is zero."""
 
 _MOST = 60
 """More choices of independent coordinates are not tried."""
@@ -125,14 +127,15 @@ class Solved:
 
     def reduced(self, y: FloatArray) -> FloatArray:
         """Return the state of the independent coordinates from that of all."""
-        free, n = self.independent, len(self.assembly.reduced.coordinates)
-        return np.concatenate([y[free], y[[n + i for i in free]]])
+        free, moving, n = self.independent, self.form.loops.speeds, len(self.assembly.reduced.coordinates)
+        return np.concatenate([y[free], y[[n + i for i in moving]]])
 
     def states(self, t: FloatArray, y: FloatArray) -> FloatArray:
         """Return all coordinates and speeds from the independent ones, shape (samples, unknowns)."""
         n = len(self.form.loops.independent)
         if not len(t):
-            return np.zeros((0, 2 * len(self.assembly.reduced.coordinates)))
+            equations = self.assembly.reduced
+            return np.zeros((0, len(equations.coordinates) + len(equations.speeds)))
         q, u = self.kernel(self.form.states, vectorized=True)(t[None, :], y[:, :n].T, y[:, n:].T)
         return np.concatenate([q, u]).T
 
@@ -159,8 +162,7 @@ class _Choices:
         assembly = plan.assembly
         self.equations = assembly.reduced
         self.loops = Loops(self.equations, _place(plan, t, q))
-        count = len(self.equations.speeds) - plan.finding.rank
-        every = itertools.combinations(range(len(self.equations.coordinates)), count)
+        every = self.loops.choices(len(self.equations.speeds) - plan.finding.rank)
         fitting = (one for one in itertools.islice(every, 20 * _MOST) if self.loops.can_be_solved(one))
         self.every = tuple(itertools.islice(fitting, _MOST))
         self._forms: dict[tuple[int, ...], ClosedForm | None] = {}
@@ -216,10 +218,18 @@ def can_be_solved(plan: Plan) -> bool:
         and len(equations.speeds) > plan.finding.rank
         and not equations.read
         and not equations.states
-        and not equations.orientation_coordinates
-        and rates_are_speeds(equations)
+        and all(one.is_homogeneous for one in equations.orientation_coordinates)
+        and _freedoms_besides(plan) >= 0
+        and (len(equations.speeds) - plan.finding.rank) * len(equations.speeds) <= _LARGEST
         and all(one.value is not None for one in equations.constraints)
     )
+
+
+def _freedoms_besides(plan: Plan) -> int:
+    """Return how many freedoms are not those of orientations, which formulas take as they are."""
+    equations = plan.assembly.reduced
+    turning = sum(len(one.speeds) for one in equations.orientation_coordinates)
+    return len(equations.speeds) - plan.finding.rank - turning
 
 
 def have_formulas(plan: Plan, t: float, q: FloatArray) -> bool:
@@ -333,7 +343,7 @@ def _margins(solved: Solved, t: float, y: FloatArray) -> Sequence[float]:
 
 def _holds(plan: Plan, solved: Solved, t: float, y: FloatArray) -> bool:
     """Return whether all constraints hold wherever formulas lead to near by, with these parameters."""
-    n, sizes = len(y) // 2, plan.coordinate_sizes[solved.independent]
+    n, sizes = len(solved.independent), plan.coordinate_sizes[solved.independent]
     states = []
     for i, step in itertools.product(range(n), (ASIDE, -ASIDE)):
         moved = y.copy()
@@ -342,7 +352,7 @@ def _holds(plan: Plan, solved: Solved, t: float, y: FloatArray) -> bool:
             states.append(solved.state(t, moved))
     if not states:
         return False
-    misses = misses_of(plan, np.full(len(states), t), *np.split(np.array(states).T, 2))
+    misses = misses_of(plan, np.full(len(states), t), *plan.program.split(np.array(states).T))
     return bool(np.all(misses[0] <= AGREES) and np.all(misses[1] * plan.scales.time <= AGREES))
 
 

@@ -88,7 +88,8 @@ class ClosedLoopSession:
     @property
     def states(self) -> int:
         """How many unknowns are integrated at present."""
-        return 2 * len(self._solved.independent)
+        loops = self._solved.form.loops
+        return len(loops.independent) + len(loops.speeds)
 
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
         """Go on from another state."""
@@ -146,15 +147,16 @@ class ClosedLoopSession:
 
     def _better(self, result: StepResult, y: FloatArray) -> Solved | None:
         """Return the best choice from here on: the present one unless another is clearly farther from a dead centre."""
-        found, n = self._at(result.t, y), len(y) // 2
+        found = self._at(result.t, y)
         if found is None or found.form is self._solved.form:
             return found
-        here = on_branch(self._request.plan, self._solved.form, result.t, y[:n], y[n:])
+        plan = self._request.plan
+        here = on_branch(plan, self._solved.form, result.t, *plan.program.split(y))
         return found if here is None or found.margin > _BETTER * here.margin else here
 
     def _at(self, t: float, y: FloatArray) -> Solved | None:
-        n = len(y) // 2
-        return solve_at(self._request.plan, t, y[:n], y[n:])
+        plan = self._request.plan
+        return solve_at(plan, t, *plan.program.split(y))
 
     def _change(self, t: float, y: FloatArray, solved: Solved) -> None:
         """Go on from a state with another choice, or on another branch."""
@@ -163,9 +165,9 @@ class ClosedLoopSession:
         self._session = self._open(t, solved.reduced(y))
 
     def _rates(self, result: StepResult, y: FloatArray) -> FloatArray:
-        n, yp = len(y) // 2, np.zeros_like(y)
-        yp[:n] = y[n:]
-        return yp
+        plan = self._request.plan
+        q, u = plan.program.split(y)
+        return np.concatenate([plan.balance.kinematic_map.rates(result.t, q, u), np.zeros_like(u)])
 
     def _reads_counts(self) -> bool:
         """Return whether what is integrated or looked for reads an angle whose half turns are counted."""
@@ -225,8 +227,9 @@ class ClosedLoopSession:
     @staticmethod
     def _longest_step(solved: Solved, t: float, y: FloatArray) -> float:
         """Return in what time no angle changes by more than formulas near a dead centre let be estimated."""
-        is_angle = np.array([one.unit == "rad" for one in solved.assembly.reduced.names])
-        fastest = float(np.max(np.abs(solved.state(t, y)[len(is_angle) :][is_angle]), initial=0.0))
+        names, speed_names = solved.assembly.reduced.names, solved.assembly.reduced.speed_names
+        is_angular = np.array([one.unit == "rad/s" for one in speed_names])
+        fastest = float(np.max(np.abs(solved.state(t, y)[len(names) :][is_angular]), initial=0.0))
         return _FARTHEST / fastest if fastest > 0.0 else np.inf
 
     @staticmethod

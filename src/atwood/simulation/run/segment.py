@@ -42,6 +42,9 @@ __all__ = ["run_segment"]
 _BLOCKS = 50
 """Progress is told about so many times."""
 
+_PARTS = 5
+"""So often it is seen to that coordinates of orientations keep their size where formulas give all others."""
+
 
 def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u: FloatArray) -> Outcome:
     """Integrate in one mode until a time, an event or a limit of the run.
@@ -302,7 +305,8 @@ class _Runner:
         kinematic_map = segment.plan.balance.kinematic_map
         whole = progress is None and not kinematic_map.has_homogeneous
         samples = segment.samples
-        ends = samples.ends_of_blocks(1 if whole else _BLOCKS)
+        parts = _BLOCKS if progress is not None or not segment.plan.balance.constraints else _PARTS
+        ends = samples.ends_of_blocks(1 if whole else parts)
         while done < len(samples.times):
             times = samples.times[done : ends[np.searchsorted(ends, done, side="right")]]
             y, _, step_result = session.sample(times)
