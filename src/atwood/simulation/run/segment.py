@@ -26,7 +26,6 @@ from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import dead_centre, stiffness_of, turned_stiff
-from atwood.simulation.run.nothing_free import follow
 from atwood.simulation.run.outcome import Outcome, Segment
 from atwood.simulation.run.record import Recorder
 from atwood.simulation.run.session import SolverRequest, open_explicit_session, open_implicit_session
@@ -67,6 +66,8 @@ def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u
     if already is not None:
         return Outcome(t, "event", "", Statistics(), (segment.choice,), already)
     if n == 0:
+        from atwood.simulation.run.nothing_free import follow
+
         return follow(segment, recorder, t)
     return _Runner(segment, recorder).run(t, y, yp)
 
