@@ -205,6 +205,20 @@ def test_a_start_near_the_place(form: str, angle: float, rtol: float) -> None:
     assert np.max(np.abs(energy - energy[0])) < 1e3 * rtol
 
 
+@pytest.mark.sample(6)
+@pytest.mark.parametrize("rtol", [1e-8, 1e-10])
+@pytest.mark.parametrize("t_end", [0.002, 0.02, 0.1])
+@pytest.mark.parametrize("angle", [1e-4, 1e-6, -1e-6, -1e-3])
+def test_a_short_run_beside_the_place(angle: float, t_end: float, rtol: float) -> None:
+    """How far the way on from a start is looked for does not depend on how long the run is."""
+    scene = FourBar(crank_length=1.0, coupler_length=2.0, rocker_length=1.0, frame_length=2.0)
+    scene.start = {"crank.angle": angle, "crank.angular_velocity": 2.0}
+    scene.guess = {"coupler.angle": 0.0, "rocker.angle": angle}
+    found = simulate(scene, form="dae", t_end=t_end, rtol=rtol, outputs=5)
+    assert found.status == "finished"
+    np.testing.assert_allclose(found["rocker.angle"], found["crank.angle"], atol=1e-9)
+
+
 @pytest.mark.sample(4)
 @needs_sundials
 @pytest.mark.parametrize("form", FORMS)

@@ -205,9 +205,11 @@ def test_a_motion_that_leaves_a_start_is_followed(monkeypatch: pytest.MonkeyPatc
     found = one._from_start(0.2)
     assert found is not None
     assert (found.time, found.ways, found.path.start, found.path.end) == (0.0, 0, 0.0, 3.0)
-    # 50 of 100 + 50 at the end is no small share; behind a position, at a tight tolerance, it is near enough.
-    for behind, largest, follows in ((False, 1.0, False), (True, 200.0, True), (True, 80.0, False)):
-        one = measured(with_arcs(monkeypatch, moving([0.0, 1.0], largest), Arcs(0.0, None, None)), 0.0, floor=50.0)
+    # 50 of 100 + 50 at the end is no small share; behind a position, at a tight tolerance, it is near enough, whether
+    # the motion has been far from it or goes there now.
+    cases = ((False, 1.0, 50.0, False), (True, 200.0, 50.0, True), (True, 80.0, 50.0, True), (True, 80.0, 500.0, False))
+    for behind, largest, floor, follows in cases:
+        one = measured(with_arcs(monkeypatch, moving([0.0, 1.0], largest), Arcs(0.0, None, None)), 0.0, floor=floor)
         one._is_behind = behind
         assert (one._from_start(0.2) is not None) is follows
     falls = measured(with_arcs(monkeypatch, moving([0.0, 1.0], 1e3), Arcs(0.0, None, None)), 30.0)

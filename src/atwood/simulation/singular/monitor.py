@@ -228,7 +228,8 @@ class SingularityMonitor:
         Behind a crossing rounding can be too large for a solver at first; there the motion goes away from the place.
         """
         first = self._looks[0]
-        stride = stride_from(self.plan, first, self._whole)
+        stride = stride_from(self.plan, first, np.inf)  # also beyond the end of a short run, where it is not looked at
+        stride = stride if np.isfinite(stride) else self._whole
         begin = self._state(first)
         if begin is None or not near < first.t + 0.1 * stride:
             return None
@@ -242,7 +243,10 @@ class SingularityMonitor:
             found = find_crossing(self._measures, arc)
             if found is not None:
                 return self._crossing(arc, *found)
-            leaves = away[0] < (_NEAR * self._largest if self._is_behind else _QUITE_CLOSE * away[-1])
+            largest = max(
+                self._largest, float(np.max(away))
+            )  # of a run that is too short to have been far from it, too
+            leaves = away[0] < (_NEAR * largest if self._is_behind else _QUITE_CLOSE * away[-1])
             if longest is None and leaves and np.all(np.diff(away[1:]) > 0.0):
                 longest = Path((arc,))
         return None if longest is None else SingularCrossing(longest.start, 0, (), (), longest)
