@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from atwood.errors import UsageError
 from atwood.integrators.compiled_functions import NativeCallbacks
-from atwood.integrators.ida import library as sundials_library, native as ida_native, sundae as ida_sundae
+from atwood.integrators.ida import library as sundials_library, memory, native as ida_native, sundae as ida_sundae
 from atwood.integrators.ida.callbacks import Record, address, jacobian_function, residual_function, weight_function
 from atwood.integrators.ida.native import IdaTuning, NativeSession
 from atwood.integrators.protocol import Budget, ImplicitProblem, SolverOptions, Status
@@ -589,6 +589,25 @@ def _machine_code() -> tuple[tuple[int, int], object]:
 class TestLife:
     def open(self, k: float = 1.0, **more: Any) -> NativeSession:
         return ida_native.open_session(oscillator(), TIGHT, 0.0, np.array([k, 0]), np.array([0, -k]), **more)
+
+    def test_what_nobody_uses_is_freed_with_the_next_and_not_in_a_finalizer(self) -> None:
+        """Whatever a finalizer raises is lost, Ctrl-C too."""
+        memory._free_dead()
+        freed: list[int] = []
+        session = self.open()
+        parts, before = session._memory._parts, len(memory._graves)
+        free = parts.free
+        parts.free = lambda: (freed.append(1), free())[1]  # type: ignore[method-assign]
+        gone = weakref.ref(session._memory)
+        del session
+        gc.collect()
+        assert gone() is None
+        assert not freed
+        with self.open():
+            assert freed == [1]
+            assert len(memory._graves) == before
+        memory._free_dead()
+        assert freed == [1]
 
     def test_closing(self) -> None:
         with self.open() as session:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import weakref
+from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from ctypes import c_double, c_int, c_long, c_void_p
 from typing import TYPE_CHECKING, Any
 
@@ -101,6 +103,29 @@ class _Parts:
         self.solver = self.matrix = self.sparse = self.fixed = None
 
 
+class _Grave(weakref.ref["IdaMemory"]):
+    """What is freed when the memory that it refers to is no longer there; the callback is no function of Python.
+
+    What a finalizer raises is lost, Ctrl-C too, and freeing takes long enough for that to happen.
+    """
+
+    __slots__ = ("parts",)
+    parts: _Parts
+
+
+_graves: dict[int, _Grave] = {}
+_dead: deque[_Grave] = deque()
+
+
+def _free_dead() -> None:
+    """Free what is no longer used."""
+    while _dead:
+        with suppress(IndexError):  # another thread was faster
+            grave = _dead.popleft()
+            if _graves.pop(id(grave), None) is not None:
+                grave.parts.free()
+
+
 class IdaMemory:
     """IDA's memory, its vectors, matrix and linear solver, in a context of their own.
 
@@ -122,8 +147,11 @@ class IdaMemory:
     def __init__(self, library: SundialsLibrary, size: int) -> None:
         self.library = library
         self.size = size
+        _free_dead()
         self._parts = parts = _Parts(library)
-        self._free = weakref.finalize(self, parts.free)
+        self._grave = grave = _Grave(self, _dead.append)
+        grave.parts = parts
+        _graves[id(grave)] = grave
         self._check(library.SUNContext_Create(0, ctypes.byref(parts.context)), "SUNContext_Create")
         library.SUNContext_ClearErrHandlers(parts.context)
         self.y, self._y = self.vector(np.zeros(size))
@@ -138,11 +166,12 @@ class IdaMemory:
     @property
     def is_closed(self) -> bool:
         """Whether the memory has been freed."""
-        return not self._free.alive
+        return id(self._grave) not in _graves
 
     def close(self) -> None:
         """Free everything; again does nothing."""
-        self._free()
+        if _graves.pop(id(self._grave), None) is not None:
+            self._parts.free()
 
     def keep(self, *things: object) -> None:
         """Let things live as long as the memory."""
