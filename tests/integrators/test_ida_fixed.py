@@ -174,7 +174,7 @@ def of_scene(name: str, level: str = "ggl") -> tuple[Prepared, Any, Any, Implici
 )
 def test_runs_end_where_they_do_with_a_dense_matrix(name: str, level: str) -> None:
     prepared, y, yp, problem = of_scene(name, level)
-    options = SolverOptions(1e-8, prepared.plan.tolerances(1e-8))
+    options = SolverOptions(1e-8, prepared.plan.tolerances(1e-8, {}))
     ends, sizes = [], slice(len(prepared.q))
     for linear_solver in ("fixed", "dense"):
         for functions in (problem, replace(problem, native=None)) if linear_solver == "fixed" else (problem,):
@@ -191,7 +191,7 @@ def test_runs_end_where_they_do_with_a_dense_matrix(name: str, level: str) -> No
 def test_pivots_that_a_scene_needs_are_found_once_and_again_alike():
     # The rope's end and the pulley's have no mass of their own, which the pattern does not tell.
     prepared, y, yp, problem = of_scene("SwingingAtwood")
-    options = SolverOptions(1e-6, prepared.plan.tolerances(1e-6), linear_solver="fixed")
+    options = SolverOptions(1e-6, prepared.plan.tolerances(1e-6, {}), linear_solver="fixed")
     ends = []
     for _ in range(2):
         with ida_native.open_session(problem, options, 0.0, y, yp) as session:

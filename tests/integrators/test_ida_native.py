@@ -301,7 +301,7 @@ class TestTuning:
         start = packed(prepared, prepared.q, prepared.u)
 
         def states(rtol: float, tuning: IdaTuning | None) -> tuple[Any, int]:
-            options = SolverOptions(rtol, plan.tolerances(rtol), horizon=5.0)
+            options = SolverOptions(rtol, plan.tolerances(rtol, {}), horizon=5.0)
             with ida_native.open_session(plan.problem(), options, 0.0, *start, tuning=tuning) as session:
                 found = [session.advance(float(t)).y[:n] for t in np.linspace(0.25, 5.0, 20)]
                 return np.array(found), session.statistics.residual_evaluations
