@@ -41,13 +41,13 @@ class ClosureError:
     angle: float
 
     def describe(self, length: float) -> str:
-        """Return the gap in words, as in ``0.1 m`` or ``0.1 m and 3 deg``, without what is rounding."""
+        """Return the gap in words, as in ``0.1 m`` or ``0.1 m and 3 deg``, without what is rounding beside the rest."""
         said = []
         if self.distance > tolerances.CLOSED * length * max(1.0, self.angle):
             said.append(f"{self.distance:.4g} m")
         if self.angle > tolerances.CLOSED:
             said.append(f"{np.degrees(self.angle):.4g} deg")
-        return " and ".join(said) or "nothing"
+        return " and ".join(said) or f"{self.distance:.4g} m and {np.degrees(self.angle):.4g} deg"
 
     def size(self, length: float) -> float:
         """Return how large it is for a scene of a given extent."""

@@ -214,7 +214,13 @@ def _lengths_that_close(failed: Failed, system: System, best: Nearest) -> list[s
             found.append((abs(derivative), symbol.name, values[j], values[j] - best.size / derivative))
     found.sort(key=lambda one: -round(one[0] * failed.length, 6))  # in the order of declaration where they do alike
     good = [one for one in found if np.sign(one[2]) == np.sign(one[3])]
-    return [f"{name} = {new:.4g} m (it is {old:.4g} m)" for _, name, old, new in good[:shown]]
+    return [f"{name} = {_unlike(new, old)} m (it is {_unlike(old, new)} m)" for _, name, old, new in good[:shown]]
+
+
+def _unlike(one: float, other: float) -> str:
+    """Return a number with as many digits as tell it from another one that is not zero, four at least."""
+    alike = abs(other) / max(abs(one - other), 1e-15 * abs(other))
+    return f"{one:.{max(4, 2 + int(np.ceil(np.log10(max(alike, 1.0)))))}g}"
 
 
 def far_from_guess(failed: Failed, found: FloatArray, wrong: Sequence[str]) -> StartError:
