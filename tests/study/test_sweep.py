@@ -182,6 +182,15 @@ def test_each_run_is_as_accurate_as_was_asked() -> None:
     assert "was asked for" in chaotic.messages[0]
 
 
+@pytest.mark.parametrize("scene", [DoublePendulum, FourBar])
+def test_tolerances_below_rounding_are_said_once(scene: type[Scene]) -> None:
+    with pytest.warns(UserWarning, match="below what rounding allows") as said:
+        found = sweep(scene(), {"gravity": [1.6, 9.8]}, t_end=0.2, rtol=1e-17)
+    least = sweep(scene(), {"gravity": [1.6, 9.8]}, t_end=0.2, rtol=1e-15)
+    assert len(said) == 1
+    assert_array_equal(found.steps, least.steps)
+
+
 def test_threads_change_nothing() -> None:
     options = {**CASES["starts"], "t_end": 1.0}
     alone, together = (sweep(DoublePendulum(), **options, threads=n) for n in (1, 3))

@@ -35,6 +35,7 @@ from atwood.simulation.problem.arguments import (
 )
 from atwood.simulation.problem.options import RunOptions, sample_times
 from atwood.simulation.run.choice import check_solver
+from atwood.simulation.run.tolerances import allowed
 from atwood.study.sweeps.batch import run_batches, why_not_batched
 from atwood.study.sweeps.cases import COMBINATIONS, Cases, make_cases
 from atwood.study.sweeps.result import Sweep, SweepStatistics
@@ -147,13 +148,14 @@ def sweep(
     cases = make_cases(source, vary, start, combine)
     first = _first(assembly, cases)
     end = assembly.flat.t_end if t_end is None else float(t_end)
+    options = RunOptions(end, rtol, max_steps=max_steps, max_seconds=max_seconds, solver=solver, accuracy=accuracy)
     request = SweepRequest(
         first,
         cases,
         expand_paths(first, quantities),
         _times(first, end, outputs),
         outputs is None,
-        RunOptions(end, rtol, max_steps=max_steps, max_seconds=max_seconds, solver=solver, accuracy=accuracy),
+        allowed(options),
     )
     records = Records.empty(request)
     count = _threads(threads)
