@@ -52,7 +52,7 @@ def _cells(one: PartEnergy, nothing: float) -> list[str]:
     def written(value: float) -> str:
         return f"{value:.4g}" if abs(value) > nothing else ""
 
-    sums = (one.total - one.total[0], one.supplied, one.dissipated, one.constraints, one.impacts)
+    sums = (one.gained, one.supplied, one.dissipated, one.constraints, one.impacts)
     cells = [written(float(values[-1])) for values in sums]
     through = ", ".join(f"{name} {text}" for name, x in one.work.items() if (text := written(float(x[-1]))))
     largest = max(float(np.max(np.abs(values), initial=0.0)) for values in (*sums, *one.work.values()))

@@ -38,6 +38,8 @@ class PartEnergy:
         Its path.
     kinetic, potential
         Kinetic and potential energy, its weight's included.
+    gained
+        What it has more of both together than at the start of the run, whether that is an output or not.
     work
         By the names of its connectors: the energy that came in through each since the start, the integral of
         ``force . velocity + torque . angular velocity``. Of a model, by those of its connectors, or of its parts, that
@@ -59,6 +61,7 @@ class PartEnergy:
     path: str
     kinetic: FloatArray
     potential: FloatArray
+    gained: FloatArray
     work: Mapping[str, FloatArray]
     supplied: FloatArray
     dissipated: FloatArray
@@ -74,23 +77,24 @@ class PartEnergy:
     @property
     def error(self) -> FloatArray:
         """By how much it fails to balance: what it has gained less all that came in."""
-        gained = self.total - self.total[0]
         given = self.supplied - self.dissipated + self.constraints + self.impacts
-        error: FloatArray = gained - given - np.sum(list(self.work.values()), axis=0)
+        error: FloatArray = self.gained - given - np.sum(list(self.work.values()), axis=0)
         return error
 
     def table(self) -> dict[str, FloatArray]:
         """Return all of it by name: ``kinetic``, ``work.a`` and so on."""
-        names = ("kinetic", "potential", "supplied", "dissipated", "constraints", "impacts", "error")
+        names = ("kinetic", "potential", "gained")
+        given = ("supplied", "dissipated", "constraints", "impacts", "error")
         work = {f"work.{name}": values for name, values in self.work.items()}
-        return {**{name: getattr(self, name) for name in names[:2]}, **work, **{n: getattr(self, n) for n in names[2:]}}
+        return {**{one: getattr(self, one) for one in names}, **work, **{one: getattr(self, one) for one in given}}
 
     def __repr__(self) -> str:
-        gained = {name: float(values[-1]) for name, values in self.table().items()}
-        gained["kinetic"] -= float(self.kinetic[0])
-        gained["potential"] -= float(self.potential[0])
-        text = ", ".join(f"{name} {value:+.3g}" for name, value in gained.items() if name != "error" and value)
-        return fitted(f"<{type(self).__name__} of {self.path}, J from start to end: {text or 'nothing changes'}>")
+        ends = {name: float(values[-1]) for name, values in self.table().items()}
+        shown = (f"{name} {value:+.3g}" for name, value in ends.items() if name not in _STATES and value)
+        return fitted(f"<{type(self).__name__} of {self.path}, J from start to end: {', '.join(shown) or 'nothing'}>")
+
+
+_STATES = ("kinetic", "potential", "error")
 
 
 class PartEnergies(Mapping[str, PartEnergy]):
@@ -200,14 +204,12 @@ class PartEnergies(Mapping[str, PartEnergy]):
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what came in from start to end as plain data, by component."""
+        """Return energies at the end, and what came in since the start, as plain data by component."""
         found: dict[str, Any] = {}
         for path, one in {**self._parts, **self._models}.items():
             ends = {name: float(values[-1]) for name, values in one.table().items() if name != "error"}
-            ends["kinetic"] -= float(one.kinetic[0])
-            ends["potential"] -= float(one.potential[0])
             error = float(np.max(np.abs(one.error), initial=0.0))
-            found[path] = {"gained": ends, "max_error": error, "is_unique": one.is_unique}
+            found[path] = {**ends, "max_error": error, "is_unique": one.is_unique}
         return found
 
     def trajectories(self) -> SavedResult:
@@ -251,8 +253,10 @@ class PartEnergies(Mapping[str, PartEnergy]):
     def _repr_html_(self) -> str:
         rows = []
         for path, one in self._parts.items():
-            gained = one.total[-1] - one.total[0]
-            cells = (gained, *(getattr(one, name)[-1] for name in ("supplied", "dissipated", "constraints", "impacts")))
+            cells = (
+                one.gained[-1],
+                *(getattr(one, name)[-1] for name in ("supplied", "dissipated", "constraints", "impacts")),
+            )
             rows.append((path, *(f"{value:.3g}" for value in cells), f"{self._size(path, 'error'):.1e}"))
         heads = ("component", "gained, J", "supplied", "dissipated", "constraints", "impacts", "error / exchanged")
         return html_table("Energy by component, from start to end", heads, rows, self.describe())
@@ -264,6 +268,7 @@ class PartEnergies(Mapping[str, PartEnergy]):
 _MEANINGS = {
     "kinetic": "Kinetic energy",
     "potential": "Potential energy",
+    "gained": "Energy gained since the start",
     "work": "Energy that came in through a connector",
     "supplied": "Work of loads and inputs",
     "dissipated": "Energy that dampers took away",

@@ -73,7 +73,7 @@ def find_part_energies(run: Run, shown: NDArray[np.bool_], exchanged: float) -> 
     loose = {path for one in connectors for path in one.in_parallel}
     for segment, one in zip(segments, connectors, strict=True):
         loose |= _undetermined(segment, one)
-    every = np.concatenate(energies, axis=2)[:, :, shown]
+    every = np.concatenate(energies, axis=2)
     parts = {path: total.part(path, every[number], shown, path not in loose) for number, path in enumerate(flat.parts)}
     models = {path: _model(path, parts, connectors[0]) for path in _models(flat.parts)}
     time = np.concatenate([one.time for one in segments])[shown]
@@ -103,13 +103,15 @@ class _Sums:
             self._carried[key] = float(pieces[-1][-1])
 
     def part(self, path: str, energies: FloatArray, shown: NDArray[np.bool_], is_unique: bool) -> PartEnergy:
-        """Return the energy of a part at the output times."""
+        """Return the energy of a part at the output times, from its energies at all samples."""
         own = {
             (field, name): np.concatenate(x)[shown] for (field, part, name), x in self._found.items() if part == path
         }
         work = {name: values for (field, name), values in own.items() if field == "work"}
         supplied, dissipated, constraints, impacts = (values for (field, _), values in own.items() if field != "work")
-        return PartEnergy(path, energies[0], energies[1], work, supplied, dissipated, constraints, impacts, is_unique)
+        kinetic, potential = energies[:, shown]
+        gained = kinetic + potential - np.sum(energies[:, 0])
+        return PartEnergy(path, kinetic, potential, gained, work, supplied, dissipated, constraints, impacts, is_unique)
 
 
 def _models(parts: Mapping[str, object]) -> list[str]:
@@ -121,7 +123,7 @@ def _models(parts: Mapping[str, object]) -> list[str]:
 def _model(model: str, parts: Mapping[str, PartEnergy], connectors: Connectors) -> PartEnergy:
     """Return the energy of a model: the sum of its parts, and the work where others are connected."""
     inside = [one for path, one in parts.items() if path.startswith(f"{model}.")]
-    names = ("kinetic", "potential", "supplied", "dissipated", "constraints", "impacts")
+    names = ("kinetic", "potential", "gained", "supplied", "dissipated", "constraints", "impacts")
     sums = {name: np.sum([getattr(one, name) for one in inside], axis=0) for name in names}
     work = {
         name: np.sum([parts[path].work[end] for path, end in ends], axis=0)

@@ -116,7 +116,7 @@ def _given(parts: list[PartEnergy]) -> FloatArray:
     """Return the energy at the start, as the stack counts it, and what came in since."""
     total: FloatArray = np.zeros_like(parts[0].kinetic)
     for one in parts:
-        at_start = one.kinetic[0] + one.potential[0] - np.min(one.potential)
+        at_start = one.total[0] - one.gained[0] - np.min(one.potential)
         total = total + at_start + one.supplied + one.constraints + np.maximum(one.impacts, 0.0)
     return total
 
