@@ -73,6 +73,7 @@ class Loops:
         self.joints: dict[tuple[str, str], list[int]] = {}
         for k, one in enumerate(equations.constraints):
             self.joints.setdefault(one.key[:2], []).append(k)
+        self.pairs = tuple(self._pairs())
         self.shapes = ConstraintShapes(self.values, self.q, place, self.elsewhere[0])
         self._number = 0
         self._known: dict[tuple[tuple[int, ...], tuple[int, ...]], tuple[Group, ...]] = {}
@@ -133,6 +134,18 @@ class Loops:
             left = set().union(*(self.reads[k] for k in ks)) - known
             if 1 < len(left) <= min(len(ks), _MOST_UNKNOWNS):
                 yield tuple(ks), tuple(sorted(left))
+        for pair in self.pairs:
+            left = set().union(*(self.reads[k] for k in pair)) - known
+            if len(left) == len(pair):
+                yield pair, tuple(sorted(left))
+
+    def _pairs(self) -> Iterator[tuple[int, int]]:
+        """Yield two laws of one joint, as the guide and the lock of a slide: of each the constraint that says most."""
+        sizes = evaluate(self.values, {**self.place.parameters, **self.elsewhere[0]})
+        most = {law: max(ks, key=lambda k: abs(sizes[k])) for law, ks in self.joints.items()}
+        for one, other in itertools.combinations(most, 2):
+            if one[0] == other[0]:
+                yield most[one], most[other]
 
     def _reads(self) -> list[set[int]]:
         """Return which coordinates each constraint depends on, by more than rounding."""

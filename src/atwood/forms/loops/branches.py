@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field
 
 from atwood.expr import Expression, absolute, floor, sign, substitute
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 
 __all__ = ["ClosedLoops", "Group", "Heading", "Place"]
 
@@ -73,6 +73,13 @@ class Heading:
     def symbols(self) -> tuple[Expression, ...]:
         """Its symbols."""
         return tuple(one for one in (self.phase, self.flip, self.offset) if one is not None)
+
+    def with_places(self, moved: Callable[[Expression], Expression]) -> Heading:
+        """Return the same with other expressions for what depends on coordinates."""
+        ahead, beside = (None if one is None else moved(one) for one in (self.ahead, self.beside))
+        return replace(
+            self, ahead=ahead, beside=beside, values={symbol: moved(one) for symbol, one in self.values.items()}
+        )
 
 
 @dataclass(frozen=True, eq=False)

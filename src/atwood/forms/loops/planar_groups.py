@@ -13,6 +13,7 @@ in their plane, whichever plane of space that is.
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 from atwood.expr import Expression, atan2, cos, jvp, sin, sqrt, substitute
@@ -42,7 +43,7 @@ def two_unknowns(loops: Loops, ks: tuple[int, ...], unknowns: tuple[int, ...]) -
         ways = ((i, j, 0.0), (i, j, 1.0), (i, j, -1.0), (j, i, 1.0), (j, i, -1.0))
         fitting = (way for way in ways if loops.shapes.may_be(ks, {way[0]: True, way[1]: True}, nested=way[2]))
         made = (_two_links(loops, ks, *way) for way in fitting)
-        found = next((one for one in made if one is not None), None)
+        found = next((one for one in made if one is not None), None) or _locked_links(loops, ks, i, j)
     elif not loops.shapes.may_be(ks, {i: angles[0], j: angles[1]}):
         found = None
     elif not any(angles):
@@ -143,6 +144,52 @@ def _slide_that_turns(loops: Loops, ks: tuple[int, ...], i: int, j: int) -> Grou
     )
     values = {turn: x - angle}
     return Group((i, j), ks, _along(loops, ks, c, s), places, tuple(margins), {sign: a + y}, values, (heading,))
+
+
+def _locked_links(loops: Loops, ks: tuple[int, ...], i: int, j: int) -> Group | None:
+    """Solve for two angles of which one constraint holds the sum or the difference, as a slide does where it turns."""
+    x, y = loops.q[i], loops.q[j]
+    if len(ks) != 2:
+        return None
+    for nested, turned in itertools.product((-1.0, 1.0), (ks, ks[::-1])):
+        lock, guide = substitute([loops.values[k] for k in turned], {x: x - nested * y})  # now x is the sum
+        (e,), (p,), (q,) = (at(one, {y: 0.0}) for one in harmonics([lock], x))
+        d, r, s = (one for (one,) in harmonics([guide], y))
+        if loops.agree([lock], [e + p * cos(x) + q * sin(x)]) and loops.agree([guide], [d + r * cos(y) + s * sin(y)]):
+            return _locked(loops, ks, (i, j), nested, (p, q, -e), (r, s, -d))
+    return None
+
+
+def _locked(
+    loops: Loops, ks: tuple[int, ...], unknowns: tuple[int, int], nested: float, lock: Vector, guide: Vector
+) -> Group:
+    """Solve for a sum of two angles by one wave in it, and then for the second by another."""
+    (i, j), (x, y) = unknowns, (loops.q[one] for one in unknowns)
+    p, q, w = lock
+    root = Root(loops, i, p, q, w, x + nested * y)
+    direction, first = loops.heading(i, p, q)
+    turns, within = (loops.turn(i), loops.turn(j)), root.angle(direction)
+    whole = within + turns[0]
+    # Whatever tells branches apart reads the coordinates as they are; what is solved for, the sum as it was found.
+    there, here = {cos(x): root.c, sin(x): root.s, x: whole}, {x: x + nested * y}
+    apart, other = (Root(loops, j, *_three(substitute(list(guide), ways)), y) for ways in (here, there))
+    found, second = loops.heading(j, guide[0], guide[1])
+    second = second.with_places(lambda one: substitute([one], here)[0])
+    angle = other.angle(substitute([found], there)[0])
+    cx = root.c * other.c + nested * (root.s * other.s)
+    sx = root.s * other.c - nested * (root.c * other.s)
+    places = {cos(x): cx, sin(x): sx, x: whole - nested * (angle + turns[1])}
+    places |= {cos(y): other.c, sin(y): other.s, y: angle + turns[1]}
+    margins = root.rest / root.square, apart.rest / apart.square
+    values = {turns[0]: x + nested * y - within, turns[1]: y - apart.angle(substitute([found], here)[0])}
+    return Group(
+        unknowns, ks, _along(loops, ks, (), ()), places, margins, {**root.sign, **apart.sign}, values, (first, second)
+    )
+
+
+def _three(values: list[Expression]) -> tuple[Expression, Expression, Expression]:
+    p, q, w = values
+    return p, q, w
 
 
 def _two_slides(loops: Loops, ks: tuple[int, ...], i: int, j: int) -> Group | None:
