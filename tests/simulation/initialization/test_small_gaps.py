@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 
 import pytest
-from tests.helpers.mechanisms import parallel_four_bar
 
 from atwood import StartError, simulate
+
+from ...helpers.mechanisms import parallel_four_bar
 
 
 @pytest.mark.parametrize("form", ["reduced", "dae"])

@@ -10,9 +10,11 @@ from atwood_library import Ground, Link, Pivot
 
 
 def four_bar(size: float) -> Scene:
-    """Return a four-bar linkage of some size, with the same motion in its own time."""
+    """Return a four-bar linkage of some size and density one, with the same motion in its own time."""
     scene = Scene()
-    links = [scene.add(f"link{i}", Link(length=size * length)) for i, length in enumerate((1.0, 2.5, 2.0))]
+    links = [
+        scene.add(f"link{i}", Link(length=size * length, mass=size**3)) for i, length in enumerate((1.0, 2.5, 2.0))
+    ]
     pivots = [scene.add(f"pivot{i}", Pivot()) for i in range(4)]
     left, right = scene.add("left", Ground()), scene.add("right", Ground(position=(2.5 * size, 0.0, 0.0)))
     ends = left.frame, links[0].a, links[0].b, links[1].a, links[1].b, links[2].b, right.frame, links[2].a
