@@ -24,6 +24,9 @@ HEAD = """# Hard cases
 Problems on which simulations of mechanisms fail: what is hard, what is asked, what each form reaches. The page is
 written by `python -m tests.hard_cases --write`; the tests ask the same. Times are of one machine, with assembling and
 compiling, and only tell forms apart. Errors in bold miss what is asked.
+
+One problem of the test set for initial value problem solvers is not here: the wheelset, whose contact points are
+unknowns of their own and whose creep is no part of the library.
 """
 
 
