@@ -8,6 +8,7 @@ import pytest
 
 from atwood import Result, Scene, clock, pipeline
 from atwood.pipeline import simulate
+from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.run import run
 from atwood_library import Force, Ground, PointMass, Rope, Sine, Spring
 from atwood_library.scenes import Atwood, DoublePendulum
@@ -206,3 +207,22 @@ def test_a_hanging_rope_carries_the_weight_and_the_spring(form: str) -> None:
     result = simulate(scene, form=form, rtol=1e-8)
     assert result.status == "finished"
     assert np.allclose(result.array("rope.tension"), 9.81 + 50.0)
+
+
+@pytest.mark.parametrize(("share", "happens"), [(0.5, False), (0.95, True), (1.1, True)])
+def test_what_has_passed_nearly_all_of_its_margin_at_a_start_happens_there(share: float, happens: bool) -> None:
+    """Equal ropes pass their margins together: one of them ends the mode, and the others are at the end of theirs."""
+    scene = pendulum_on_a_string()
+    scene.start.update({"bob.position.x": math.sin(2.0), "bob.velocity.x": 3.0 * math.cos(2.0)})
+    scene.guess.update({"bob.position.z": -math.cos(2.0), "bob.velocity.z": 3.0 * math.sin(2.0)})
+    (segment, *_) = simulate(scene, t_end=1e-3, outputs=2).run.segments
+    rtol, plan = 1e-9, segment.plan
+    tension = -share * 10.0 * rtol * plan.scales.of("N")
+    speed = math.sqrt(tension - 9.81 * math.cos(2.0))  # m v^2 / l = T - m g cos
+    q = segment.coordinates[:, 0]
+    probe = EventProbe(plan, 0.0, q, speed * np.array([math.cos(2.0), math.sin(2.0)]), rtol)
+    names = [one.message for one in probe.event_functions]
+    which = names.index("the rope has gone slack")
+    assert (probe.broken is not None) == happens
+    if not happens:
+        assert probe.values(0.0, q, speed * np.array([math.cos(2.0), math.sin(2.0)]))[which] > 0.0

@@ -95,6 +95,14 @@ def _find_needs(assembly: Assembly, event_functions: Sequence[EventFunction]) ->
     )
 
 
+_PASSED = 0.9
+"""What has passed zero by this share of its margin at the start of a mode happens there.
+
+Equal parts pass their margins together. One of them ends the mode, and the others are at the end of theirs to rounding:
+a whole margin would leave them at zero, with a sign that nobody knows.
+"""
+
+
 class EventProbe:
     """The events of one mode as a function of the solver's state.
 
@@ -139,7 +147,7 @@ class EventProbe:
             (
                 one
                 for one, v, s in zip(self.event_functions, values, small, strict=True)
-                if one.direction * v > s and not one.is_noted
+                if one.direction * v > _PASSED * s and not one.is_noted
             ),
             None,
         )
