@@ -253,10 +253,10 @@ def simulate(
         The largest step, s.
     solver
         ``"ida"``: SUNDIALS IDA with the equations as machine code. ``"ida-sundae"``: the same method through
-        scikit-sundae with the equations as Python, the reference. ``"explicit"``: a Runge-Kutta method of order 8(5,3),
-        and ``"taylor"``: Taylor series, for the reduced form without closed loops, or with loops that formulas solve
-        (four-bars, slider-cranks, and what is made of such groups, in any plane). ``"auto"``: IDA for what is
-        constrained or stiff, or turns out so; else an explicit method. `Result.solver` says which, and why.
+        scikit-sundae with the equations as Python, the reference. ``"explicit"``: a Runge-Kutta method of order 8(5,3), on
+        constraints too. ``"taylor"``: Taylor series, for the reduced form without closed loops, or with such as
+        formulas solve (four-bars, slider-cranks, groups of these, in any plane). ``"auto"``: IDA for what is
+        stiff, or turns out so, and for index 1; else an explicit method. `Result.solver` says which, and why.
         ``"gauss"``: a symplectic method with equal steps, whose energy error does not grow, for scenes that have a
         Hamiltonian, closed loops that formulas solve included. ``"composition"``: the same where that is
         T(p) + V(q, t), by explicit steps.

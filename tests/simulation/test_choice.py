@@ -47,6 +47,8 @@ SOLVED = (
     "andrews-squeezer",
     "scott-russell-lift",
     "strandbeest",
+    "foucault-pendulum",
+    "spherical-pendulum",
 )
 """Scenes whose closed loops are solved by formulas."""
 
@@ -235,7 +237,7 @@ def test_a_mode_with_loops_is_followed_by_one_without() -> None:
     scene.start.update({"bob.position.x": 0.0, "bob.position.z": -1.0, "bob.velocity.x": math.sqrt(3.5 * 9.81)})
     result = simulate(scene, rtol=1e-8)
     assert result.events
-    assert solvers(result) == ["explicit"]
+    assert solvers(result)[0] == solvers(result)[-1] == "explicit"
     assert result.energy.max_drift < 1e-6
 
 

@@ -6,10 +6,9 @@ it knows of a problem comes in through pointers, so that it is compiled once and
 
 from __future__ import annotations
 
-from atwood.integrators.dop853.constraint_code import project_code, watch_code
+from atwood.integrators.dop853.ends_code import begin_code, project_code, watch_code
 from atwood.integrators.dop853.layout import COUNTS, NUMBERS, POINTERS, prologue
 from atwood.integrators.dop853.reference import GROWTH, RETREAT, SAFETY, SHRINKAGE
-from atwood.integrators.dop853.start_code import begin_code
 from atwood.integrators.dop853.stepping_code import ROWS, loop_code
 from atwood.integrators.dop853.tableau import NODES
 from atwood.integrators.explicit_problem import CALM, EDGE, STIFF

@@ -238,7 +238,9 @@ def find_way(request: SweepRequest) -> tuple[Way | None, str]:
     motion: Motion = OpenTree(assembly)
     if plan.balance.constraints:
         solved = solve_at(plan, start.time, q, u)
-        if solved is None or not solved.is_clear or solved.form.loops.counted or plan.finding.redundant:
+        if solved is None:
+            return None, "no formulas solve its closed loops"
+        if not solved.is_clear or solved.form.loops.counted or plan.finding.redundant:
             return None, "formulas for its closed loops have dead centres on the way"
         motion = ClosedLoops(assembly, solved, np.asarray(plan.finding.kept, dtype=np.intp))
         values = solved.values
