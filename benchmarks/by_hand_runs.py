@@ -14,8 +14,9 @@ import by_hand
 import numpy as np
 from mechanisms import GRAVITY, FloatArray, Mechanism
 
-from atwood.integrators.ida import setup as native_setup
 from atwood.integrators.ida.library import library
+from atwood.integrators.ida.setup import measured_tuning
+from atwood.integrators.protocol import FIXED_SIZE
 
 __all__ = ["PLAIN", "IdaRun", "Run", "Tuning", "explicit_run", "ggl_order", "reference", "tuned"]
 
@@ -31,9 +32,7 @@ PLAIN: Tuning = (0.0, 0.0, 0.0)
 
 def tuned(unknowns: int) -> Tuning:
     """Return what Atwood tells IDA about so many unknowns, some of which are algebraic."""
-    growth = native_setup._GROWTH if unknowns > native_setup._CHEAP else native_setup._HELD_GROWTH
-    age = native_setup._SHORT_AGE if unknowns <= native_setup._CHEAPEST else native_setup._AGE
-    return native_setup.TIGHT_NEWTON, growth, age
+    return measured_tuning(unknowns, True, unknowns >= FIXED_SIZE)
 
 
 def _defines(mechanism: Mechanism) -> dict[str, object]:

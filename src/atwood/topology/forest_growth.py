@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from typing import Literal
 
@@ -44,6 +45,10 @@ def grow_spanning_forest(
     locked = grower.turn(joints, use_locks=form == "reduced")
     solved = set(bodies.idle)
     hung = {id(one.joint) for one in grower.attachments if one.joint is not None}
+    users: dict[Expression, list[Joint]] = defaultdict(list)  # joints of a part that have a coordinate in common
+    for joint in joints:
+        for symbol in joint.local.coordinates:
+            users[symbol].append(joint)
     for joint in joints:
         local = locals_[joint.part]
         for constraint in local.constraints:
@@ -51,7 +56,8 @@ def grow_spanning_forest(
                 continue
             by_position = reads_position(local, constraint)
             chosen = hung if by_position else locked
-            if all(id(one) in chosen for one in joints if one is joint or _share(one, joint)):
+            sharing = [one for symbol in joint.local.coordinates for one in users[symbol]]
+            if all(id(one) in chosen for one in (joint, *sharing)):
                 solved.add((joint.part, constraint.law.name, constraint.index))
     counted = grower.count_turns(solved)
     pairs = [(bodies.body_of[joint.a], bodies.body_of[joint.b]) for joint in joints]
@@ -74,11 +80,6 @@ def grow_spanning_forest(
 
 def _between(joint: Joint, bodies: Bodies) -> bool:
     return bodies.body_of[joint.a] != bodies.body_of[joint.b]
-
-
-def _share(one: Joint, other: Joint) -> bool:
-    """Return whether two joints of a part have a coordinate in common: then what one solves takes both."""
-    return not set(one.local.coordinates).isdisjoint(other.local.coordinates)
 
 
 class _Grower:

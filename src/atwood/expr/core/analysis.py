@@ -71,19 +71,24 @@ def dependencies(outputs: Sequence[Expression | float], symbols: Sequence[Expres
 
 def depends_on(expression: Expression | float, symbols: Collection[Expression]) -> bool:
     """Return whether an expression depends on any of the symbols."""
-    wanted = {symbol.index for symbol in symbols}
-    return any(node.index in wanted for node in live([expression]))
+    wanted = _to_look_up(symbols)
+    return any(node in wanted for node in live([expression]))
+
+
+def _to_look_up(expressions: Iterable[Expression]) -> Collection[Expression]:
+    """Return expressions as something that can be asked at once, themselves if they are."""
+    return expressions if isinstance(expressions, set | frozenset | dict) else set(expressions)
 
 
 def varying(nodes: Sequence[Expression], parameters: Iterable[Expression]) -> set[int]:
     """Return the indices of the nodes that need something besides constants and parameters."""
-    fixed = {parameter.index for parameter in parameters}
+    fixed = _to_look_up(parameters)
     result: set[int] = set()
     for node in nodes:
         if node.operation == "symbol":
-            if node.index not in fixed:
+            if node not in fixed:
                 result.add(node.index)
-        elif node.index not in fixed:
+        elif node not in fixed:
             for argument in node.arguments:
                 if argument.index in result:
                     result.add(node.index)
@@ -129,6 +134,8 @@ def substitute(
         return []
     graph = _graph_of(outputs, mapping)
     nodes = live(outputs)
+    if len(mapping) > len(nodes):  # one part of a large scene
+        mapping = {node: mapping[node] for node in nodes if node in mapping}
     replaced = {old.index: graph.convert(new) for old, new in mapping.items()}
     touched = dependents(nodes, mapping)
     unknowns: dict[int, list[Expression]] = {}

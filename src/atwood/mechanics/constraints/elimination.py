@@ -131,9 +131,9 @@ def drop_closed(derivation: Derivation, q: Sequence[Expression], values: Values)
     Those that do not are checked here; functions of time are checked when it is known for which times.
     """
     kept: Values = []
-    prescribed = []
+    prescribed, moving = [], frozenset(q)
     for path, constraint, value in values:
-        if depends_on(value, q):
+        if depends_on(value, moving):
             kept.append((path, constraint, value))
             continue
         if depends_on(value, derivation.relations.roots):

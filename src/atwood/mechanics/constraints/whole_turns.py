@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from functools import partial
 
-from atwood.expr import Expression, affine_coefficients, evaluate
+from atwood.expr import Expression, affine_coefficients, evaluate, live
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide
 
@@ -37,7 +37,7 @@ def without_whole_turns(derivation: Derivation, angles: Sequence[Expression], va
     places: dict[Expression | None, _Place] = {angle: (angle, zero) for angle in [None, *angles]}
     kept: Values = []
     for path, constraint, value in values:
-        ends = _ends(derivation, angles, value)
+        ends = _ends(derivation, [node for node in live([value]) if node in places], value)
         if ends is not None:
             ahead, behind, difference = ends
             (first, shift), (second, other) = places[ahead], places[behind]
@@ -58,7 +58,7 @@ def _ends(
     mechanism: Mechanism, angles: Sequence[Expression], value: Expression
 ) -> tuple[Expression | None, Expression | None, Expression] | None:
     """Return the two angles whose difference is held, and what is added to it; None if it is no such constraint."""
-    affine = affine_coefficients(value, angles, list(mechanism.table.values))
+    affine = affine_coefficients(value, angles, mechanism.table.values)
     if affine is None or not (affine[1].is_parametric or affine[1].is_constant):
         return None
     found: dict[float, Expression] = {}

@@ -197,10 +197,8 @@ def check_masses(masses: Masses, values: Mapping[Expression, float]) -> None:
     """
     found = [(" and ".join(one.parts), one.mass) for one in masses.bodies.values()]
     found += [(one.part, row[i]) for one in masses.coupled for i, row in enumerate(one.masses)]
-    for where, mass in found:
-        if isinstance(mass, Expression) and not mass.is_parametric:
-            continue
-        number = evaluate([mass], values)[0] if isinstance(mass, Expression) else float(mass)
+    known = [(where, mass) for where, mass in found if not isinstance(mass, Expression) or mass.is_parametric]
+    for (where, _), number in zip(known, evaluate([mass for _, mass in known], values), strict=True):
         if number < 0.0:
             raise ParameterError(
                 f"the mass of the body is {number:.6g} kg in all, and the mass of a body cannot be negative",

@@ -15,7 +15,8 @@ from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import KernelEvaluationError
 from atwood.late import dataclass, replace
-from atwood.linalg.matrices import scaled, to_array
+from atwood.linalg.groups import independent_by_groups
+from atwood.linalg.matrices import is_full, scaled, to_array
 from atwood.simulation.dynamics.balance import Balance
 from atwood.simulation.dynamics.rank import independent_rows, open_directions, review_rows, row_sizes
 from atwood.tolerances import tolerances
@@ -94,6 +95,8 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     count = balance.constraints
     if count == 0:
         return RankFinding((), (), 0, 0)
+    if _hangs_together(balance, t, q, scales):
+        return RankFinding(tuple(range(count)), (), count, count)
     here = _look(balance, t, q, scales)
     # A row may be small because it vanishes at a singular position: it is measured by the terms that cancel in it.
     units = np.maximum(row_sizes(here.jacobian, np.ones(len(scales))), here.errors / ROUGHNESS)
@@ -110,6 +113,22 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     lost = _lost(here, nearby, best.kept)
     errors = np.max([place.errors for place in (here, *nearby)], axis=0)
     return RankFinding(tuple(best.kept), redundant, len(best.kept), len(best.kept) - len(lost), lost, errors)
+
+
+def _hangs_together(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> bool:
+    """Return whether the constraints of a large scene are independent joint by joint, as those of a tree are.
+
+    A law whose slopes by what it alone moves are independent is so of all others, whatever these are. Without it,
+    others are alone with what they move. How many there are does not matter, as for singular values of them all.
+    """
+    slopes = balance.constraints_at(t, q, np.zeros_like(scales)).jacobian
+    if is_full(slopes):
+        return False
+    rows = row_sizes(slopes, scales)
+    units = np.maximum(rows, balance.errors.of_jacobian(t, q, scales, 0.0) / ROUGHNESS)
+    return bool(np.all(rows > 0.0)) and independent_by_groups(
+        scaled(slopes, scales, units), balance.errors.laws, tolerances.CLEAR
+    )
 
 
 def review_kept(finding: RankFinding, balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> RankFinding:

@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
@@ -75,6 +76,11 @@ class RowErrors:
         self._reach = self._passed = 0.0
         self._values = self._entries = self._tangent = np.zeros(0)
         self._known: tuple[FloatArray, FloatArray] | None = None
+
+    @property
+    def laws(self) -> NDArray[np.intp]:
+        """The number of the law that each condition belongs to."""
+        return self._laws
 
     def near(self, t: float, q: FloatArray, scales: FloatArray) -> FloatArray:
         """Return how far rounding can take values and slopes where coordinates are of like size, shape (rows,).
