@@ -15,7 +15,6 @@ from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import KernelEvaluationError
 from atwood.late import dataclass, replace
-from atwood.linalg.groups import independent_by_groups
 from atwood.linalg.matrices import is_full, scaled, to_array
 from atwood.simulation.dynamics.balance import Balance
 from atwood.simulation.dynamics.rank import independent_rows, open_directions, review_rows, row_sizes
@@ -124,6 +123,8 @@ def _hangs_together(balance: Balance, t: float, q: FloatArray, scales: FloatArra
     slopes = balance.constraints_at(t, q, np.zeros_like(scales)).jacobian
     if is_full(slopes):
         return False
+    from atwood.linalg.groups import independent_by_groups
+
     rows = row_sizes(slopes, scales)
     units = np.maximum(rows, balance.errors.of_jacobian(t, q, scales, 0.0) / ROUGHNESS)
     return bool(np.all(rows > 0.0)) and independent_by_groups(
