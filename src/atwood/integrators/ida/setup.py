@@ -16,13 +16,13 @@ from atwood.late import dataclass
 __all__ = ["FIXED_NEWTON", "LOOSE_NEWTON", "TIGHT_NEWTON", "IdaTuning", "measured_tuning", "prepare"]
 
 LOOSE_NEWTON, TIGHT_NEWTON, FIXED_NEWTON = 0.33, 0.01, 0.1
-"""IDA's own choice of the Newton coefficient, that for problems with multipliers, and with fixed pivots."""
+"""IDA's own choice of the Newton coefficient, that for problems with multipliers, and for large ones of them."""
 
 _GROWTH, _SMOOTH_GROWTH, _HELD_GROWTH = 2.0, 1.5, 1.2
 """Bounds for `IdaTuning.least_growth`: IDA's own, and those for few unknowns without and with algebraic ones."""
 
 _AGE, _SHORT_AGE, _FIXED_AGE = 0.25, 0.05, 0.1
-"""Bounds for `IdaTuning.jacobian_age`: IDA's own, that for few unknowns, and with fixed pivots."""
+"""Bounds for `IdaTuning.jacobian_age`: IDA's own, that for few unknowns, and with fixed pivots for many."""
 
 _CHEAP, _CHEAPEST = 60, 40
 """Up to so many unknowns a new Jacobian costs little, and less than the iterations that it saves."""
@@ -40,15 +40,15 @@ class IdaTuning:
         How small the error of Newton's iteration must be, as a share of the error that a step may have.  `None`
         takes what was measured to be best: `LOOSE_NEWTON` without algebraic unknowns, else `TIGHT_NEWTON`, which
         saves a quarter to a half of the steps of constrained pendulums for the same number of residuals, or, with
-        fixed pivots, `FIXED_NEWTON`, which saves a sixteenth of the work of a dozen mechanisms more.
+        fixed pivots beyond 60 unknowns, `FIXED_NEWTON`, which saves up to half the work of loose tolerances there.
     least_growth
         A step is made longer once it can grow by this factor. `None` takes 1.2 with fixed pivots and up to 60 unknowns
         if some of them are algebraic, 1.5 if none is, and else IDA's own 2, since every change of the step can ask for
         a new Jacobian. Below 1.15 steps change so often that the order cannot rise: runs take many times as long.
     jacobian_age
-        By which share the step may have changed before the Jacobian is worked out anew. `None` takes 0.1 with fixed
-        pivots and 0.05 up to 40 unknowns, where that costs less than the iterations it saves, and else IDA's own
-        0.25. Together these save a quarter to a third of the time for the same error of pendulums and linkages.
+        By which share the step may have changed before the Jacobian is worked out anew. `None` takes 0.05 up to 40
+        unknowns, with fixed pivots up to 60 and then 0.1, where that costs less than the iterations it saves, and
+        else IDA's own 0.25. Together these save a quarter to a third of the time for the same error of pendulums and linkages.
     angle_like
         Unknowns whose error is allowed as a share of `angle_size` instead of their own value: angles that go round
         and round, or anything else whose zero means nothing.
@@ -149,10 +149,11 @@ def measured_tuning(size: int, is_held: bool, has_fixed_pivots: bool) -> tuple[f
     has_fixed_pivots
         Whether the matrix is eliminated with fixed pivots, so that a new one costs little whatever its size.
     """
-    if has_fixed_pivots and is_held:
+    if has_fixed_pivots and is_held and size > _CHEAP:
         return FIXED_NEWTON, _HELD_GROWTH, _FIXED_AGE
     growth = _GROWTH if size > _CHEAP else _HELD_GROWTH if is_held else _SMOOTH_GROWTH
-    return TIGHT_NEWTON if is_held else LOOSE_NEWTON, growth, _SHORT_AGE if size <= _CHEAPEST else _AGE
+    age = _SHORT_AGE if size <= (_CHEAP if has_fixed_pivots else _CHEAPEST) else _AGE
+    return TIGHT_NEWTON if is_held else LOOSE_NEWTON, growth, age
 
 
 def _set_weights(
