@@ -48,7 +48,8 @@ class IdaTuning:
     jacobian_age
         By which share the step may have changed before the Jacobian is worked out anew. `None` takes 0.05 up to 40
         unknowns, with fixed pivots up to 60 and then 0.1, where that costs less than the iterations it saves, and
-        else IDA's own 0.25. Together these save a quarter to a third of the time for the same error of pendulums and linkages.
+        else IDA's own 0.25. Together these save a quarter to a third of the time for the same error of pendulums and
+        linkages.
     angle_like
         Unknowns whose error is allowed as a share of `angle_size` instead of their own value: angles that go round
         and round, or anything else whose zero means nothing.
