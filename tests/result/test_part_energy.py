@@ -10,7 +10,20 @@ import pytest
 
 import atwood
 import atwood_library as lib
-from atwood import Component, Model, Point, Scalar, Scene, connect, connector, constraint, parameter, simulate, sin
+from atwood import (
+    Component,
+    Model,
+    Point,
+    Scalar,
+    Scene,
+    connect,
+    connector,
+    constraint,
+    parameter,
+    select,
+    simulate,
+    sin,
+)
 from atwood.errors import ResultError
 from atwood.result.part_energy import PartEnergies
 from atwood_library.scenes import SCENES
@@ -18,6 +31,7 @@ from atwood_library.scenes.atwood import Atwood
 from atwood_library.scenes.double_pendulum import DoublePendulum
 from atwood_library.scenes.rigid_bodies import RigidBodies
 
+from ..helpers.lagrangians import LeakingBucket
 from ..helpers.runs import FORMS
 
 
@@ -174,6 +188,22 @@ def test_impact_takes_energy_at_the_rope_that_comes_taut(form):
     assert parts["rope"].work["b"][-1] == pytest.approx(lost, rel=1e-6)
     assert parts["ball"].impacts[-1] == 0.0
     assert f"rope: {lost:.3g} J go by impacts" in parts.describe()
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("form", FORMS)
+def test_mass_that_is_dropped_takes_its_energy_along(form):
+    """Half of the mass goes at 0.5 s: with half of the kinetic energy ``m v^2 / 2`` and of that of its weight."""
+    scene = Scene(t_end=1.0)
+    bucket = scene.add("bucket", LeakingBucket(mass=lambda t: select(t < 0.5, 2.0, 1.0)))
+    probe = scene.add("probe", lib.PointMass(mass=0.0))
+    scene.connect(bucket.point, probe.point)
+    scene.start.update({"probe.position.x": 0.0, "probe.position.z": 0.0})
+    scene.start.update({"probe.velocity.x": 3.0, "probe.velocity.z": 1.0})
+    parts = check_balance(simulate(scene, form=form))
+    velocity, height = 1.0 - 0.5 * 9.81, 0.5 - 0.125 * 9.81
+    gone = 0.5 * (9.0 + velocity**2) + 9.81 * height
+    np.testing.assert_allclose(parts["bucket"].supplied[-1], -gone, atol=1e-6)
 
 
 @pytest.mark.sample(1)

@@ -255,10 +255,15 @@ def _sorted(keys: Sequence[Flow | str], rows: FloatArray, connectors: Connectors
 def _between(
     before: SegmentRecord, after: SegmentRecord, was: FloatArray, now: FloatArray, connectors: Connectors
 ) -> _Done:
-    """Return what is done between two segments: impulses, and potentials that come and go or follow a switch."""
-    paths = list(after.assembly.flat.parts)
-    jumps = zip(paths, (now - was)[:, 1], strict=True)
-    return {**_impulses(before, after, connectors), **{("supplied", path, ""): jump for path, jump in jumps if jump}}
+    """Return what is done between two segments: impulses, and energy that comes and goes with potentials and mass."""
+    found = _impulses(before, after, connectors)
+    for path, (kinetic, potential) in zip(after.assembly.flat.parts, now - was, strict=True):
+        come = float(potential)
+        if after.after_time_event and after.assembly.mechanism.locals_[path].varying:  # mass takes its energy along
+            come += float(kinetic) - sum(float(done) for (_, part, _), done in found.items() if part == path)
+        if come:
+            found["supplied", path, ""] = np.asarray(come)
+    return found
 
 
 def _impulses(before: SegmentRecord, after: SegmentRecord, connectors: Connectors) -> _Done:
