@@ -292,9 +292,12 @@ def run(scene: Scene, form: str, rtol: float = 1e-12) -> Result:
 
 
 def apart(found: Result, expected: Result, stand: Stand) -> tuple[float, float]:
-    """Return by how much a turned run differs: in motion, and in the forces of its pivots."""
+    """Return by how much a turned run differs, relative to the size: in motion, and in the forces of its pivots."""
     paths = ("pivot1.angle", "pivot3.angle", "pivot3.angular_velocity")
-    motion = max(float(np.max(np.abs(found.array(path) - expected.array(path)))) for path in paths)
+    motion = max(
+        float(np.max(np.abs(found.array(path) - there)) / max(1.0, np.max(np.abs(there))))
+        for path, there in ((path, expected.array(path)) for path in paths)
+    )
     gaps = []
     for pivot in ("pivot0", "pivot2"):
         here, there = (np.stack([one.array(f"{pivot}.force.{x}") for x in "xyz"], 1) for one in (found, expected))

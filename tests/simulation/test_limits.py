@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,11 @@ from atwood.clock import Clock, TimeIsUp, check_time, more_time, time_left, with
 from atwood.errors import ResultError
 from atwood.integrators import explicit_session
 from atwood.integrators.ida import native as ida_native
+from atwood.integrators.protocol import Budget, Status, StepResult
 from atwood.simulation.initialization import massless as massless_directions
+from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.run import tolerances as run_tolerances
+from atwood.simulation.run.session import SolverRequest
 from atwood_library.scenes import DoublePendulum, FourBar, FourBarRow, SimplePendulum
 
 FORMS = ("reduced", "dae")
@@ -144,3 +149,29 @@ def test_rounding_behind_a_singular_position_keeps_no_solver_from_going_on() -> 
     assert result.status == "finished"
     assert [one.ways for one in result.singular_crossings] == [2]
     assert result.energy.max_drift < 1e-9
+
+
+@pytest.mark.parametrize(("came", "begins"), [(1e-9, 0.0), (0.5, 0.5)])
+def test_larger_tolerances_are_tried_from_the_start_where_a_run_has_not_come_far(
+    monkeypatch: pytest.MonkeyPatch, came: float, begins: float
+) -> None:
+    """A start that one tolerance lets go wrong is none for another; what fails later, for another cause, does."""
+    asked: list[tuple[float, float]] = []
+
+    def opened(request: Any, solver: str, t: float, y: Any, yp: Any) -> Any:
+        asked.append((request.options.relative_tolerance, t))
+        ends = t + (1e-8 if request.options.relative_tolerance < 5e-12 else 0.05)
+        return SimpleNamespace(advance=lambda end: StepResult(ends, y, yp, Status.FAILED))
+
+    monkeypatch.setattr(run_tolerances, "open_implicit_session", opened)
+    flat = SimpleNamespace(flat=SimpleNamespace(name="scene"))
+    y = np.zeros(1)
+    options = RunOptions(t_end=1.0, relative_tolerance=1e-13)
+    plan: Any = SimpleNamespace(assembly=flat)
+    nothing: Any = None
+    request = SolverRequest(plan, nothing, options, 1.0, Budget(), nothing)
+    failed, start = (StepResult(t, y, y, Status.FAILED, message="no") for t in (came, 0.0))
+    error = run_tolerances.too_tight(request, "ida", failed, start)
+    assert error is not None
+    assert getattr(error, "tolerance", None) == pytest.approx(1e-11)
+    assert asked == [(pytest.approx(1e-12), begins), (pytest.approx(1e-11), begins)]

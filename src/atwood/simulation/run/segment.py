@@ -101,6 +101,7 @@ class _Runner:
         self.monitor: SingularityMonitor | None = None
         self.way_back: WayBack | None = None
         self.request: SolverRequest | None = None
+        self.opened: StepResult | None = None
         self.noted: list[EventRecord] = []
 
     def run(self, t: float, y: FloatArray, yp: FloatArray) -> Outcome:
@@ -219,7 +220,9 @@ class _Runner:
         if found is None:
             stuck = None if self.monitor is None else self.monitor.explain(step_result.message)
             tight = (
-                None if stuck or self.request is None else too_tight(self.request, self.choices[-1].solver, step_result)
+                None
+                if stuck or self.request is None
+                else too_tight(self.request, self.choices[-1].solver, step_result, self.opened)
             )
             from atwood.simulation.run.stuck import explain_stuck
 
@@ -251,7 +254,7 @@ class _Runner:
             from atwood.simulation.singular.monitor import singularity_monitor_of
 
             here = StepResult(t, y, yp, Status.REACHED)
-            self.request = request
+            self.request, self.opened = request, here
             self.monitor = singularity_monitor_of(segment.plan, options.relative_tolerance, segment.end, here)
             self.session = open_implicit_session(request, choice.solver, t, y, yp, self.monitor)
             if choice.goes_back:

@@ -27,6 +27,9 @@ _TRIAL = 300
 _ENOUGH = 1e-6
 """The share of the run that they must cover at least."""
 
+_FAR = 1e-2
+"""The same where they fail then: without the looks that a run takes at which constraints are kept."""
+
 
 def allowed(options: RunOptions) -> RunOptions:
     """Return options with a tolerance that the arithmetic can meet; it is said in a warning if that is another one.
@@ -47,10 +50,13 @@ def allowed(options: RunOptions) -> RunOptions:
     return replace(options, relative_tolerance=LEAST)
 
 
-def too_tight(request: SolverRequest, solver: str, failed: StepResult) -> SolveError | None:
+def too_tight(
+    request: SolverRequest, solver: str, failed: StepResult, opened: StepResult | None = None
+) -> SolveError | None:
     """Return the error of a run that failed since its tolerance is below what rounding allows; None if it is not.
 
-    Larger tolerances are tried from where it failed.
+    Larger tolerances are tried from where it failed, or from where it began, if it has not come far: the steps that it
+    took until then need not have been good ones.
 
     Parameters
     ----------
@@ -58,18 +64,23 @@ def too_tight(request: SolverRequest, solver: str, failed: StepResult) -> SolveE
         What was to be solved, and by which kind of IDA.
     failed
         How it ended.
+    opened
+        Where it began.
     """
     options, t = request.options, failed.t
     asked = options.relative_tolerance
     if asked > _TIGHT or not t < request.end:
         return None
+    is_near = opened is not None and t - opened.t < _ENOUGH * (request.end - opened.t)
+    here = opened if is_near and opened is not None else failed
     for factor in (10.0, 100.0, 1000.0):
         looser = replace(request, options=replace(options, relative_tolerance=factor * asked), budget=Budget(_TRIAL))
         try:
-            found = open_implicit_session(looser, solver, t, failed.y, failed.yp).advance(request.end)
+            found = open_implicit_session(looser, solver, here.t, here.y, here.yp).advance(request.end)
         except AtwoodError:
             continue
-        if found.status is not Status.FAILED and found.t - t >= _ENOUGH * (request.end - t):
+        share = _FAR if found.status is Status.FAILED else _ENOUGH
+        if found.t - here.t >= share * (request.end - here.t):
             error = SolveError(
                 f"the relative tolerance, {asked:g}, is below what rounding allows here: {failed.message}",
                 where=request.plan.assembly.flat.name,
