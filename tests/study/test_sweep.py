@@ -155,6 +155,24 @@ def hanging(damping: float = 1.0) -> Scene:
     return scene
 
 
+def far(space: str = "plane") -> Scene:
+    """Return a mass on a spring that hangs a kilometre from the origin."""
+    scene = Scene(t_end=1.0, space=space)
+    ground, bob = scene.add("ground", Ground(position=(1e3, 0.0, 0.0))), scene.add("bob", PointMass(mass=1.0))
+    spring = scene.add("spring", Spring(stiffness=100.0, natural_length=1.0))
+    scene.connect(ground.frame, spring.a)
+    scene.connect(spring.b, bob.point)
+    scene.start.update({"bob.position.x": 1e3, "bob.position.z": -1.0, "bob.velocity.x": 0.5, "bob.velocity.z": 0.0})
+    return scene
+
+
+@pytest.mark.parametrize("varied", [{"start": {"bob.position.z": [-0.8, -1.5]}}, {"vary": {"bob.mass": [0.5, 2.0]}}])
+def test_far_from_the_origin(varied: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Positions are counted from where it hangs, and so are the sizes that tolerances are relative to."""
+    options = {"outputs": 4, "threads": 1, **varied}
+    assert_same(sweep(far(), **options), one_by_one(monkeypatch, far(), **options))
+
+
 def test_damped_scenes_many_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     options = {"vary": {"damper.damping": [0.1, 1.0, 20.0]}, "outputs": 5, "threads": 1}
     assert_same(sweep(hanging(), **options), one_by_one(monkeypatch, hanging(), **options))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from atwood.arrays import FloatArray
@@ -21,10 +23,16 @@ __all__ = [
     "motion_names",
     "motion_scales",
     "multiplier_sizes",
+    "origin_part",
     "scene_length",
+    "size_of",
     "total_mass",
     "total_masses",
 ]
+
+
+Sizes: TypeAlias = "FloatArray | float"
+"""Of one scene, or of many."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +55,21 @@ class Scales:
 
     def of(self, unit: str) -> float:
         """Return the size of a quantity by the powers of mass, length and time in its SI unit; of an angle, one."""
-        masses, lengths, times, _ = parse_unit(unit).exponents
-        mass = self.force * self.time**2 / self.length
-        return mass**masses * self.length**lengths * self.time**times
+        return float(size_of(unit, self.length, self.time, self.force * self.time**2 / self.length))
+
+
+def size_of(unit: str, length: Sizes, time: Sizes, mass: Sizes) -> Sizes:
+    """Return the size of a quantity for one scene or for many, by the powers in its SI unit; of an angle, one.
+
+    Parameters
+    ----------
+    unit
+        Its SI unit.
+    length, time, mass
+        Sizes of the scenes, m, s and kg.
+    """
+    masses, lengths, times, _ = parse_unit(unit).exponents
+    return mass**masses * length**lengths * time**times
 
 
 def scene_length(assembly: Assembly) -> float:
@@ -61,11 +81,11 @@ def scene_length(assembly: Assembly) -> float:
     for path, value in assembly.flat.start.items():
         observable = assembly.start_observables.get(path)
         if observable is not None and observable.unit == "m":
-            sizes.append(abs(value - _at_origin(assembly, observable)))
+            sizes.append(abs(value - origin_part(assembly, observable)))
     return max(sizes) or 1.0
 
 
-def _at_origin(assembly: Assembly, observable: Observable) -> float:
+def origin_part(assembly: Assembly, observable: Observable) -> float:
     """Return the part of a quantity that is only where positions are counted from; 0 at the world's own origin."""
     mechanism = assembly.mechanism
     shift = sum((one for one in mechanism.table.origin if depends_on(observable.value, [one])), 0.0)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from atwood.arrays import FloatArray
+from atwood.arrays import BoolArray, FloatArray
 from atwood.expr import Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
@@ -29,7 +29,7 @@ from atwood.simulation.problem.problem import Plan
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode, EventData
 
-__all__ = ["EventProbe", "EventRecord", "find_event_functions"]
+__all__ = ["MARGIN", "EventProbe", "EventRecord", "find_event_functions", "margins_at_start"]
 
 _EVENT_FUNCTIONS: Key[tuple[EventFunction, ...]] = Key("event functions")
 _NEEDS: Key[_Needs] = Key("what event functions read")
@@ -95,12 +95,33 @@ def _find_needs(assembly: Assembly, event_functions: Sequence[EventFunction]) ->
     )
 
 
+MARGIN = 10.0
+"""What starts at zero must pass it by so many tolerances, lest errors of a step set it off."""
+
 _PASSED = 0.9
 """What has passed zero by this share of its margin at the start of a mode happens there.
 
 Equal parts pass their margins together. One of them ends the mode, and the others are at the end of theirs to rounding:
 a whole margin would leave them at zero, with a sign that nobody knows.
 """
+
+
+def margins_at_start(
+    functions: Sequence[EventFunction], values: FloatArray, small: FloatArray
+) -> tuple[BoolArray, FloatArray]:
+    """Return which events have happened where a mode starts, and what is added to those that start at zero.
+
+    Parameters
+    ----------
+    functions
+        What is watched.
+    values, small
+        Values of the events there, and their margins; the last axis is along the events, and so in what is returned.
+    """
+    directions = np.array([one.direction for one in functions], dtype=np.float64)
+    counts = np.array([not one.is_noted for one in functions], dtype=np.bool_)
+    happened: BoolArray = counts & (directions * values > _PASSED * small)
+    return happened, np.where(counts & (np.abs(values) <= small), -directions * small, 0.0)
 
 
 class EventProbe:
@@ -140,20 +161,11 @@ class EventProbe:
             if self.event_functions
             else None
         )
-        small = [10.0 * tolerance * plan.scales.of(one.unit) for one in self.event_functions]
+        small = np.array([MARGIN * tolerance * plan.scales.of(one.unit) for one in self.event_functions])
         self.shift = np.zeros(len(small))
         values = np.asarray(self.values(t, q, u)) if self.event_functions else np.zeros(0)
-        self.broken = next(
-            (
-                one
-                for one, v, s in zip(self.event_functions, values, small, strict=True)
-                if one.direction * v > _PASSED * s and not one.is_noted
-            ),
-            None,
-        )
-        for i, (one, value) in enumerate(zip(self.event_functions, values, strict=True)):
-            if abs(value) <= small[i] and not one.is_noted:
-                self.shift[i] = -one.direction * small[i]
+        happened, self.shift = margins_at_start(self.event_functions, values, small)
+        self.broken = next((one for one, has in zip(self.event_functions, happened, strict=True) if has), None)
 
     @property
     def directions(self) -> tuple[int, ...]:

@@ -20,6 +20,7 @@ from atwood.mechanics.kinematics.mechanism import extent
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.local.flatten import flatten
+from atwood.simulation.dynamics.scales import origin_part
 from atwood.simulation.initialization.many import meet_positions, meet_speeds, size_rows
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.initialization.system import Conditions, start_conditions
@@ -203,6 +204,7 @@ class StartRows:
             and not speeds.guessed
             and not equations.orientation_coordinates
             and starting(assembly) is assembly
+            and not (assembly.mechanism.table.origin and any(not axis.is_start for axis in request.cases.axes))
             and not (equations.constraints and assembly.mechanism.space.is_spatial)  # turns, and ways to assemble it
         )
         self.is_direct = is_simple and not self._start_is_bound()
@@ -213,7 +215,7 @@ class StartRows:
             self._conditions = self._found(equations, speeds, True), places
         flat = assembly.flat
         self._lengths = [
-            columns.get(path, value)
+            columns.get(path, value) - origin_part(assembly, assembly.start_observables[path])
             for path, value in flat.start.items()
             if assembly.start_observables[path].unit == "m"
         ]

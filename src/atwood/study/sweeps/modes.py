@@ -20,9 +20,9 @@ from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Statu
 from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
-from atwood.simulation.dynamics.scales import total_masses
+from atwood.simulation.dynamics.scales import size_of, total_masses
 from atwood.simulation.events.margins import without_margin
-from atwood.simulation.events.modes import EventProbe, EventRecord
+from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, margins_at_start
 from atwood.simulation.problem.explicit_scene import explicit_problem_of, own_rates
 from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.run.choice import choose
@@ -118,19 +118,13 @@ class SweepMode:
         bound = self.assembly.parameter_values if values is None else values.T
         kernel = self.assembly.compiled(self.program, vectorized=True).bind(bound)
         found = np.broadcast_to(kernel(t[None, :], q.T, u.T, np.zeros((count, runs)))[0], (count, runs)).T
-        small = np.full((runs, count), 10.0 * tolerance)
+        mass = total_masses(self.assembly, values)
+        small = np.empty((runs, count))
         for k, one in enumerate(self.functions):
-            if one.unit == "m":
-                small[:, k] *= lengths
-            elif one.unit == "m/s":
-                small[:, k] *= lengths / time
-            elif one.unit == "N":
-                small[:, k] *= total_masses(self.assembly, values) * lengths / time**2
-        directions = np.array([one.direction for one in self.functions], dtype=float)
-        shifts = np.where(np.abs(found) <= small, -directions * small, 0.0)
-        holds = ~np.any(directions * found > small, axis=1)
+            small[:, k] = MARGIN * tolerance * size_of(one.unit, lengths, time, mass)
+        happened, shifts = margins_at_start(self.functions, found, small)
         known = np.all(np.isfinite(found), axis=1) & np.all(found + shifts != 0.0, axis=1)
-        return shifts, holds & known
+        return shifts, known & ~np.any(happened, axis=1)
 
     def run(
         self,
