@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from atwood import Scene, assemble, simulate
+from atwood import Scene, UsageError, assemble, simulate
 from atwood.arrays import FloatArray
 from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.explicit_session import open_explicit
@@ -37,6 +38,7 @@ from atwood_library.scenes import (
 from ..helpers.mechanisms import parallel_four_bar
 from ..helpers.runs import FORMS
 from ..scenes.test_turned_mechanisms import BASES, stands_on
+from .test_not_compilable import Odd, Plain, looped
 
 
 def opened(scene: Scene, form: str) -> tuple[Plan, ExplicitProblem, FloatArray]:
@@ -227,3 +229,20 @@ def test_what_has_no_inertia_of_its_own_is_carried_by_what_has(form: str) -> Non
 def test_what_has_no_constraints_runs_in_the_dae_form_too(scene: Scene) -> None:
     one, other = (simulate(scene, form=form, t_end=1.0, rtol=1e-11, solver="explicit", outputs=3) for form in FORMS)
     assert_allclose(one.energy.kinetic, other.energy.kinetic, rtol=1e-9)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_functions_in_python_take_the_same_steps(form: str) -> None:
+    ends = []
+    for kind in (Plain, Odd):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # it says that Python is called
+            result = simulate(looped(kind), form=form, t_end=0.3, rtol=1e-8, solver="explicit", outputs=3)
+        ends.append((result["crank.angle"][-1], result.statistics.steps))
+    assert_allclose(ends[0], ends[1], rtol=1e-9)
+
+
+def test_series_are_refused_where_constraints_stay() -> None:
+    with pytest.raises(UsageError, match="Taylor series") as caught:
+        simulate(Bricard(), solver="taylor", t_end=0.1)
+    assert "'explicit'" in str(caught.value)
