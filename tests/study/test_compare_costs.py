@@ -13,7 +13,7 @@ from atwood import Comparison, UsageError, compare
 from atwood.cli.app import main
 from atwood.cli.scenes import bundled_scenes
 from atwood.integrators.protocol import Statistics
-from atwood.plotting.comparison_page import write_page
+from atwood.plotting.comparison_page import _cost, write_page
 from atwood.plotting.plots.precision import plot_comparison, style_of
 from atwood.study.comparison.found import ComparisonRow
 from atwood.study.comparison.reference import Reference
@@ -92,6 +92,34 @@ def test_forms_keep_their_colours_whatever_else_is_shown():
 def test_time_for_all_runs_is_limited():
     rows = compare(SimplePendulum(), rtols=(1e-5,), t_end=0.5, total_seconds=1e9).rows
     assert not [row.reason for row in rows if row.reason]
+
+
+def test_time_that_went_into_compiling_is_given_again(monkeypatch):
+    from importlib import import_module
+
+    module = import_module("atwood.study.comparison.compare")
+    inner, calls = module.run_form, []
+
+    def late(assembled, form, level, rtol, t_end, outputs, *rest):
+        result = inner(assembled, form, level, rtol, t_end, outputs, *rest)
+        calls.append(result)
+        if len(calls) == 1:
+            object.__setattr__(result.run, "status", "time_limit")
+            object.__setattr__(result.statistics, "steps", 0)
+        return result
+
+    monkeypatch.setattr(module, "run_form", late)
+    row = compare(SimplePendulum(), rtols=(1e-5,), forms=("dae",), levels=("ggl",), t_end=0.5).rows[0]
+    assert not row.reason
+    assert row.error is not None
+
+
+def test_costs_of_errors_between_runs_and_beyond_them():
+    points = [(1e-4, 1.0), (1e-6, 2.0)]
+    assert _cost(points, 1e-5) == pytest.approx(2.0**0.5)
+    assert _cost(points, 1e-2) == 1.0  # more accurate is no worse
+    assert _cost(points, 1e-9) is None
+    assert _cost([], 1e-2) is None
 
 
 class _Page(HTMLParser):

@@ -91,11 +91,18 @@ def _overview(comparisons: Sequence[Comparison], labels: Sequence[str]) -> str:
     return f"<h2>All scenes: ms for errors of {said}</h2><table>{''.join(rows)}</table>"
 
 
+def _cost(points: list[tuple[float, float]], error: float) -> float | None:
+    """Return the time for an error: between the runs, or that of the cheapest where all are more accurate."""
+    if points and max(errs for errs, _ in points) < error:
+        return min(wall for _, wall in points)
+    return cost_at(points, error) if points else None
+
+
 def _costs_of(one: Comparison, labels: Sequence[str]) -> str:
     costs: dict[str, list[float | None]] = {}
     for label in labels:
         points = [(max(row.error or 0.0, 1e-16), row.wall_s) for row in one.rows if row.label == label and row.wall_s]
-        costs[label] = [cost_at(points, error) if points else None for error in _ERRORS]
+        costs[label] = [_cost(points, error) for error in _ERRORS]
     least = [min((c[k] or math.inf for c in costs.values()), default=math.inf) for k in range(len(_ERRORS))]
 
     def text(cost: float | None, best: float) -> str:
