@@ -89,3 +89,15 @@ def test_a_speed_that_nothing_can_have_is_measured_as_a_speed(scale: float) -> N
     scene.start["body.velocity.z"] = -3e-3 * scale
     with pytest.raises(StartError, match=r"body\.velocity\.z"):
         simulate(scene, t_end=1e-3 / scale, outputs=2)
+
+
+def test_what_another_run_has_left_of_a_speed_is_a_start() -> None:
+    """States are handed on as they are, with numbers whose squares are none."""
+    scene = Scene(space="plane", gravity=0.0)
+    ground, pivot = scene.add("ground", Ground()), scene.add("pivot", Pivot())
+    link = scene.add("link", Link(length=1.0, mass=1.0))
+    scene.connect(ground.frame, pivot.a)
+    scene.connect(pivot.b, link.a)
+    scene.start.update({"pivot.angle": 0.3, "pivot.angular_velocity": 1.6e-206})
+    found = simulate(scene, t_end=0.1, outputs=2)
+    assert found["pivot.angle"][-1] == pytest.approx(0.3, abs=1e-15)

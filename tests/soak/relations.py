@@ -97,7 +97,15 @@ def moved_and_turned(mechanism: Mechanism, random: np.random.Generator) -> Relat
             replace(new, rotation=old.rotation, center=turn @ old.center)
             for new, old in zip(bodies, mechanism.bodies, strict=True)
         )
+        ties = tuple(_turned_on_line(new, old, turn) for new, old in zip(ties, mechanism.ties, strict=True))
     return Related(replace(mechanism, bodies=bodies, ties=ties, line=turn @ mechanism.line), str, turn, shift)
+
+
+def _turned_on_line(tie: Tie, before: Tie, turn: Array) -> Tie:
+    """Return a tie whose mounts keep their axes, with its own direction turned: along another line."""
+    mounts = tuple(replace(new, rotation=old.rotation) for new, old in zip(tie.mounts, before.mounts, strict=True))
+    values = {**tie.values, "axis": turn @ tie.values["axis"]} if "axis" in tie.values else tie.values
+    return replace(tie, mounts=mounts, values=values)
 
 
 def _placed(tie: Tie, turn: Array, shift: Array) -> Tie:

@@ -16,6 +16,9 @@ __all__ = ["StartValues"]
 
 _NUMBER = ParameterSpec(0.0, "1", "A start value.")
 
+_NOTHING = 1e-100
+"""Values of starts below this are zero: nothing divides by them, and other numbers of any unit are larger."""
+
 
 class StartValues(MutableMapping[str, Any]):
     """Start values by path: numbers in SI units, text with a unit, or parameters of the scene.
@@ -82,6 +85,8 @@ def _checked(path: Any, value: Any, where: str) -> Any:
             parse_unit(unit_text)
         except AtwoodError as error:
             raise StartError(error.message, where=full, advice=error.advice) from None
+    if not isinstance(value, str) and isinstance(number, (int, float)) and abs(number) < _NOTHING:
+        number = 0.0  # what rounding has left of a state of another run; its square is no number, and it says no more
     try:
         checked = _NUMBER.check(number, full)
     except AtwoodError as error:
