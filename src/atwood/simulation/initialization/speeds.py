@@ -19,6 +19,9 @@ from atwood.tolerances import tolerances
 
 __all__ = ["solve_speeds"]
 
+_KNOWN = 1e-6
+"""Rounding of what is prescribed counts where it is no larger share of what moves."""
+
 
 def _least_rates(assembly: Assembly, level: Level, rows: FloatArray, length: float, fastest: float) -> FloatArray:
     """Return for each condition what counts as nothing: rounding beside what is fastest, or not seen in all the time.
@@ -113,7 +116,8 @@ def solve_speeds(
         rows = row_scales(matrix, scales, errors)
         u = u - scales * least_norm(scaled(matrix, scales, rows), residual / rows)
         fastest = float(np.max(np.abs(u / scales), initial=0.0))
-        if fastest > 0.0:  # a row that changes little is known no better than what is prescribed in it rounds
+        # A row that changes little is known no better than what is prescribed in it rounds; at rest that says nothing.
+        if float(np.max(prescribed, initial=0.0)) < _KNOWN * fastest * float(np.max(rows, initial=0.0)):
             errors = np.maximum(errors, prescribed / fastest)
     residual, matrix = system.at(t, q, u)
     if residual.size:
