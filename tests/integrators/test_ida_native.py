@@ -592,6 +592,7 @@ class TestLife:
 
     def test_what_nobody_uses_is_freed_with_the_next_and_not_in_a_finalizer(self) -> None:
         """Whatever a finalizer raises is lost, Ctrl-C too."""
+        gc.collect()  # sessions of other tests
         memory._free_dead()
         freed: list[int] = []
         session = self.open()

@@ -130,13 +130,15 @@ def _runs() -> Iterator[Call]:
             "structure": "flag",
             "atol": "optional positive",
             "accuracy": "optional error",
+            "nominal": "mapping",
             "order": "optional order",
             "step": "optional positive",
             "monitor": "optional object",
             "until": "stop condition",
             "record": "stop condition",
         },
-        said_as={"until": ("crosses",), "record": ("crosses",)},
+        also={"nominal": ({"rod1.angle": "x"}, {"rod1.angle": -1.0}, {"rod1.angle": "1 m"}, {3: 1.0}, {"rod9": 1.0})},
+        said_as={"until": ("crosses",), "record": ("crosses",), "nominal": ("rod1.angle", "3", "rod9")},
     )
     yield Call(
         "sweep",
@@ -151,6 +153,7 @@ def _runs() -> Iterator[Call]:
             "outputs": "optional times",
             "threads": "optional whole",
             "executor": "optional object",
+            "accuracy": "optional error",
             "name": "text",
         },
         also={
@@ -171,6 +174,7 @@ def _runs() -> Iterator[Call]:
             "levels": "texts",
             "outputs": "whole",
             "max_seconds": "optional positive",
+            "total_seconds": "optional positive",
             "name": "text",
             "progress": "callback",
         },
