@@ -242,6 +242,7 @@ class _Search:
             if moments:
                 self._boost(axis, name, told, moments, linear, angular)
         for axis, moved in rotations_of(scaled, n, straight):
+            moved = np.where(np.abs(moved) < 1e-9 * np.max(np.abs(axis)), 0.0, moved)  # rounding of where the axis is
             about = length * moved  # a rotation in its own units
             coefficients = np.concatenate([about, axis])
             every = [*motions.momentum, *motions.angular_momentum]

@@ -212,7 +212,9 @@ class RandomStates:
         slopes = slopes.reshape(self._count, -1)
         still = np.zeros_like(gamma)
         flows = [solve_balance(replace(now, bias=-one, gamma=still), kept, t)[0] for one in slopes[:, -n:]]
-        # Accelerations are known as well as the largest of them, each in its own size.
-        fastest = sizes * float(np.max(np.abs(a) / sizes, initial=0.0))
+        # Accelerations are known as well as the largest of them, each in its own size; and as squares of speeds,
+        # which cancel where they are zero.
+        pace, rate_of_pace = (float(np.max(np.abs(one) / sizes, initial=0.0)) for one in (u, a))
+        fastest = sizes * max(rate_of_pace, pace**2)
         terms = np.abs(slopes) @ np.concatenate([[1.0], np.abs(rates), np.maximum(np.abs(a), fastest)])
         return State(t, q, u, quantities, slopes @ along, terms, np.reshape(flows, (self._count, n)))
