@@ -70,7 +70,6 @@ MOST_FILES = 20
 
 LONG_FILES = {
     "forms/accelerations.py",
-    "forms/program.py",
     "integrators/explicit_session.py",
     "integrators/ida/native.py",
     "simulation/run/segment.py",

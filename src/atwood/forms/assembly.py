@@ -16,17 +16,12 @@ from atwood.codegen import BoundKernel, CompiledProgram, compile_program
 from atwood.errors import UsageError
 from atwood.expr import Expression, Program
 from atwood.expr.core.relations import Relation, values_just_after
+from atwood.forms.balance_program import BalanceProgram, RatesProgram, balance_program, rates_program
 from atwood.forms.by_hand import as_by_hand
 from atwood.forms.dae import dae_form, keep_constraints
 from atwood.forms.kept import Kept, Key
 from atwood.forms.places import with_reactions
-from atwood.forms.program import (
-    BalanceProgram,
-    FormProgram,
-    RatesProgram,
-    balance_program,
-    rates_program,
-)
+from atwood.forms.program import FormProgram
 from atwood.forms.reassembly import follow, other_mode, with_flat
 from atwood.forms.reduced import reduced_form
 from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared

@@ -12,7 +12,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
-from atwood.forms.program import BalanceProgram
+from atwood.forms.balance_program import BalanceProgram
 from atwood.late import dataclass
 from atwood.linalg.matrices import (
     Matrix,

@@ -16,7 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly, Coordinates
-from atwood.forms.program import RatesProgram
+from atwood.forms.balance_program import RatesProgram
 from atwood.mechanics.dynamics.equations import Equations
 
 __all__ = ["KinematicMap", "best_rough_orientation", "kinematic_map_of", "orientations", "reference_coordinates"]

@@ -17,9 +17,9 @@ from atwood.arrays import FloatArray
 from atwood.errors import SolveError
 from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.balance_program import BalanceProgram
 from atwood.forms.kept import Key
 from atwood.forms.places import internal_reactions_of, to_maximal
-from atwood.forms.program import BalanceProgram
 from atwood.late import dataclass
 from atwood.linalg.matrices import is_best_full
 from atwood.simulation.dynamics.balance import balance_of

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError
-from atwood.forms.program import BalanceProgram
+from atwood.forms.balance_program import BalanceProgram
 from atwood.linalg.sparse_batch import Augmented, Borders, Normal, Pattern
 
 __all__ = ["States"]
