@@ -41,6 +41,23 @@ def test_symplectic_errors_stay_and_others_grow(pendulum):
     assert "does not grow with reduced, gauss, rtol 1e-08." in pendulum.verdict
 
 
+@pytest.mark.parametrize(
+    ("errors", "grows"),
+    [
+        ((4e-10, 4.5e-8, 9e-8), True),  # in proportion to the time
+        ((1e-7, 2e-4, 1.6e-4), False),  # of bounded size, which the first periods do not show
+        ((2e-15, 3e-15, 4e-15), False),  # rounding
+        ((1e-9, 3e-9, None), True),
+        ((1e-9, None, None), False),
+    ],
+)
+def test_what_grows_is_told_from_the_last_marks(errors, grows):
+    assert (
+        long_runs.LongRow("reduced", "taylor", 1e-8, (1, 5 if errors[-1] is None else 10, 20), energy=errors).grows
+        is grows
+    )
+
+
 def test_how_long_a_run_is_does_not_change_its_first_errors(pendulum):
     shorter = compare_long(SimplePendulum(), periods=10)
     for form, solver in (("reduced", "gauss"), ("reduced", "ida")):

@@ -33,9 +33,6 @@ _WINDOW = 50
 _CONSERVED = 1e-9
 """Of the energy that is exchanged: with more work than this the energy is not conserved."""
 
-_GROWS = 3.0
-"""An error that at the end is so many times that of the first periods grows."""
-
 _METHODS = (
     ("reduced", "gauss", 1e-8),
     ("reduced", "taylor", 1e-8),
@@ -54,6 +51,8 @@ class LongRow:
     ----------
     form, solver, rtol
         How it was made.
+    marks
+        After how many periods errors were taken.
     reached
         To how many periods it came in the time that there was.
     steps, wall_s
@@ -70,6 +69,7 @@ class LongRow:
     form: str
     solver: str
     rtol: float
+    marks: tuple[int, ...] = ()
     reached: float = 0.0
     steps: int = 0
     wall_s: float = 0.0
@@ -84,9 +84,15 @@ class LongRow:
 
     @property
     def grows(self) -> bool:
-        """Whether its error of the energy is larger at the end than in the first periods."""
-        known = [max(one, 1e-15) for one in self.energy if one is not None]
-        return len(known) > 1 and known[-1] > _GROWS * max(known[:-1][:2])
+        """Whether its error of the energy grows: at the end by more than the root of the time since the mark before.
+
+        Errors of bounded size do not, whenever they reach it, and those of rounding grow with that root.
+        """
+        known = [(mark, max(one, 1e-15)) for mark, one in zip(self.marks, self.energy, strict=True) if one is not None]
+        if len(known) < 2:
+            return False
+        (before, _), (end, last) = known[-2:]
+        return last > math.sqrt(end / before) * max(one for _, one in known[:-1])
 
 
 @dataclass(frozen=True)
@@ -267,6 +273,7 @@ def _row(row: LongRow, result: Result, begin: float, sizes: tuple[float, float],
         row.form,
         row.solver,
         row.rtol,
+        tuple(marks),
         float(result.run.segments[-1].time[-1] - begin) / sizes[0],
         result.statistics.steps,
         result.statistics.seconds,
