@@ -12,7 +12,6 @@ import numpy as np
 
 from atwood.arguments import each, instance, takes, whole
 from atwood.errors import AtwoodError
-from atwood.forms.assembly import Assembly
 from atwood.forms.canonical import is_canonical
 from atwood.forms.dae import LEVELS
 from atwood.integrators.protocol import Statistics
@@ -22,11 +21,8 @@ from atwood.model.local.flatten import flatten
 from atwood.pipeline import assemble_flat
 from atwood.progress import told
 from atwood.result.result import Result
-from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRESS, RTOL, T_END, check_span
-from atwood.simulation.problem.closed_loops import solve_at
 from atwood.simulation.problem.options import SOLVERS
-from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.run.choice import implicit_solver
 from atwood.study.comparison.environment import environment
 from atwood.study.comparison.found import Comparison, ComparisonRow
@@ -181,23 +177,15 @@ def _kinds(assembled: Assembled, forms: Sequence[str], levels: Sequence[str]) ->
     assembly = assembled("dae", "ggl")
     if "reduced" in forms:
         yield "reduced", "", shared
-        if assembly.reduced.coordinates and not assembly.reduced.constraints:
+        if assembly.reduced.coordinates:
             yield "reduced", "", "explicit"
-            if is_canonical(assembly):
-                yield "reduced", "", "gauss"
-        elif assembly.reduced.constraints and _formulas_solve(assembled("reduced", "ggl")):
-            yield "reduced", "", "explicit"
+        if is_canonical(assembly):
+            yield "reduced", "", "gauss"
     if "dae" in forms:
         has_constraints = bool(assembly.maximal.constraints)
         yield from (("dae", level, shared) for level in (levels if has_constraints else levels[:1]))
-
-
-def _formulas_solve(assembly: Assembly) -> bool:
-    """Return whether formulas solve the closed loops of a scene where it starts."""
-    start = find_start(assembly)
-    q, u = own_state(assembly, start)
-    plan = make_plan(assembly, start.time, q, u, start.length, 1.0)
-    return solve_at(plan, start.time, q, u) is not None
+        if has_constraints:  # levels say how constraints enter the residual, which explicit steps do not have
+            yield "dae", "", "explicit"
 
 
 def _measure(
