@@ -185,7 +185,7 @@ SAID = {
     "saved": ("SavedResult of Chain", "reduced form", "finished", "400 output times"),
     "loop": ("Result of FourBar", "dae form (ggl)"),
     "report": ("MechanismReport of Chain", "30 degrees of freedom", "30 bodies"),
-    "comparison": ("Comparison of FourBar", "10 runs"),
+    "comparison": ("Comparison of FourBar", "12 runs"),
     "long comparison": ("LongComparison of SimplePendulum", "10 periods"),
     "sweep": ("Sweep of Chain", "40 runs", "rod[0].angle 0 to 1 rad", "40 finished"),
 }
