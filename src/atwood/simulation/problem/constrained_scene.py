@@ -7,7 +7,7 @@ state is taken onto the constraints on position and velocity, in the metric in w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.integrators.explicit_problem import MET, STEPS, CompiledRates, ExplicitProblem
 from atwood.integrators.protocol import FloatArray, Values
+from atwood.simulation.problem.explicit_scene import first_order
 from atwood.simulation.problem.problem import Plan
 from atwood.topology.groups import connected_groups
 
@@ -60,16 +61,12 @@ def constrained_problem(
     kernel = assembly.compiled(program.accelerations).bind(values)
     nearer = assembly.compiled(program.projection).bind(values)
 
-    def rates(t: float, y: FloatArray) -> Sequence[float]:
-        found = kernel([t], y[:n], y[n:])
-        return [*(y[n:] if len(found) == 1 else found[0]), *found[-1]]
-
     def project(t: float, y: FloatArray) -> FloatArray:
         return _projected(nearer, t, y, n)
 
     return ExplicitProblem(
         size=n + m,
-        rates=rates,
+        rates=first_order(kernel, n),
         events=events,
         event_count=len(directions),
         event_directions=directions,

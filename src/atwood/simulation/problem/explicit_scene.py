@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING
 
+from atwood.codegen import BoundKernel
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
@@ -15,7 +16,7 @@ from atwood.integrators.protocol import FloatArray, Values
 if TYPE_CHECKING:
     from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
 
-__all__ = ["compiled_rates", "explicit_problem", "explicit_problem_of", "own_rates"]
+__all__ = ["compiled_rates", "explicit_problem", "explicit_problem_of", "first_order", "own_rates"]
 
 _EXTERNAL: Key[bool] = Key("whether accelerations call functions in Python")
 _COMPILED: Key[CompiledAccelerations] = Key("machine code of accelerations")
@@ -72,18 +73,25 @@ def explicit_problem_of(
     _, n, m = (len(group.symbols) for group in program.program.inputs)
     kernel = assembly.compiled(program.program).bind(values)
 
-    def rates(t: float, y: FloatArray) -> Sequence[float]:
-        found = kernel([t], y[:n], y[n:])
-        return [*(y[n:] if len(found) == 1 else found[0]), *found[-1]]
-
     return ExplicitProblem(
         size=n + m,
-        rates=rates,
+        rates=first_order(kernel, n),
         events=events,
         event_count=len(directions),
         event_directions=directions,
         compiled=_compiled(assembly, program, values),
     )
+
+
+def first_order(kernel: BoundKernel, coordinates: int) -> Callable[[float, FloatArray], Sequence[float]]:
+    """Return the rates of ``y = (q, u)`` from a kernel of accelerations, or of (q', u') where q' is not u."""
+
+    def rates(t: float, y: FloatArray) -> Sequence[float]:
+        u = y[coordinates:]
+        found = kernel([t], y[:coordinates], u)
+        return [*(u if len(found) == 1 else found[0]), *found[-1]]
+
+    return rates
 
 
 def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAccelerations:
