@@ -30,8 +30,8 @@ from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, shapes
 from atwood.model.declare.binding import bind
 from atwood.model.local.laws import LocalConstraint
+from atwood.model.local.output_values import output_value
 from atwood.model.local.parts import LocalState, multiplier_symbol
-from atwood.model.returned import law_value
 from atwood.model.values.vector import Vector
 from atwood.topology.spanning_forest import Coordinate, SpanningForest
 
@@ -220,7 +220,8 @@ def resolve_signals(
     Raises
     ------
     DeclarationError
-        If inputs feed each other in a circle, or an output needs what is known only after the forces are.
+        If inputs feed each other in a circle, or an output has no meaning here or needs what is known only after the
+        forces are.
     """
     with mechanism.relations.reading():
         found = _resolved(mechanism, site, kinematics)
@@ -235,19 +236,8 @@ def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[
         if name not in mechanism.locals_[path].signal_symbols:
             continue  # a function of time, which is in place already
         local = mechanism.locals_[source]
-        law, _, axis = observable.partition(".")
         inputs = replace(local.binding, values={**local.binding.values, **local.signal_symbols})
-        bound = bind(local.part.component, inputs)
-        is_reaction = observable in local.binding.reactions
-        value = bound.reaction(observable) if is_reaction else law_value(bound, law)
-        if isinstance(value, Vector):
-            if axis not in ("x", "y", "z"):
-                raise DeclarationError(
-                    "it is a vector",
-                    where=f"{source}.{observable}",
-                    advice=f"Connect {observable}.x or {observable}.z.",
-                )
-            value = getattr(value, axis)
+        value = output_value(local.part, bind(local.part.component, inputs), observable, mechanism.space)
         (value,), _ = in_joint_coordinates(local, kinematics, [site.graph.convert(value)])
         placed = put_in_place(value, local_map(site, local, kinematics))
         raw[mechanism.locals_[path].signal_symbols[name]] = placed

@@ -267,7 +267,8 @@ def _readable_reactions(
             for name in law.options.reactions:
                 found |= dict.fromkeys((name, *(f"{name}.{axis}" for axis in "xyz")), 0.0)
     for one in constraints:
-        found[one.reaction] = one.sign * multiplier_symbol(graph, part.path, one.law.name, one.index)
+        acts = not one.value.is_zero  # across a plane nothing does
+        found[one.reaction] = one.sign * multiplier_symbol(graph, part.path, one.law.name, one.index) if acts else 0.0
     return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import field
-from functools import partial
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError
@@ -12,8 +11,9 @@ from atwood.late import dataclass
 from atwood.model.declare.binding import Binding, bind
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.local.flatten import FlatScene, Part
+from atwood.model.local.output_values import output_value
 from atwood.model.local.states import state_values
-from atwood.model.returned import call_law, law_value
+from atwood.model.values.space import make_space
 from atwood.model.values.vector import Vector
 
 __all__ = ["ParameterTable", "read_parameter", "read_signal", "read_variation", "variation_names"]
@@ -119,5 +119,4 @@ def _source_value(source: Part, observable: str, flat: FlatScene, time: Expressi
     values |= {name: read_signal(source, name, given, flat, time, table, {}) for name, given in source.signals.items()}
     values |= state_values(source, table.graph)
     bound = bind(source.component, Binding(values=values, time=time))
-    law = next(law for law in source.component.laws("observable") if law.name == observable)
-    return table.graph.convert(call_law(source.path, law, partial(law_value, bound, law.name)))
+    return table.graph.convert(output_value(source, bound, observable, make_space(flat.space, flat.line_axis)))
