@@ -28,6 +28,7 @@ from atwood.expr import (
     substitute,
 )
 from atwood.expr.simplify.collect import cost
+from atwood.expr.simplify.polynomial import Effort
 from atwood.forms.derived import derive_once
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
@@ -71,6 +72,9 @@ _MUCH = 400
 
 _SMALL = 300
 """Expressions of up to so many nodes are rewritten."""
+
+_EFFORT = 1000
+"""So many operations on single terms for each unknown are spent on that: several times what it takes in a chain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,6 +261,7 @@ class _Tree:
         self.parameters = assembly.parameters
         self.u = self.reduced.speeds
         self.differences = True
+        self.effort = Effort(_EFFORT * (len(self.maximal.speeds) + len(self.maximal.constraints)))
         self.rewrites = not self.maximal.orientation_coordinates
         self.angles = [q for q, c in zip(self.reduced.coordinates, self.reduced.names, strict=True) if c.unit == "rad"]
         outputs = to_maximal(assembly).outputs
@@ -285,7 +290,7 @@ class _Tree:
         used = {node.index for node in nodes}
         angles = [a for a in self.angles if a.index in used] if self.differences else []
         parameters = [node for node in nodes if node.is_symbol and node.is_parametric]
-        return collect(values, angles, parameters)
+        return collect(values, angles, parameters, effort=self.effort)
 
     def _bodies_of_speeds(self) -> list[int]:
         forest = self.maximal.forest

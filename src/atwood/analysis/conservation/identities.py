@@ -12,6 +12,7 @@ from collections.abc import Collection
 from atwood.expr import Expression
 from atwood.expr.simplify.polynomial import (
     Atom,
+    Effort,
     Expansion,
     Monomial,
     Polynomial,
@@ -64,7 +65,7 @@ def _expanded(value: Expression, angles: Collection[Expression]) -> tuple[Expans
     """Return the polynomial of an expression, and those of what it divides by and of what stands under its roots."""
     inner: list[Expression] = []
     for _ in range(_ROUNDS):
-        expansion = expand([value, *inner], tuple(angles), (), _TERMS, _BUDGET)  # parameters as any symbols
+        expansion = expand([value, *inner], tuple(angles), (), _TERMS, Effort(_BUDGET))  # parameters as any symbols
         asked = [one for one in map(_inside, expansion.atoms) if one is not None]
         new = [one for one in dict.fromkeys(asked) if one not in inner]
         if not new:

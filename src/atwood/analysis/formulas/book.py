@@ -44,6 +44,7 @@ from atwood.expr.simplify.polynomial import (
     ONE,
     Atom,
     Coefficient,
+    Effort,
     Expansion,
     Monomial,
     Polynomial,
@@ -151,9 +152,9 @@ class Book:
 
     def _expanded(self, values: Sequence[Expression]) -> Expansion:
         try:
-            return expand(values, self.angles, self.parameters, LIMIT, _BUDGET)
+            return expand(values, self.angles, self.parameters, LIMIT, Effort(_BUDGET))
         except TooLargeError:
-            return expand(values, self.angles, self.parameters, LIMIT, _BUDGET, 1)
+            return expand(values, self.angles, self.parameters, LIMIT, Effort(_BUDGET), 1)
 
     def _with_unit_quaternions(self, expansion: Expansion, row: Polynomial) -> Polynomial:
         """Return a polynomial in which quaternions have size one: in its one form, with no square of the first part.
@@ -174,7 +175,7 @@ class Book:
         key = atom.argument.index, quaternion[0].index
         if key not in self._norms:
             try:
-                found = expand([atom.argument], (), self.parameters, 4, 100)
+                found = expand([atom.argument], (), self.parameters, 4, Effort(100))
                 wanted = [found.numbers.get(Atom("node", part), -1) for part in quaternion]
                 self._norms[key] = found.rows[0] == {((number, 2),): {ONE: 1.0} for number in wanted}
             except TooLargeError:

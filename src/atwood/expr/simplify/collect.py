@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from atwood.expr.core.analysis import count_operations
 from atwood.expr.core.graph import Expression
 from atwood.expr.simplify.emission import Emitter, Term, share_products, sum_terms, terms_of
-from atwood.expr.simplify.polynomial import Expansion, Polynomial, TooLargeError, expand, volume
+from atwood.expr.simplify.polynomial import Effort, Expansion, Polynomial, TooLargeError, expand, volume
 from atwood.expr.simplify.trigonometry import join_squares, products_of_waves, sum_of_waves
 
 _WEIGHTS = {"add": 1, "sub": 1, "mul": 1, "neg": 1, "div": 4, "sqrt": 6}
@@ -43,6 +43,7 @@ def collect(
     angles: Collection[Expression],
     parameters: Collection[Expression],
     limit: int = 400,
+    effort: Effort | None = None,
 ) -> list[Expression]:
     """Rewrite expressions with fewer operations, or return them as they are.
 
@@ -58,6 +59,8 @@ def collect(
         coefficients.
     limit
         The largest number of terms of a row to work with.
+    effort
+        What this and other calls may spend together.
 
     Returns
     -------
@@ -68,7 +71,7 @@ def collect(
     best = list(rows)
     lowest = cost(best, parameters)
     found: list[list[Expression]] = []
-    for candidate in _candidates(rows, angles, parameters, limit, lowest):
+    for candidate in _candidates(rows, angles, parameters, limit, lowest, effort):
         found.append(candidate)
         price = cost(candidate, parameters)
         if price < lowest:
@@ -97,13 +100,14 @@ def _candidates(
     parameters: Collection[Expression],
     limit: int,
     lowest: int,
+    effort: Effort | None,
 ) -> Iterator[list[Expression]]:
     """Yield the rows written in other ways."""
     try:
-        expansion = expand(rows, angles, parameters, limit, _BUDGET)
+        expansion = expand(rows, angles, parameters, limit, Effort(_BUDGET, effort))
     except TooLargeError:
         try:
-            expansion = expand(rows, angles, parameters, limit, _BUDGET, _LONGEST)
+            expansion = expand(rows, angles, parameters, limit, Effort(_BUDGET, effort), _LONGEST)
         except TooLargeError:
             return
     if sum(map(len, expansion.rows)) > 2 * lowest:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import field
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 from atwood.expr.core.analysis import live, varying
@@ -57,6 +58,22 @@ class Atom(NamedTuple):
     argument: Expression | Wave
 
 
+class Effort:
+    """How many operations on single terms may still be spent, by one expansion or by many that share it."""
+
+    def __init__(self, left: int, whole: Effort | None = None) -> None:
+        self.left: int = left if whole is None else min(left, whole.left)
+        self._whole = whole
+
+    def spend(self, operations: int) -> None:
+        """Take operations off, or raise if there are not so many left."""
+        self.left -= operations
+        if self._whole is not None:
+            self._whole.left -= operations
+        if self.left < 0:
+            raise TooLargeError
+
+
 @dataclass
 class Expansion:
     """Polynomials and the atoms that they are about.
@@ -71,9 +88,8 @@ class Expansion:
         The atoms that depend on parameters alone, by number.
     rows
         One polynomial for each expression that was expanded.
-    budget
-        How many operations on single terms may still be spent: coefficients of general directions and positions have
-        thousands of terms in parameters.
+    effort
+        What may still be spent: coefficients of general directions and positions have thousands of terms in parameters.
     taken
         What was taken whole, by its terms up to a factor: the value, and its first coefficient.
     """
@@ -83,14 +99,12 @@ class Expansion:
     constants: list[Expression] = field(default_factory=list)
     rows: list[Polynomial] = field(default_factory=list)
     numbers: dict[Atom | Expression, int] = field(default_factory=dict)
-    budget: int = 0
+    effort: Effort = field(default_factory=partial(Effort, 0))
     taken: dict[tuple[tuple[Monomial, float], ...], tuple[Expression, float]] = field(default_factory=dict)
 
     def spend(self, operations: int) -> None:
-        """Take operations off the budget, or raise if there are not so many left."""
-        self.budget -= operations
-        if self.budget < 0:
-            raise TooLargeError
+        """Take operations on single terms off what may be spent, or raise if there are not so many left."""
+        self.effort.spend(operations)
 
     def taken_whole(self, node: Expression, coefficient: Coefficient) -> Coefficient:
         """Return a coefficient as an atom, or as a multiple of one that was taken before."""
@@ -181,7 +195,7 @@ def expand(
     angles: Collection[Expression],
     parameters: Collection[Expression],
     limit: int,
-    budget: int = 1_000_000,
+    effort: Effort | None = None,
     longest: int | None = None,
 ) -> Expansion:
     """Write expressions as polynomials.
@@ -196,8 +210,8 @@ def expand(
         The symbols that go into coefficients.
     limit
         The largest number of monomials.
-    budget
-        How many operations on single terms this may take.
+    effort
+        How many operations on single terms this may take; a million if it is not said.
     longest
         What depends on parameters alone is an atom where it has more terms than this.
 
@@ -206,7 +220,7 @@ def expand(
     TooLargeError
         If a polynomial becomes larger than the limit, or has coefficients that are not finite.
     """
-    expansion = Expansion(tuple(angles), budget=budget)
+    expansion = Expansion(tuple(angles), effort=effort or Effort(1_000_000))
     nodes = live(rows)
     moving = varying(nodes, parameters) | {angle.index for angle in angles}
     wanted = _wanted(rows, nodes, moving, expansion.angles)
