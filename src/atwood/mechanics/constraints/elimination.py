@@ -139,14 +139,16 @@ def drop_closed(derivation: Derivation, q: Sequence[Expression], values: Values)
         if depends_on(value, derivation.relations.roots):
             prescribed.append(((path, constraint.law.name, constraint.index), value))
             continue
-        decide(derivation, partial(_check_closed, f"{path}.{constraint.law.name}", value))
+        is_length = str(constraint.law.options.unit) == "N"  # what is missed, times the reaction, is an energy
+        decide(derivation, partial(_check_closed, f"{path}.{constraint.law.name}", value, is_length))
     return kept, tuple(prescribed)
 
 
-def _check_closed(where: str, value: Expression, mechanism: Mechanism) -> None:
+def _check_closed(where: str, value: Expression, is_length: bool, mechanism: Mechanism) -> None:
     """Refuse a constraint between what is fixed that does not hold."""
     (miss,) = evaluate([value], mechanism.table.values)
-    if not abs(miss) <= tolerances.CLOSED * (extent(mechanism) or 1.0):
+    size = (extent(mechanism) or 1.0) if is_length else 1.0
+    if not abs(miss) <= tolerances.CLOSED * size:
         raise TopologyError(
             f"the constraint cannot be satisfied: everything it joins is fixed, and its error is {miss:g}",
             where=where,

@@ -184,12 +184,12 @@ class Balance:
             if miss == 0.0 or (miss < tolerances.MET and miss >= 0.5 * last):
                 break
             last = miss
-            q = self.kinematic_map.moved(t, q, -scales * least_norm(scaled(jacobian, scales, rows), value / rows))
+            q = self.kinematic_map.moved(t, q, -scales * least_norm(scaled(jacobian, scales, rows), value / rows, 1.0))
         now = self.constraints_at(t, q, u)
         rows = row_scales(now.jacobian, scales, errors)
         for _ in range(2):  # the second pass takes out the rounding of the first
             rate = now.jacobian @ u + now.explicit_rate
-            u = u - scales * least_norm(scaled(now.jacobian, scales, rows), rate / rows)
+            u = u - scales * least_norm(scaled(now.jacobian, scales, rows), rate / rows, 1.0)
         return q, u
 
     def on_positions(self, now: ConstraintValues) -> tuple[FloatArray, FloatArray]:

@@ -47,6 +47,9 @@ _POOR, _SETTLED = 3.0, 1.5
 _LOOK = 1e-4
 """While more than this share of the largest row is left, errors of the chosen rows cannot matter."""
 
+_FLAT = 1e-3
+"""Columns are scaled alike down to this share of the largest: one in which only rounding is stays as small as it is."""
+
 
 def row_sizes(jacobian: Matrix, scales: FloatArray) -> FloatArray:
     """Return the largest entry of each row after its columns are scaled, shape (rows,)."""
@@ -224,6 +227,7 @@ def least_size(jacobian: FloatArray, kept: NDArray[np.intp], multipliers: FloatA
     if not len(kept):
         return found
     columns = np.max(np.abs(jacobian[:, kept]), axis=1)
+    columns = np.maximum(columns, _FLAT * np.max(columns, axis=1, keepdims=True))
     even = jacobian / np.where(columns > 0.0, columns, 1.0)[:, None, :]
     rows = np.max(np.abs(even[:, kept]), axis=2)[:, :, None]
     weights = even[:, others] @ np.linalg.pinv(even[:, kept] / rows) / np.swapaxes(rows, 1, 2)
@@ -259,8 +263,16 @@ def open_directions(matrix: FloatArray, least: float = 0.0) -> FloatArray:
     return np.asarray(directions[len(matrix) if least == 0.0 else int(np.sum(values > least)) :])
 
 
-def least_norm(matrix: Matrix, right: FloatArray) -> FloatArray:
+def least_norm(matrix: Matrix, right: FloatArray, unit: float = 0.0) -> FloatArray:
     """Return the shortest solution of a linear system, or the best where there is none.
+
+    Parameters
+    ----------
+    matrix, right
+        The system.
+    unit
+        Size of a row that is known, where rows are scaled (`row_scales`): if all of them are below `tolerances.RANK` of
+        it, as those of a loop that closes by itself wherever it is, they are rounding and nothing is to be followed.
 
     Raises
     ------
@@ -270,7 +282,11 @@ def least_norm(matrix: Matrix, right: FloatArray) -> FloatArray:
     if is_full(matrix):
         if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
             raise np.linalg.LinAlgError("a linear system has entries that are not finite")
+        if unit and np.abs(matrix).max(initial=0.0) < tolerances.RANK * unit:
+            return np.zeros(matrix.shape[1])
         return np.asarray(np.linalg.lstsq(matrix, right, rcond=tolerances.RANK)[0], dtype=float)
     from atwood.linalg.sparse import csr_least_norm
 
+    if unit and np.abs(matrix.data).max(initial=0.0) < tolerances.RANK * unit:
+        return np.zeros(matrix.shape[1])
     return csr_least_norm(matrix, right)

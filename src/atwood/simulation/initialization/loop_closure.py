@@ -18,7 +18,7 @@ from atwood.linalg.matrices import LARGEST_FULL, scaled, to_array
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.initialization.system import System
 
-__all__ = ["Nearest", "closest", "closest_of_all", "places_around", "units_of_rows"]
+__all__ = ["Nearest", "closest", "closest_of_all", "is_length", "places_around", "units_of_rows"]
 
 
 _SHIFTS = (0.1, 0.2, 0.3, 0.5, 0.5, 0.8, 0.8, 1.2, 1.2, 1.8, 1.8, 2.5, 2.5, 3.1, 3.1)

@@ -20,6 +20,7 @@ from atwood.model.declare.law import Kind
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.rank import independent_rows
 from atwood.simulation.dynamics.scales import motion_scales, scene_length
+from atwood.simulation.initialization.loop_closure import is_length
 from atwood.simulation.initialization.start import Start, maximal_state
 from atwood.tolerances import tolerances
 
@@ -164,13 +165,16 @@ def check_prescribed(assembly: Assembly, times: FloatArray) -> None:
     n, m = len(assembly.own_equations.coordinates), len(assembly.own_equations.speeds)
     idle = (np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(len(assembly.reactions)))
     misses = np.abs(assembly.kernel(program, vectorized=True)(times[None, :], *idle)[0])
-    if float(np.max(misses)) > tolerances.CLOSED * scene_length(assembly):
+    length, equations = scene_length(assembly), assembly.own_equations
+    units = np.array([length if is_length(equations, key) else 1.0 for key, _ in prescribed])
+    misses = misses / units[:, None]
+    if float(np.max(misses)) > tolerances.CLOSED:
         worst, moment = np.unravel_index(int(np.argmax(misses)), misses.shape)
         part, law, _ = prescribed[int(worst)][0]
         raise TopologyError(
             f"the constraint cannot be satisfied: at t = {times[moment]:.6g} a prescribed motion contradicts a "
             "fixed part, by "
-            f"{misses[worst, moment]:.3g}",
+            f"{misses[worst, moment] * units[worst]:.3g}",
             where=f"{part}.{law}",
             advice="Two drives, or a drive and a fixed part, prescribe the same motion differently.",
         )

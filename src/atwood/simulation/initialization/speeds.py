@@ -114,7 +114,7 @@ def solve_speeds(
         if not np.any(residual):
             break
         rows = row_scales(matrix, scales, errors)
-        u = u - scales * least_norm(scaled(matrix, scales, rows), residual / rows)
+        u = u - scales * least_norm(scaled(matrix, scales, rows), residual / rows, 1.0)
         fastest = float(np.max(np.abs(u / scales), initial=0.0))
         # A row that changes little is known no better than what is prescribed in it rounds; at rest that says nothing.
         if float(np.max(prescribed, initial=0.0)) < _KNOWN * fastest * float(np.max(rows, initial=0.0)):

@@ -143,7 +143,7 @@ def newton(
         size = float(np.abs(residual / rows).max(initial=0.0))
         if size < 1e-15:
             break
-        step = scales * least_norm(scaled(matrix, scales, rows), residual / rows)
+        step = scales * least_norm(scaled(matrix, scales, rows), residual / rows, 1.0)
         longest = float(np.abs(step / scales).max(initial=0.0))
         step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
         for _ in range(8):
