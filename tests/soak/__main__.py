@@ -5,17 +5,17 @@ from __future__ import annotations
 import json
 import signal
 import time
-from collections import Counter
 
 import click
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from .kinds import KINDS, run_trial
-from .trial import GRAVITIES
+from .summary import as_data, progress_line, show
 from .workers import Done, make_trials
+
+MARK = 100
+"""Trials after which a line says how far the command is."""
 
 
 @click.command()
@@ -32,7 +32,7 @@ def main(
     """Make random trials and say what was found; the exit status is 1 if anything was."""
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     chosen = kinds or tuple(kind for kind in KINDS if kind != "memory")  # which takes long by itself
-    console = Console(stderr=True)
+    console, began = Console(stderr=True), time.monotonic()
     if only is not None:
         done = [Done(kind, only, *run_trial(kind, only)) for kind in chosen]
     else:
@@ -40,14 +40,15 @@ def main(
         jobs = [(kind, first + i) for i in range(count) for kind in chosen]
         done = _make_all(jobs, workers, limit, console)
     if as_json:
-        print(json.dumps(_as_data(done), indent=1))
+        print(json.dumps(as_data(done, time.monotonic() - began), indent=1))
     else:
-        _show(done, Console(), detailed=only is not None)
+        show(done, Console(), time.monotonic() - began, detailed=only is not None)
     raise SystemExit(any(each.trial.findings for each in done))
 
 
 def _make_all(jobs: list[tuple[str, int]], workers: int, limit: float, console: Console) -> list[Done]:
     done: list[Done] = []
+    began = time.monotonic()
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:
         task = progress.add_task("trials", total=len(jobs))
@@ -57,49 +58,13 @@ def _make_all(jobs: list[tuple[str, int]], workers: int, limit: float, console: 
                 progress.advance(task)
                 for finding in each.trial.findings:
                     said = f"{finding.gravity}: --kind {each.kind} --only {each.seed}: {finding.what}"
-                    progress.console.print(said, markup=False, highlight=False)
+                    progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
+                if len(done) % MARK == 0 or len(done) == len(jobs):
+                    said = progress_line(done, len(jobs), time.monotonic() - began)
+                    progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
         except KeyboardInterrupt:
             console.print(f"interrupted after {len(done)} of {len(jobs)} trials")
     return done
-
-
-def _as_data(done: list[Done]) -> dict[str, object]:
-    return {
-        "tried": {kind: dict(_counts(done, kind)) for kind in sorted({each.kind for each in done})},
-        "findings": [
-            {"kind": each.kind, "seed": each.seed, **vars(finding)} for each in done for finding in each.trial.findings
-        ],
-    }
-
-
-def _counts(done: list[Done], kind: str) -> Counter[str]:
-    counts: Counter[str] = Counter()
-    for each in done:
-        if each.kind == kind:
-            counts.update(["trials", *each.trial.tried])
-    return counts
-
-
-def _show(done: list[Done], console: Console, detailed: bool) -> None:
-    for kind in sorted({each.kind for each in done}):
-        counts = _counts(done, kind)
-        slowest = max((each for each in done if each.kind == kind), key=lambda each: each.seconds)
-        console.print(f"\n[bold]{kind}[/bold]: {counts.pop('trials')} trials, the slowest {slowest.seconds:.1f} s")
-        console.print(f"  (seed {slowest.seed})")
-        console.print("  " + ", ".join(f"{word} {n}" for word, n in counts.most_common()), highlight=False)
-    causes: dict[tuple[str, str, str], list[int]] = {}
-    for each in done:
-        for finding in each.trial.findings:
-            causes.setdefault((finding.gravity, each.kind, finding.what), []).append(each.seed)
-            if detailed:
-                console.print(f"\n{finding.gravity}: {finding.what}\n{finding.detail}", markup=False, highlight=False)
-    if not causes:
-        console.print("\nnothing was found")
-        return
-    table = Table("gravity", "kind", "what", "times", "seeds")
-    for (gravity, kind, what), seeds in sorted(causes.items(), key=lambda item: GRAVITIES.index(item[0][0])):
-        table.add_row(gravity, kind, escape(what), str(len(seeds)), " ".join(map(str, seeds[:5])))
-    console.print(table)
 
 
 if __name__ == "__main__":

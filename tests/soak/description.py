@@ -6,6 +6,7 @@ whose columns are the axes of a frame.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -133,6 +134,20 @@ class Mechanism:
                 if tie.sort == "weld" and ends & found:
                     found |= ends
         return found
+
+    def loops(self, sorts: Iterable[str]) -> int:
+        """Return how many loops the ties of some sorts make, the world being one body."""
+        held = set(sorts)
+        pieces = [{""}, *({body.name} for body in self.bodies)]
+        count = 0
+        for tie in self.ties:
+            if tie.sort in held and tie.mounts:
+                ends = {mount.body for mount in (tie.mounts[0], tie.mounts[-1])}
+                joined = [piece for piece in pieces if piece & ends]
+                count += len(joined) == 1
+                pieces = [piece for piece in pieces if not piece & ends] + [set().union(*joined)]
+            count += bool(tie.grips)  # a gear relates coordinates that there are already
+        return count
 
     def turned(self, mount: Mount) -> Array:
         """Return the rotation of a mount in the world."""

@@ -15,6 +15,7 @@ from .build import build_scene, moving_axes
 from .description import Array, Body, Mechanism, Tie, outline, rotation
 from .draw import draw
 from .oracle import Oracle, Place
+from .oracle_parts import ROWS
 from .trial import Discarded, Finding, Trial
 
 T_END = 0.3
@@ -34,6 +35,11 @@ class Way:
     solver: str = "auto"
     orientation: str = "quaternion"
     start: str = "speeds"
+
+    def words(self) -> tuple[str, ...]:
+        """Return what is counted of it."""
+        form = f"dae {self.level}" if self.form == "dae" else f"reduced {self.orientation}"
+        return f"form: {form}", f"solver: {self.form} {self.solver}", f"start: {self.start}"
 
 
 def ways(seed: int, space: str) -> tuple[Way, Way]:
@@ -57,7 +63,7 @@ def check(seed: int) -> Trial:
 def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
     """Compare a mechanism, run in some ways, with the oracle."""
     findings: list[Finding] = []
-    tried = [mechanism.space, f"{len(mechanism.bodies)} bodies", *sorted({tie.sort for tie in mechanism.ties})]
+    tried = [*covered(mechanism), *dict.fromkeys(word for way in some_ways for word in way.words())]
     known: tuple[Oracle, list[tuple[Place, Array]]] | None = None
     for way in some_ways:
         words = f"{way.form} {way.level if way.form == 'dae' else way.orientation} {way.solver} start={way.start}"
@@ -95,6 +101,18 @@ def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
             numbers = ", ".join(f"{what} {gap:.1e}" for what, gap in wrong)
             findings.append(Finding("wrong", f"{way.form}: {wrong[0][0]}", f"{words}: {numbers}\n{outline(mechanism)}"))
     return Trial(tuple(tried), tuple(findings))
+
+
+def covered(mechanism: Mechanism) -> list[str]:
+    """Return what is counted of a mechanism: its space, how many bodies and loops it has, and its parts."""
+    parts = {tie.sort for tie in mechanism.ties}
+    holding = {tie.sort for tie in mechanism.ties if tie.sort in ROWS or tie.grips}
+    return [
+        f"space: {mechanism.space}",
+        f"bodies: {len(mechanism.bodies)}",
+        f"loops: {mechanism.loops(holding)}",
+        *(f"{'joint' if sort in holding else 'load'}: {sort}" for sort in sorted(parts)),
+    ]
 
 
 def read_at_once(result: Result, mechanism: Mechanism) -> None:
@@ -265,6 +283,7 @@ def _motion(result: Result, oracle: Oracle, states: list[tuple[Place, Array]]) -
 
 def _reactions(result: Result, oracle: Oracle, states: list[tuple[Place, Array]]) -> Iterator[tuple[str, float]]:
     """Compare the reactions that are unique at the start and at the end."""
+    wanted: list[tuple[int, str, str, float, float]] = []
     for at in (0, -1):
         known = oracle.reactions(*states[at], float(result.time[at]))
         size = max((float(np.max(np.abs(load))) for _, load, _ in known.values()), default=1.0)
@@ -272,9 +291,11 @@ def _reactions(result: Result, oracle: Oracle, states: list[tuple[Place, Array]]
             tie = oracle.mechanism.tie(name)
             for path, value, unique in named_reactions(tie, multipliers, load, is_unique, oracle.mechanism.space):
                 if unique and np.isfinite(value):
-                    got = float(result.array(f"{name}.{path}")[at])
-                    gap = abs(got - value) / (1.0 + size) / 10.0
-                    yield f"{tie.sort}.{path}", gap if np.isfinite(got) else np.inf
+                    wanted.append((at, f"{name}.{path}", f"{tie.sort}.{path}", value, size))
+    table = result.table(list(dict.fromkeys(path for _, path, _, _, _ in wanted))) if wanted else {}
+    for at, path, what, value, size in wanted:
+        got = float(table[path][at])
+        yield what, abs(got - value) / (1.0 + size) / 10.0 if np.isfinite(got) else np.inf
 
 
 def named_reactions(

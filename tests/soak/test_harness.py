@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from . import workers
 from .draw import draw
 from .oracle import Oracle
-from .trial import Discarded, Trial
+from .summary import as_data, progress_line
+from .trial import Discarded, Finding, Trial
+from .workers import Done
 
 
 def test_no_start_is_singular() -> None:
@@ -46,3 +50,21 @@ def test_a_trial_that_waits_for_the_processor_is_no_hang(monkeypatch: pytest.Mon
     assert done is not None
     assert isinstance(done.trial, Trial)
     assert done.trial.findings[0].gravity == "hang"
+
+
+def test_the_summary_counts_by_groups_and_names_the_slowest() -> None:
+    done = [
+        Done("scenes", 7, Trial(("space: line", "joint: pivot", "compared dae")), 0.5),
+        Done("scenes", 8, Trial(("space: line", "discarded: immobile")), 2.0),
+        Done("scenes", 9, Trial(("space: plane",), (Finding("wrong", "dae: speeds", "1e-3"),)), 1.0),
+    ]
+    found = json.loads(json.dumps(as_data(done, 4.0)))
+    scenes = found["tried"]["scenes"]
+    assert scenes["words"]["space"] == {"line": 2, "plane": 1}
+    assert scenes["words"][""] == {"compared dae": 1}
+    assert [each["seed"] for each in scenes["slowest"]] == [8, 9, 7]
+    assert (scenes["trials"], scenes["with_findings"]) == (3, 1)
+    assert found["findings"] == [
+        {"kind": "scenes", "seed": 9, "gravity": "wrong", "what": "dae: speeds", "detail": "1e-3"}
+    ]
+    assert progress_line(done, 30, 4.0).startswith("3 of 30: 1 with findings, 1 discarded, 1.17 s a trial")

@@ -25,7 +25,7 @@ _PATIENCE = 10.0
 
 @dataclass(frozen=True)
 class Done:
-    """One trial that has been made, with the seconds that it took."""
+    """One trial that has been made, with the seconds of the processor that it took."""
 
     kind: str
     seed: int
@@ -135,10 +135,10 @@ def _look(worker: _Worker, is_ready: bool, limit: float) -> Done | None:
             worker.process.join()
             trial = Trial(("died",), (Finding("crash", f"the process died with {worker.process.exitcode}"),))
             _dismiss(worker)
-            return Done(kind, seed, trial, seconds)
+            return Done(kind, seed, trial, used)
         worker.job = None
         return Done(kind, seed, trial, seconds)
     if used > limit or seconds > _PATIENCE * limit:
         _dismiss(worker)
-        return Done(kind, seed, Trial(("hung",), (Finding("hang", f"no end within {limit:g} s"),)), seconds)
+        return Done(kind, seed, Trial(("hung",), (Finding("hang", f"no end within {limit:g} s"),)), used)
     return None
