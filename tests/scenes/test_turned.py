@@ -32,6 +32,7 @@ from atwood.pipeline import assemble
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.problem import Plan
 from atwood_library import Disc, Ground, Link, Pivot, RigidBody, Rod, RotaryDrive, Spherical, Weld
 
 FORMS = ("reduced", "dae")
@@ -325,8 +326,33 @@ def test_what_is_redundant_changes_as_a_plate_turns(make: Callable[[Stand], Scen
     found, expected = run(make(stand), form, rtol), run(make(UPRIGHT), form, rtol)
     motion, forces = apart(found, expected, stand)
     assert motion < 1e-9
-    assert forces < 3e-7
+    assert forces < 1e-9
     assert max(found.energy.max_drift, expected.energy.max_drift) < 1e-7
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("reviews", [True, False])
+@pytest.mark.parametrize("make", [driven, governor])
+def test_steps_do_not_shrink_where_what_is_kept_becomes_redundant(
+    make: Callable[[Stand], Scene], reviews: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fifth of a radian after its start a component that was kept says nothing any more.
+
+    Others are kept from the start; and where they are not, many short steps are reason enough to look.
+    """
+    if not reviews:
+        monkeypatch.setattr(Plan, "keep_better", lambda *_: None)
+    found = simulate(make(Stand(1.360841402195895)), form="dae", rtol=1e-13, outputs=13, max_steps=200)
+    assert found.status == "finished"
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("angle", [1.6e-10, 2.1242e-4, 1.5926, -2.74, 4.1e-9])
+@pytest.mark.parametrize("form", FORMS)
+def test_a_shaft_that_nothing_is_said_of_starts_where_it_is(form: str, angle: float) -> None:
+    """While a loop closes, the shaft that it is on seems to matter a little, less and less; rounding must not count."""
+    found = simulate(governor(Stand(angle, place=(0.3, -2.0, 0.1))), form=form, t_end=1e-3, outputs=2)
+    assert abs(found.array("bearing.angle")[0]) < 1e-11
 
 
 @pytest.mark.sample(3)

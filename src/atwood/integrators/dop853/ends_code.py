@@ -11,6 +11,10 @@ __all__ = ["begin_code", "project_code", "watch_code"]
 _STRETCH = 1.5
 """The end of a step takes the place of a look that was wanted before, if that makes the way to it longer by no more."""
 
+_PATIENCE = 32
+"""After so many steps without a look the motion is looked at, however little it has moved: perhaps what keeps steps
+short is what is looked for."""
+
 
 def begin_code() -> str:
     """Return the function that starts anew from a state: 0, or 4 where that has no finite rates.
@@ -25,6 +29,8 @@ entry:
   store double %t, ptr %looked.at
   store i64 0, ptr %edgy.at
   store i64 0, ptr %calm.at
+  %steps = load i64, ptr %steps.at
+  store i64 %steps, ptr %looks.at
   %bytes = mul i64 %n, 8
   %y.index = mul i64 %m, {ROWS["y"]}
   %y = getelementptr double, ptr %arrays, i64 %y.index
@@ -134,9 +140,9 @@ nothing:
 def watch_code() -> str:
     """Return the function that looks at the motion in the last step, at the times that what watches it wants.
 
-    The end of a step is looked at instead where it is not much later: its state is there already. It returns 1 where
-    something was seen, which `seen` keeps until somebody asks; the looks that are then left in the step are taken when
-    the steps go on.
+    The end of a step is looked at instead where it is not much later: its state is there already. It is looked at, too,
+    after many steps that were not. It returns 1 where something was seen, which `seen` keeps until somebody asks; the
+    looks that are then left in the step are taken when the steps go on.
     """
     return f"""define internal i32 @watched(ptr %session, double %t_new) #0 {{
 entry:
@@ -149,16 +155,22 @@ begin:
   br i1 %is_behind, label %enter, label %nothing
 enter:
   %h = load double, ptr %h.at
+  %steps = load i64, ptr %steps.at
 {_places()}
   br label %turn
 turn:
   %next = load double, ptr %due
   %is_within = fcmp ole double %next, %t_new
-  br i1 %is_within, label %choose, label %nothing
+  br i1 %is_within, label %choose, label %wait
+wait:
+  %before = load i64, ptr %looks.at
+  %taken = sub i64 %steps, %before
+  %is_late = icmp sge i64 %taken, {_PATIENCE}
+  br i1 %is_late, label %at_end, label %nothing
 choose:
   %looked = load double, ptr %looked.at
-  %wait = fsub double %next, %looked
-  %most = fmul double %wait, {exact(_STRETCH)}
+  %stretch = fsub double %next, %looked
+  %most = fmul double %stretch, {exact(_STRETCH)}
   %gap = fsub double %t_new, %looked
   %is_near = fcmp ole double %gap, %most
   br i1 %is_near, label %at_end, label %inside
@@ -179,6 +191,7 @@ look:
   %values.at = phi ptr [ %trial, %read ], [ %y, %at_end ]
   %slopes.at = phi ptr [ %last, %read ], [ %yp, %at_end ]
   store double %moment, ptr %looked.at
+  store i64 %steps, ptr %looks.at
   %asks = call i32 %watch(double %moment, ptr %values.at, ptr %slopes.at, ptr %watch_data)
   %is_seen = icmp ne i32 %asks, 0
   br i1 %is_seen, label %keep, label %turn

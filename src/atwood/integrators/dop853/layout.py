@@ -23,6 +23,7 @@ COUNTS = (
     "event_count",
     "heeds",
     "seen",
+    "looks",
 )
 POINTERS = (
     "function",

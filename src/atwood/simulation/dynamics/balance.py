@@ -184,7 +184,10 @@ class Balance:
             if miss == 0.0 or (miss < tolerances.MET and miss >= 0.5 * last):
                 break
             last = miss
-            q = self.kinematic_map.moved(t, q, -scales * least_norm(scaled(jacobian, scales, rows), value / rows, 1.0))
+            even = self.errors.shared(rows, self.holonomic)
+            missing = value / even
+            step = least_norm(scaled(jacobian, scales, even), missing, 1.0, float(np.max(np.abs(missing))))
+            q = self.kinematic_map.moved(t, q, -scales * step)
         now = self.constraints_at(t, q, u)
         rows = row_scales(now.jacobian, scales, errors)
         for _ in range(2):  # the second pass takes out the rounding of the first

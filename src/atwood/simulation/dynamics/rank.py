@@ -50,6 +50,9 @@ _LOOK = 1e-4
 _FLAT = 1e-3
 """Columns are scaled alike down to this share of the largest: one in which only rounding is stays as small as it is."""
 
+_UNCLEAR = 1e-4
+"""Where a place misses what is to be met by more, all directions help; what rounding makes of them is little then."""
+
 
 def row_sizes(jacobian: Matrix, scales: FloatArray) -> FloatArray:
     """Return the largest entry of each row after its columns are scaled, shape (rows,)."""
@@ -263,16 +266,20 @@ def open_directions(matrix: FloatArray, least: float = 0.0) -> FloatArray:
     return np.asarray(directions[len(matrix) if least == 0.0 else int(np.sum(values > least)) :])
 
 
-def least_norm(matrix: Matrix, right: FloatArray, unit: float = 0.0) -> FloatArray:
+def least_norm(matrix: Matrix, right: FloatArray, unit: float = 0.0, miss: float = 0.0) -> FloatArray:
     """Return the shortest solution of a linear system, or the best where there is none.
 
     Parameters
     ----------
     matrix, right
-        The system.
+        The system. Columns are scaled by the scene.
     unit
         Size of a row that is known, where rows are scaled (`row_scales`): if all of them are below `tolerances.RANK` of
         it, as those of a loop that closes by itself wherever it is, they are rounding and nothing is to be followed.
+    miss
+        By how much a place misses what the system takes it to, on scales on which the rows of one law are alike.
+        Derivatives there are off by as much: directions of smaller singular values, along which one would have to go
+        farther than the scene is large, are rather ones along which nothing changes, and are not followed.
 
     Raises
     ------
@@ -284,7 +291,8 @@ def least_norm(matrix: Matrix, right: FloatArray, unit: float = 0.0) -> FloatArr
             raise np.linalg.LinAlgError("a linear system has entries that are not finite")
         if unit and np.abs(matrix).max(initial=0.0) < tolerances.RANK * unit:
             return np.zeros(matrix.shape[1])
-        return np.asarray(np.linalg.lstsq(matrix, right, rcond=tolerances.RANK)[0], dtype=float)
+        least = max(tolerances.RANK, miss if miss < _UNCLEAR else 0.0)
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=least)[0], dtype=float)
     from atwood.linalg.sparse import csr_least_norm
 
     if unit and np.abs(matrix.data).max(initial=0.0) < tolerances.RANK * unit:

@@ -105,7 +105,7 @@ class RowErrors:
             self._known, self._reach, self._passed = None, max(reach, self._reach, 1.0), max(passed, self._passed)
             self._first = t if self._first is None else self._first
         if self._known is None or self._known[0] is not scales:
-            found = self._shared(np.maximum(self._values, self._of_rows(self._entries, self._tangent, scales)))
+            found = self.shared(np.maximum(self._values, self._of_rows(self._entries, self._tangent, scales)))
             self._known = scales, found
         return self._known[1]
 
@@ -146,7 +146,7 @@ class RowErrors:
         values, found, _ = self._rough(t, q, scales, 1.0)
         errors = self._of_rows(_spread(found), tangent, scales)
         if of_rates:
-            return self._shared(errors)
+            return self.shared(errors)
         sizes = np.maximum(self._of_rows(np.max(np.abs(found), axis=1), tangent, scales), errors / ROUGHNESS)
         unknown = np.divide(_spread(values), sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
         # A row that says no more of the place than that is followed by no step to it, and is no row here either.
@@ -155,7 +155,7 @@ class RowErrors:
         if off > 1.0:
             errors = self._of_rows(_spread(self._rough(t, q, scales, off)[1]), tangent, scales)
         errors = np.where(is_followed, errors, np.maximum(errors, sizes))
-        return self._shared(errors)
+        return self.shared(errors)
 
     def of_values(self, t: float, q: FloatArray, scales: FloatArray) -> FloatArray:
         """Return how far rounding can take values at a place where nothing moves by itself, shape (rows,).
@@ -165,13 +165,14 @@ class RowErrors:
         t, q, scales
             See `near`.
         """
-        return self._shared(_spread(self._rough(t, q, scales, 1.0)[0]))
+        return self.shared(_spread(self._rough(t, q, scales, 1.0)[0]))
 
-    def _shared(self, errors: FloatArray) -> FloatArray:
-        """Return for each condition the largest error of those of its law."""
-        largest = np.zeros(len(errors))
-        np.maximum.at(largest, self._laws, errors)
-        return largest[self._laws]
+    def shared(self, sizes: FloatArray, chosen: NDArray[np.intp] | None = None) -> FloatArray:
+        """Return for each condition, or some, the largest of those of its law: of errors, or of the sizes of rows."""
+        laws = self._laws if chosen is None else self._laws[chosen]
+        largest = np.zeros(len(self._laws))
+        np.maximum.at(largest, laws, sizes)
+        return largest[laws]
 
     def _rough(
         self, t: float, q: FloatArray, scales: FloatArray, off: float

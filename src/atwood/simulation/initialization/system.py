@@ -135,24 +135,20 @@ def newton(
 ) -> tuple[FloatArray, FloatArray, Matrix]:
     """Move to the nearest configuration that fulfils a system; return it with what is missing, scaled."""
     still = np.zeros_like(scales)
-    assert system.kinematic_map is not None
     residual, matrix = system.at(t, q, still)
     errors = system.errors.near(t, q, scales)
     rows = row_scales(matrix, scales, errors)
     for _ in range(iterations):
-        size = float(np.abs(residual / rows).max(initial=0.0))
+        size = _largest(residual / rows)
         if size < 1e-15:
             break
-        step = scales * least_norm(scaled(matrix, scales, rows), residual / rows, 1.0)
-        longest = float(np.abs(step / scales).max(initial=0.0))
-        step *= min(1.0, 0.5 / longest) if longest > 0.5 else 1.0
-        for _ in range(8):
-            trial = system.kinematic_map.moved(t, q, -step)
-            new_residual, new_matrix = system.at(t, trial, still)
-            new_size = float(np.abs(new_residual / rows).max())
-            if new_size < size or longest < 1e-9:
+        even = system.errors.shared(rows)  # which components of a law are small depends on how a scene is turned
+        slopes, missing = scaled(matrix, scales, even), residual / even
+        for miss in (_largest(missing), 0.0):
+            step = scales * least_norm(slopes, missing, 1.0, miss)
+            trial, new_residual, new_matrix, new_size = _nearer(system, scales, rows, t, q, step, size)
+            if new_size < 0.5 * size:
                 break
-            step *= 0.5
         if new_size >= size and size < tolerances.MET:
             break
         q, residual, matrix = trial, new_residual, new_matrix
@@ -162,6 +158,27 @@ def newton(
     # What rounding could have left of a condition that nothing changes, as of a speed that a drive prescribes, is met.
     sizes = np.maximum(sizes, certain(errors, np.zeros_like(errors)) / tolerances.MET)
     return q, residual / sizes, scaled(matrix, scales)
+
+
+def _nearer(
+    system: System, scales: FloatArray, rows: FloatArray, t: float, q: FloatArray, step: FloatArray, size: float
+) -> tuple[FloatArray, FloatArray, Matrix, float]:
+    """Return where a step leads, shortened until less is missing there: the place, residual, derivatives and miss."""
+    assert system.kinematic_map is not None
+    longest = _largest(step / scales)
+    step = step * (0.5 / longest) if longest > 0.5 else step
+    for _ in range(8):
+        trial = system.kinematic_map.moved(t, q, -step)
+        residual, matrix = system.at(t, trial, np.zeros_like(scales))
+        missing = _largest(residual / rows)
+        if missing < size or longest < 1e-9:
+            break
+        step = 0.5 * step
+    return trial, residual, matrix, missing
+
+
+def _largest(values: FloatArray) -> float:
+    return float(np.abs(values).max(initial=0.0))
 
 
 def counted(

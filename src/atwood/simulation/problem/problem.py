@@ -158,6 +158,12 @@ class Plan:
         finding = review_kept(self.finding, self.balance, t, q, self.sizes)
         return None if finding is self.finding else finding
 
+    def keep_better(self, t: float, q: FloatArray) -> None:
+        """Keep the constraints that are better kept at a place, if those that are will not do."""
+        finding = self.better_kept(t, q)
+        if finding is not None:
+            self.keep(finding, t, q)
+
     def keep(self, finding: RankFinding, t: float, q: FloatArray) -> None:
         """Keep other constraints from a place on; programs and sessions for those before have had their day."""
         self.finding, self._kernels, self._null_space = finding, None, None

@@ -76,6 +76,8 @@ def _first_state(segment: Segment, t: float, q: FloatArray, u: FloatArray) -> tu
     """Return the start of a segment for a solver; explicit methods work out the rates themselves."""
     if not len(q):
         return np.zeros(0), np.zeros(0)
+    if segment.choice.solver.startswith("ida"):
+        segment.plan.keep_better(t, q)
     return _state_for(segment.choice.solver, segment.plan, t, q, u)
 
 

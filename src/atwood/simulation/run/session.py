@@ -254,6 +254,7 @@ def _open_constrained(request: SolverRequest, t: float, y: FloatArray, leave: Le
     from atwood.simulation.problem.constrained_scene import constrained_problem
 
     plan, probe = request.plan, request.probe
+    plan.keep_better(t, plan.program.split(y)[0])
     problem = constrained_problem(plan, t, y, probe.function(), probe.directions)
     settings = request.settings(t, LOOSEST)
     absolute = np.asarray(settings.absolute_tolerances)[: len(y)]
