@@ -154,6 +154,19 @@ def driven(jump: float) -> Scene:
     return scene
 
 
+def parting() -> Scene:
+    """Return a mass on two drives, one of which goes away from the other from 0.2 s on, very slowly at first."""
+    scene = Scene()
+    ground, mass = scene.add("ground", lib.Ground()), scene.add("mass", lib.PointMass())
+    late = lib.Drive(motion=lambda t: select(t > 0.2, (t - 0.2) ** 4, 0.0 * t))
+    drives = [scene.add("still", lib.Drive()), scene.add("late", late)]
+    for drive in drives:
+        scene.connect(ground.frame, drive.a)
+    scene.connect(drives[0].b, mass.point)
+    scene.connect(drives[0].b, drives[1].b)
+    return scene
+
+
 class Catch(Component):
     """Lets go of a mass at first, and holds it at a place from 0.3 s on."""
 
@@ -210,6 +223,7 @@ ENDS: dict[tuple[str, str], tuple[float, str, Callable[[], Scene], str]] = {
     ("CERTAIN", "high"): (3e10, "dae", lambda: wedge(1e-4), "assemble"),
     ("TRUSTED", "high"): (1e19, "dae", FourBar, "assemble"),
     ("RANK", "high"): (0.1, "reduced", RollingBall, "assemble"),
+    ("KNOWN", "high"): (1e3, "dae", parting, "run"),
     ("CLEAR", "low"): (1e-12, "dae", lambda: parallelogram(1e-9), "assemble"),
     ("SINGULAR", "low"): (1e-10, "dae", lambda: parallelogram(1e-9), "assemble"),
     ("SINGULAR", "high"): (1.0, "dae", Bricard, "assemble"),

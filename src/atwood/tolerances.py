@@ -44,6 +44,14 @@ class Tolerances:
     near a singular position. Integrals of Pfaffian constraints and relations between scaled rows are decided by it too.
     """
 
+    KNOWN: float = 1e-6
+    """Unit 1, share of the fastest rate of what is prescribed: rates count where rounding takes none by more.
+
+    They say how far rounding takes a prescribed place in the time in which it moves by the scene's size. Where it
+    hardly moves yet, its rate is rounding itself. Above the interval, drives that contradict each other pass for
+    consistent ones.
+    """
+
     CLEAR: float = 1e-6
     """Unit 1, smallest singular value with rows and columns scaled: above, rank is full and no place near by is asked.
 
@@ -120,6 +128,7 @@ INTERVALS: Mapping[str, tuple[float, float]] = MappingProxyType(
         "CERTAIN": (0.3, 1e6),
         "TRUSTED": (0.0, 1e15),
         "RANK": (0.0, 1e-3),
+        "KNOWN": (0.0, 0.1),
         "CLEAR": (1e-10, math.inf),
         "SINGULAR": (1e-8, 1e-2),
         "FREE": (0.0, 0.1),

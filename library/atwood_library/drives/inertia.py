@@ -43,7 +43,9 @@ class Inertia(Component):
     spaces = ("plane", "space")
 
     moment: float = parameter(1.0, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the axis.")
-    position: tuple[float, float, float] = parameter((0.0, 0.0, 0.0), unit="m", size=3, doc="Where it is in the world.")
+    position: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0), unit="m", size=3, place=True, doc="Where it is in the world."
+    )
     axis: tuple[float, float, float] = parameter(
         (0.0, -1.0, 0.0), turning=True, doc="Axis in the world; the angle is right-handed about it."
     )

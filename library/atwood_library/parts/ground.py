@@ -14,7 +14,11 @@ class Ground(Component):
     synonyms = ("Fixed", "World frame", "World", "MultiBody.Parts.Fixed")
 
     position: tuple[float, float, float] = parameter(
-        (0.0, 0.0, 0.0), unit="m", size=3, doc="Position in world axes (x right, y into the page, z up)."
+        (0.0, 0.0, 0.0),
+        unit="m",
+        size=3,
+        place=True,
+        doc="Position in world axes (x right, y into the page, z up).",
     )
     angle: float = parameter(0.0, unit="rad", doc="Rotation in the plane x-z, counter-clockwise; in space, about -y.")
     frame: Frame = connector(Frame, "The fixed frame.")

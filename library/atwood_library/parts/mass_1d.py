@@ -34,7 +34,7 @@ class Mass1D(Component):
 
     mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     origin: tuple[float, float, float] = parameter(
-        (0.0, 0.0, 0.0), unit="m", size=3, doc="Point of the line where the displacement is zero."
+        (0.0, 0.0, 0.0), unit="m", size=3, place=True, doc="Point of the line where the displacement is zero."
     )
     axis: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction of the line.")
     flange: Point = connector(Point, "The mass.")

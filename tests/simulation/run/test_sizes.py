@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from atwood import Scene, simulate
-from atwood_library import Ground, Link, Pivot
+from atwood import DeclarationError, Scene, parameter, simulate, sweep
+from atwood_library import Ground, Link, Mass1D, Pivot, RigidBody, Spring, Weld
+
+from ...helpers.runs import FORMS
 
 
 def four_bar(size: float) -> Scene:
@@ -38,3 +40,41 @@ def test_steps_do_not_depend_on_the_size_of_the_scene(level: str, size: float) -
         steps.append(result.statistics.steps)
     assert ends[1] == pytest.approx(ends[0], abs=1e-4)
     assert 0.8 * steps[0] < steps[1] < 1.25 * steps[0]
+
+
+def two_masses(place: float, space: str) -> Scene:
+    """Return two masses on guides, with a spring between them, somewhere in the world."""
+    scene = Scene(t_end=10.0, gravity=0.0, space=space, **({"line_axis": (1.0, 0.0, 0.0)} if space == "line" else {}))
+    masses = [scene.add(f"mass{i}", Mass1D(origin=(place + i, 0.0, 0.0))) for i in range(2)]
+    spring = scene.add("spring", Spring(stiffness=100.0, natural_length=1.0))
+    scene.connect(masses[0].flange, spring.a)
+    scene.connect(masses[1].flange, spring.b)
+    scene.start["mass0.displacement"] = 0.1
+    return scene
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("space", ["line", "plane"])
+def test_where_a_scene_stands_says_nothing_of_its_size(space: str, form: str) -> None:
+    near, far = (simulate(two_masses(place, space), form=form) for place in (0.0, 1e6))
+    np.testing.assert_allclose(near["mass0.displacement"][-1], 0.05 * (1.0 + np.cos(np.sqrt(200.0) * 10.0)), atol=1e-6)
+    np.testing.assert_allclose(far["mass0.displacement"], near["mass0.displacement"], atol=1e-6)
+    assert far.energy.max_drift < 1e-3
+
+
+def test_the_size_of_a_scene_in_a_sweep_is_that_of_a_run() -> None:
+    scene = Scene(t_end=5.0)
+    ground, pivot, body = scene.add("ground", Ground()), scene.add("pivot", Pivot()), scene.add("body", RigidBody())
+    weld = scene.add("weld", Weld(displacement=(30.0, 0.0, 40.0)))
+    for a, b in ((ground.frame, pivot.a), (pivot.b, weld.a), (weld.b, body.frame)):
+        scene.connect(a, b)
+    many = sweep(scene, {"body.mass": [1.0, 2.0]}, quantities=["pivot.angle"], outputs=11, solver="explicit")
+    scene["body"].mass = 2.0
+    alone = simulate(scene, outputs=11, solver="explicit")
+    # Tolerances follow from the size; with another one steps would differ.
+    np.testing.assert_allclose(many["pivot.angle"][1], alone["pivot.angle"], rtol=1e-12)
+
+
+def test_a_place_is_in_metres() -> None:
+    with pytest.raises(DeclarationError, match="a place in the world is in metres"):
+        parameter(1.0, unit="rad", place=True, doc="An angle.")

@@ -42,6 +42,7 @@ __all__ = [
     "from_start",
     "make_gravity",
     "origin_at",
+    "sizing_parameters",
     "started_at",
     "world_position",
 ]
@@ -238,16 +239,20 @@ def extent(mechanism: Mechanism) -> float:
 
     Of a vector that is its magnitude, which does not depend on how the scene is turned.
     """
-    sizes = [0.0]
+    values = (mechanism.locals_[path].part.values[name] for path, name in sizing_parameters(mechanism))
+    return max((math.hypot(*one) if isinstance(one, tuple) else abs(one) for one in values), default=0.0)
+
+
+def sizing_parameters(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
+    """Yield the part and the name of each parameter that is a length of what moves, and no place in the world."""
     for path, local in mechanism.locals_.items():
         bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors}
         if bodies == {0}:
             continue  # where the ground is says nothing about the size of what moves
         for name, spec in local.part.component.parameter_specs().items():
-            value = local.part.values[name]
-            if spec.unit.exponents == (0, 1, 0, 0) and value is not None:
-                sizes.append(math.hypot(*value) if isinstance(value, tuple) else abs(value))
-    return max(sizes)
+            is_length = spec.unit.exponents == (0, 1, 0, 0) and not spec.place
+            if is_length and local.part.values[name] is not None:
+                yield path, name
 
 
 def check_closures(mechanism: Mechanism) -> None:

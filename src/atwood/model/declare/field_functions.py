@@ -46,6 +46,7 @@ _BOUND = optional(number())
     structural=FLAG,
     direction=FLAG,
     turning=FLAG,
+    place=FLAG,
     text=FLAG,
     function_of=optional(BY_PATH),
     array=either(FLAG, CALLBACK),
@@ -64,6 +65,7 @@ def parameter(
     structural: bool = False,
     direction: bool = False,
     turning: bool = False,
+    place: bool = False,
     text: bool = False,
     function_of: Mapping[str, str] | None = None,
     array: Callable[[Any, str], Any] | bool = False,
@@ -97,6 +99,9 @@ def parameter(
         ``"z"`` or ``"-x"``. Components that are nothing but rounding, as of ``(cos(pi/2), 0, 1)``, are zero.
     turning
         Whether it is a direction about which something turns; in a plane it can only be the plane's normal.
+    place
+        Whether it says where something is in the world, as a position or one coordinate of it. It then says nothing of
+        how large the scene is, by which tolerances are measured: a scene that is moved runs as before.
     text
         Whether it is text, as the path of a file is.
     function_of
@@ -110,8 +115,10 @@ def parameter(
     Raises
     ------
     DeclarationError
-        If there is no line of meaning, or the unit is no SI unit.
+        If there is no line of meaning, the unit is no SI unit, or a place is not in metres.
     """
+    if place and unit.strip() != "m":
+        raise DeclarationError(f"a place in the world is in metres, not in {unit}", advice='Give unit="m".')
     return ParameterSpec(
         default,
         unit,
@@ -125,6 +132,7 @@ def parameter(
         structural=structural,
         direction=direction or turning,
         turning=turning,
+        place=place,
         text=text,
         function_of=function_of,
         array=array,

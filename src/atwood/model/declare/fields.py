@@ -148,6 +148,7 @@ class ParameterSpec(Field):
         structural: bool = False,
         direction: bool = False,
         turning: bool = False,
+        place: bool = False,
         text: bool = False,
         function_of: Mapping[str, str] | None = None,
         array: Callable[[Any, str], Any] | bool = False,
@@ -159,7 +160,7 @@ class ParameterSpec(Field):
         size = None if function_of else size
         self.minimum, self.above, self.maximum = minimum, above, maximum
         self.size, self.integer, self.choices = size, integer, choices
-        self.direction, self.turning, self.text = direction, turning, text
+        self.direction, self.turning, self.place, self.text = direction, turning, place, text
         self.structural = structural or direction or integer or text or bool(choices or function_of or array)
 
     def check(self, value: Any, where: str) -> Any:

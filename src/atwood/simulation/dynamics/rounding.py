@@ -36,10 +36,6 @@ _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 """The angle whose multiples are spread most evenly."""
 
 
-_KNOWN = 1e-6
-"""Rates of what is prescribed count where rounding takes them by no larger share."""
-
-
 class RowErrors:
     """How far rounding can take each condition: its value, and its slopes along the speeds.
 
@@ -120,7 +116,7 @@ class RowErrors:
         fastest, rounds = float(np.max(np.abs(rates), initial=0.0)), _spread(rates)
         # In the time in which what is prescribed moves by as much as the coordinates are scaled by; where it hardly
         # moves yet, its rate is rounding itself, and says nothing of such a time.
-        if fastest > 0.0 and float(np.max(rounds)) <= _KNOWN * fastest:
+        if fastest > 0.0 and float(np.max(rounds)) <= tolerances.KNOWN * fastest:
             sizes = self._of_rows(np.max(np.abs(slopes), axis=1), tangent, scales)
             values = np.maximum(values, rounds * (float(np.max(sizes)) / fastest))
         if len(self._entries):

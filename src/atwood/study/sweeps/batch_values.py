@@ -16,7 +16,7 @@ from atwood.forms.shared import Slot, decisions_of, find_slots
 from atwood.forms.starting import starting
 from atwood.late import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.kinematics.mechanism import extent
+from atwood.mechanics.kinematics.mechanism import extent, sizing_parameters
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.local.flatten import flatten
@@ -343,19 +343,14 @@ def _of(given: FloatArray | float, runs: NDArray[np.intp]) -> FloatArray | float
 
 
 def _moving_lengths(assembly: Assembly, parameters: FloatArray) -> FloatArray:
-    """Return the largest length among the parameters of what moves, for each row of parameters."""
-    mechanism, flat = assembly.mechanism, assembly.flat
+    """Return the largest length among the parameters of what moves, for each row of parameters; see `extent`."""
     numbers = {symbol.name: i for i, symbol in enumerate(assembly.parameters)}
-    found = np.zeros(len(parameters))
-    for name, slot in find_slots(flat):
-        local = mechanism.locals_.get(slot.part)
-        specs = local.part.component.parameter_specs() if local is not None else {}
-        if local is None or slot.name not in specs or specs[slot.name].unit.exponents != (0, 1, 0, 0):
+    counted = set(sizing_parameters(assembly.mechanism))
+    squares: dict[tuple[str, str], FloatArray] = {}
+    for name, slot in find_slots(assembly.flat):
+        key = slot.part, slot.name
+        if key not in counted:
             continue
-        bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[slot.part, one]] for one in local.connectors}
-        value = slot.read(flat)
-        if bodies == {0} or value is None:
-            continue
-        column = parameters[:, numbers[name]] if name in numbers else np.full(len(parameters), float(value))
-        found = np.maximum(found, np.abs(column))
-    return found
+        value = parameters[:, numbers[name]] if name in numbers else np.float64(slot.read(assembly.flat))
+        squares[key] = squares.get(key, np.zeros(len(parameters))) + value**2
+    return np.sqrt(np.max(list(squares.values()), axis=0)) if squares else np.zeros(len(parameters))
