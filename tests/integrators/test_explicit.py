@@ -1,6 +1,8 @@
 """The explicit method of order 8(5,3): its coefficients, its orders, its steps, and the session around it."""
 
 import math
+import signal
+import sys
 from collections.abc import Callable
 from typing import Any, Literal
 
@@ -280,6 +282,35 @@ def test_limits_stop_where_they_are_reached(kind: Kind) -> None:
     assert_array_equal(last.y, found.y)
     found = start(kind, pendulum, tight(1e-9), [2.0, 0.0], budget=Budget(wall_seconds=0.0)).advance(1.0)
     assert found.status is Status.TIME_LIMIT
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_ctrl_c_just_as_compiled_steps_call_python_is_not_lost(sampled: bool) -> None:
+    """The exception would arise in the function of Python before its `try`, where ctypes swallows it."""
+    sent = 0
+
+    def send(frame: Any, event: str, _: Any) -> None:
+        nonlocal sent
+        if event == "call" and frame.f_code.co_name == "rates" and frame.f_code.co_filename.endswith("native.py"):
+            sent += 1
+            if sent == 200:
+                signal.raise_signal(signal.SIGINT)
+
+    session = start("compiled", pendulum, tight(1e-9), [2.0, 0.0])
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
+    tracing = sys.gettrace()
+    try:
+        sys.settrace(send)
+        found = session.sample(np.linspace(0.0, 5.0, 6))[2] if sampled else session.advance(5.0)
+    finally:
+        sys.settrace(tracing)
+        handler = signal.signal(signal.SIGINT, before)
+    assert handler is signal.default_int_handler
+    assert found is not None
+    assert found.status is Status.INTERRUPTED
+    assert 0.0 <= found.t < 5.0
+    assert_allclose(found.y, start("reference", pendulum, tight(1e-12), [2.0, 0.0]).advance(found.t).y, atol=1e-8)
+    assert session.advance(5.0).status is Status.REACHED
 
 
 def test_interruption_loses_nothing(kind: Kind) -> None:

@@ -1,7 +1,7 @@
 """Kind `interrupts`: a process that runs and saves is killed, or meets Ctrl-C, at a random time.
 
 Afterwards files are whole or absent, and with the kernels that it left in the cache the next run gives the same
-numbers.
+numbers. A third of the processes are commands of `atwood`, which end with status 130 and without a traceback.
 """
 
 from __future__ import annotations
@@ -23,11 +23,22 @@ from .interrupted import FILES
 from .trial import Finding, Trial
 
 ROOT = Path(__file__).resolve().parents[2]
-ROUNDS = 50
+ROUNDS = 100_000
 """More than are done before the signal comes."""
 
 LONGEST = 4.0
 """The signal comes within so many seconds: the first round compiles, the others do not."""
+
+COMMANDS = (
+    ("run", "double-pendulum", "--t-end", "3000", "--outputs", "20000", "--save", "{place}/run.nc"),
+    ("run", "four-bar", "--form", "dae", "--t-end", "2000", "--save", "{place}/run.csv"),
+    ("run", "double-pendulum", "--solver", "ida-sundae", "--t-end", "300", "--json"),
+    ("sweep", "double-pendulum", "--vary", "mass2=0.5:2:3000", "--t-end", "100", "--save", "{place}/many.nc"),
+    ("sweep", "four-bar", "--form", "dae", "--vary-start", "crank.angle=0:1:500", "--save", "{place}/many.npz"),
+    ("compare", "double-pendulum", "--t-end", "200"),
+    ("run", "double-pendulum", "--t-end", "5", "--draw", "{place}/motion.gif"),
+)
+"""Commands of `atwood` that take longer than `LONGEST`."""
 
 PATIENCE = 30.0
 """Seconds within which a process must have ended after Ctrl-C."""
@@ -37,11 +48,15 @@ def check(seed: int) -> Trial:
     """Stop one process, and look at what it left."""
     chance = random.Random(seed)
     sent = chance.choice((signal.SIGKILL, signal.SIGINT))
+    after = LONGEST * chance.random() ** 2
+    if chance.random() < 1.0 / 3.0:
+        return _stop_command(chance.choice(COMMANDS), sent, after)
     with tempfile.TemporaryDirectory() as directory:
         place = Path(directory, "files")
         cache = Path(directory, "kernels")
         place.mkdir()
-        findings = _stop(place, cache, sent, LONGEST * chance.random() ** 2)
+        command, options = _command(place, cache, ROUNDS)
+        findings = _stop(command, options, sent, after)
         present = [name for name in FILES if (place / name).exists()]
         findings += [finding for name in present for finding in _look_at(place / name)]
         left = sorted(path.name for path in place.iterdir() if path.name not in FILES)
@@ -53,6 +68,36 @@ def check(seed: int) -> Trial:
     return Trial((f"{sent.name}, {len(present)} files",), tuple(findings))
 
 
+def _stop_command(arguments: tuple[str, ...], sent: signal.Signals, after: float) -> Trial:
+    """Stop a command of `atwood`, and read the file that it has saved, if it has."""
+    with tempfile.TemporaryDirectory() as directory:
+        place = Path(directory, "files")
+        place.mkdir()
+        _, options = _command(place, Path(directory, "kernels"), 1)
+        program = (
+            "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); print('ready', flush=True); "
+        )
+        program += "from atwood.cli import main; main()"
+        words = [word.format(place=place) for word in arguments]
+        findings = _stop([sys.executable, "-c", program, *words], options, sent, after)
+        for file in sorted(place.iterdir()):
+            if file.suffix not in (".nc", ".npz", ".csv", ".gif"):
+                if sent == signal.SIGINT:
+                    findings.append(Finding("message", "Ctrl-C leaves files with other names", file.name))
+            elif file.suffix != ".gif":
+                findings += _read_whole(file, arguments[0])
+    return Trial((f"{sent.name}: atwood {arguments[0]}",), tuple(findings))
+
+
+def _read_whole(file: Path, command: str) -> list[Finding]:
+    """Return what is wrong with a file of a command, which may end early but not in the middle of a number."""
+    try:
+        (atwood.load_sweep if command == "sweep" else atwood.load_result)(file)
+    except Exception as error:
+        return [Finding("crash", f"half a file {file.suffix}: {type(error).__name__}", str(error))]
+    return []
+
+
 def _command(place: Path, cache: Path, rounds: int) -> tuple[list[str], dict[str, Any]]:
     path = os.pathsep.join(str(ROOT / name) for name in ("src", "library"))
     environment = {**os.environ, "PYTHONPATH": path, "ATWOOD_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
@@ -60,9 +105,8 @@ def _command(place: Path, cache: Path, rounds: int) -> tuple[list[str], dict[str
     return command, {"cwd": ROOT, "env": environment, "text": True}
 
 
-def _stop(place: Path, cache: Path, sent: signal.Signals, after: float) -> list[Finding]:
+def _stop(command: list[str], options: dict[str, Any], sent: signal.Signals, after: float) -> list[Finding]:
     """Start a process and send it a signal so many seconds after it began; return what is wrong with how it ended."""
-    command, options = _command(place, cache, ROUNDS)
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(command, **options, **pipes) as process:
         assert process.stdout is not None
@@ -74,7 +118,8 @@ def _stop(place: Path, cache: Path, sent: signal.Signals, after: float) -> list[
         except subprocess.TimeoutExpired:
             process.kill()
             return [Finding("hang", "Ctrl-C does not end it", f"sent after {after:.3f} s")]
-    if process.returncode not in (-signal.SIGKILL, 130) or (sent == signal.SIGINT and errors):
+    is_quiet = errors.strip() in ("", "Interrupted.") and "Traceback" not in errors
+    if process.returncode not in (-signal.SIGKILL, 130) or (sent == signal.SIGINT and not is_quiet):
         said = errors.strip().rpartition("\n")[2]
         return [Finding("crash", f"{sent.name}: status {process.returncode}, {said[:60]}", errors)]
     return []

@@ -76,8 +76,10 @@ class NativeProgram:
         self.prologue_address = built.code.addresses["kernel_prologue"]
         self.scratch = built.scratch
         self.from_cache = built.from_cache
-        self.call = _KERNEL(self.address)
-        self._prologue = _PROLOGUE(self.prologue_address)
+        self.call: Callable[..., int] = _KERNEL(self.address)
+        self._prologue: Callable[..., None] = _PROLOGUE(self.prologue_address)
+        if built.failures is not None:
+            self.call, self._prologue = map(built.failures.watch, (self.call, self._prologue))
 
     def bind(self, parameter_values: ArrayLike) -> NativeKernel:
         """Compute once what depends on parameters alone.

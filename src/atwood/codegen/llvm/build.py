@@ -58,14 +58,28 @@ class Failures(threading.local):
     ----------
     error
         The exception, or None.
+    interrupted
+        Whether Ctrl-C came meanwhile.
     """
 
     error: BaseException | None = None
+    interrupted: bool = False
 
     def take(self) -> BaseException | None:
         """Return the exception and forget it."""
         error, self.error = self.error, None
-        return error
+        interrupted, self.interrupted = self.interrupted, False
+        return error or (KeyboardInterrupt() if interrupted else None)
+
+    def watch(self, call: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a compiled function that calls Python, with Ctrl-C put off until it has returned."""
+        from atwood.interrupts import InterruptLater
+
+        def watched(*arguments: Any) -> Any:
+            with InterruptLater(self):
+                return call(*arguments)
+
+        return watched
 
 
 @dataclass(frozen=True)

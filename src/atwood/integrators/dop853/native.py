@@ -147,6 +147,8 @@ class CompiledStepper:
     def __init__(self, problem: ExplicitProblem, options: SolverOptions) -> None:
         self._size, self._options = problem.size, options
         self._failure: BaseException | None = None
+        self.interrupted = False
+        self._calls_python = problem.compiled is None
         self._restart: Callable[[float], None] | None = None
         rates = self._in_python(problem) if problem.compiled is None else problem.compiled()
         self._keep = rates.keep
@@ -234,7 +236,7 @@ class CompiledStepper:
         self._y[:] = y
         if self._restart is not None:
             self._restart(t)
-        return self._finish(self._begin(self._session, t, self._places[0])) == 0
+        return self._call(self._begin, t, self._places[0]) == 0
 
     def state(self) -> State:
         """Return time, values and rates at the end of the last step."""
@@ -245,11 +247,11 @@ class CompiledStepper:
         """Take steps until one ends at or after a time, but no more than so many."""
         self._numbers[_STOP] = t_stop
         self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
-        return Outcome(self._finish(self._run(self._session)))
+        return Outcome(self._call(self._run))
 
     def interpolate(self, t: float) -> State:
         """Return the state at a time within the last step."""
-        if self._finish(self._interpolate(self._session, t, *self._places)) or not np.isfinite(self._y).all():
+        if self._call(self._interpolate, t, *self._places) or not np.isfinite(self._y).all():
             raise no_interpolation(t)
         return t, self._y.copy(), self._yp.copy()
 
@@ -259,17 +261,26 @@ class CompiledStepper:
         y, yp = np.empty((2, len(times), self._size))
         self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
         tables = (array.ctypes.data for array in (y, yp))
-        outcome = self._finish(self._sample(self._session, times.ctypes.data, len(times), *tables))
+        outcome = self._call(self._sample, times.ctypes.data, len(times), *tables)
         filled = int(self._counts[_FILLED])
         if outcome == _NO_VALUE:
             raise no_interpolation(float(times[filled]))
         return y[:filled], yp[:filled], Outcome(outcome)
 
-    def _finish(self, code: int) -> int:
-        """Return the code of a call, after raising what was raised in it."""
-        if self._failure is not None:
-            failure, self._failure = self._failure, None
+    def _call(self, function: Callable[..., int], *arguments: float) -> int:
+        """Call a function of the steps and return its code, or raise what Python functions raised in it."""
+        if not self._calls_python:
+            return function(self._session, *arguments)
+        from atwood.interrupts import InterruptLater
+
+        with InterruptLater(self):
+            code = function(self._session, *arguments)
+        failure, self._failure = self._failure, None
+        interrupted, self.interrupted = self.interrupted, False
+        if failure is not None:
             raise failure
+        if interrupted:
+            raise KeyboardInterrupt
         return code
 
     def _in_python(self, problem: ExplicitProblem) -> CompiledRates:
@@ -277,7 +288,7 @@ class CompiledStepper:
         size = problem.size
 
         def rates(t: float, y: int, yp: int, data: int) -> int:
-            if self._failure is not None:
+            if self._failure is not None or self.interrupted:
                 return 1
             try:
                 found = np.ctypeslib.as_array(ctypes.cast(yp, ctypes.POINTER(c_double)), (size,))

@@ -7,8 +7,6 @@ are kept in the `Record`, and raised again once IDA has returned.
 from __future__ import annotations
 
 import ctypes
-import signal
-import threading
 from collections.abc import Callable, Iterable
 from ctypes import c_double, c_int32, c_int64, c_void_p
 from math import inf
@@ -25,7 +23,6 @@ from atwood.integrators.protocol import FloatArray, ImplicitProblem, LinearSolve
 from atwood.late import dataclass
 
 __all__ = [
-    "InterruptLater",
     "Record",
     "address",
     "explain",
@@ -257,42 +254,6 @@ def weight_function(relative: FloatArray, absolute: FloatArray, record: Record, 
 
     record.calls_python = True
     return WEIGHTS(weights)
-
-
-class InterruptLater:
-    """While this is entered, Ctrl-C makes IDA return as soon as it calls a Python function.
-
-    Otherwise the exception could arise where a C function has just called Python, and would be lost there.  A second
-    Ctrl-C is raised at once, so that a function that never returns can be left.  Only the main thread gets
-    signals, and a handler that somebody else has installed is left alone.
-
-    Parameters
-    ----------
-    record
-        Takes up that Ctrl-C came.
-    """
-
-    def __init__(self, record: Record) -> None:
-        self._record = record
-        self._installed = False
-
-    def __enter__(self) -> None:
-        if (
-            threading.current_thread() is threading.main_thread()
-            and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        ):
-            signal.signal(signal.SIGINT, self._handle)
-            self._installed = True
-
-    def __exit__(self, *_: object) -> None:
-        if self._installed:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-            self._installed = False
-
-    def _handle(self, *_: object) -> None:
-        if self._record.interrupted:
-            raise KeyboardInterrupt
-        self._record.interrupted = True
 
 
 def explain(problem: ImplicitProblem, record: Record, states: Iterable[State]) -> None:

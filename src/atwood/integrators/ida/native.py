@@ -21,7 +21,7 @@ import numpy as np
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import EventLocator, Root, State
-from atwood.integrators.ida.callbacks import InterruptLater, Record, explain
+from atwood.integrators.ida.callbacks import Record, explain
 from atwood.integrators.ida.library import available, library, why_not
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
 from atwood.integrators.ida.pace import FIRST_CHUNK, Pace, first_chunk
@@ -38,6 +38,7 @@ from atwood.integrators.protocol import (
     StepResult,
     choose_linear_solver,
 )
+from atwood.interrupts import InterruptLater
 from atwood.late import replace
 
 __all__ = ["IdaTuning", "NativeSession", "available", "open_session", "why_not"]
