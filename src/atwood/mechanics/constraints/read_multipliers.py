@@ -5,6 +5,11 @@ every joint has its multipliers, both solve ``M a - G^T lambda = -w``, ``G a = -
 the balance of forces, and depends on some of the multipliers: z.  They solve ``z = z_0 - A w(z)``.  Where w is affine
 in z that is a linear system; else Newton's method is written out, from the multipliers without these forces on, and
 what has not converged has no value.
+
+Where joints close a loop, constraints may be redundant. Then some multipliers are not determined, and what forces make
+of them must not depend on these, which is checked in numbers. A small multiple of its diagonal is added to
+``G M^-1 G^T`` and taken back by iteration (iterated Tikhonov regularization: Engl, Hanke and Neubauer, Regularization
+of Inverse Problems, section 5.1), since no choice of independent constraints need hold all along a motion.
 """
 
 from __future__ import annotations
@@ -26,6 +31,12 @@ _ITERATIONS = 6
 
 _CONVERGED = 1e-9
 """Relative to the multipliers: what is further from a solution after all steps is none."""
+
+_ADDED = 1e-6
+"""Relative to the diagonal of ``G M^-1 G^T``: what is added to it where constraints may be redundant."""
+
+_TIMES = 4
+"""So often the system is solved with it; of a direction with an eigenvalue of 1e-4 a share of 1e-8 is missing then."""
 
 _LARGEST_FILL = 20_000
 """Beyond so many products the system is solved in numbers."""
@@ -72,7 +83,7 @@ def known_multipliers(
     mechanism
         The mechanism.
     equations
-        Its equations in maximal coordinates, whose rows may depend on multipliers, with independent constraints.
+        Its equations in maximal coordinates, whose rows may depend on multipliers.
     read
         The multipliers wanted.
 
@@ -95,7 +106,8 @@ def known_multipliers(
     stand_ins = {i: graph.symbol(f"force row {i}") for i, row in enumerate(bias) if depends_on(row, wanted)}
     right = [-stand_ins.get(i, row) for i, row in enumerate(bias)]
     right += [-one for one in substitute([one.second for one in constraints], at_rest)]
-    solved = _solve_system(rows, speeds, accelerations, constraints, right)
+    system = _System(rows, speeds, accelerations, constraints, right)
+    solved = _without_choice(system, speeds) if _close_loops(mechanism, constraints) else _solve_system(system)
     found = [solved[number[symbol]] for symbol in wanted]
     forces, values = list(stand_ins.values()), [bias[i] for i in stand_ins]
     slopes = jacobian(found, forces)
@@ -112,25 +124,80 @@ def known_multipliers(
     return {**known, **dict(zip(wanted, found, strict=True))}
 
 
-def _solve_system(
-    rows: Sequence[Expression],
-    speeds: Sequence[Expression],
-    accelerations: Sequence[Expression],
-    constraints: Sequence[Constraint],
-    right: Sequence[Expression],
-) -> list[Expression]:
-    """Return accelerations and multipliers for a right-hand side: written out if that is short, else in numbers."""
-    graph, n, size = rows[0].graph, len(speeds), len(right)
-    mass = jacobian(list(rows), list(accelerations))
-    constraint_jacobian = jacobian([one.rate for one in constraints], list(speeds))
-    full = {(r, c): e for r, c, e in zip(mass.rows, mass.columns, mass.entries, strict=True)}
-    slopes = {
-        (n + r, c): e
-        for r, c, e in zip(
-            constraint_jacobian.rows, constraint_jacobian.columns, constraint_jacobian.entries, strict=True
-        )
-    }
-    upper = {(r, c): e for (r, c), e in full.items() if r <= c} | {(c, r): e for (r, c), e in slopes.items()}
+class _System:
+    """The balance ``M a - G^T lambda = r``, ``G a + C lambda = s`` with a diagonal C.
+
+    Attributes
+    ----------
+    mass, slopes
+        Entries of M, and those of G with the rows behind those of M, by row and column.
+    right
+        The right-hand side.
+    diagonal
+        The diagonal of C; empty where it is zero.
+    masses
+        Number of accelerations.
+    """
+
+    def __init__(
+        self,
+        rows: Sequence[Expression],
+        speeds: Sequence[Expression],
+        accelerations: Sequence[Expression],
+        constraints: Sequence[Constraint],
+        right: Sequence[Expression],
+    ) -> None:
+        self.masses, self.right = len(speeds), list(right)
+        mass = jacobian(list(rows), list(accelerations))
+        held = jacobian([one.rate for one in constraints], list(speeds))
+        self.mass = {(r, c): e for r, c, e in zip(mass.rows, mass.columns, mass.entries, strict=True)}
+        places = zip(held.rows, held.columns, held.entries, strict=True)
+        self.slopes = {(self.masses + r, c): e for r, c, e in places}
+        self.diagonal: list[Expression] = []
+
+
+def _close_loops(mechanism: Mechanism, constraints: Sequence[Constraint]) -> bool:
+    """Return whether parts with constraints close a loop of bodies, so that constraints may be redundant."""
+    group: dict[int, int] = {}
+
+    def leader(body: int) -> int:
+        while group.setdefault(body, body) != body:
+            body = group[body]
+        return body
+
+    body_of, node_of = mechanism.bodies.body_of, mechanism.graph.node_of
+    for path in dict.fromkeys(one.key[0] for one in constraints):
+        bodies = {body_of[node_of[path, name]] for name in mechanism.locals_[path].connectors}
+        leaders = {leader(body) for body in bodies}
+        if len(leaders) < len(bodies):
+            return True
+        group.update(dict.fromkeys(leaders, min(leaders)))
+    return False
+
+
+def _without_choice(system: _System, speeds: Sequence[Expression]) -> list[Expression]:
+    """Return accelerations and multipliers, of which those that are not determined have any value that fits."""
+    graph, n = speeds[0].graph, system.masses
+    diagonal = [graph.zero] * (len(system.right) - n)
+    for (r, c), entry in system.slopes.items():
+        if (c, c) in system.mass:
+            diagonal[r - n] = diagonal[r - n] + entry * entry / system.mass[c, c]
+    system.diagonal = [_ADDED * one if not one.is_zero else graph.constant(_ADDED) for one in diagonal]
+    right = list(system.right)
+    solved = _solve_system(system)
+    for _ in range(_TIMES - 1):
+        kept = [c * multiplier for c, multiplier in zip(system.diagonal, solved[n:], strict=True)]
+        system.right = [*right[:n], *(side + one for side, one in zip(right[n:], kept, strict=True))]
+        solved = _solve_system(system)
+    return solved
+
+
+def _solve_system(system: _System) -> list[Expression]:
+    """Return accelerations and multipliers: written out if that is short, else in numbers."""
+    n, size, full, right = system.masses, len(system.right), system.mass, system.right
+    graph = right[0].graph
+    upper = {(r, c): e for (r, c), e in full.items() if r <= c} | {(c, r): e for (r, c), e in system.slopes.items()}
+    upper |= {(n + i, n + i): one for i, one in enumerate(system.diagonal)}
     order = [*range(n), *(i for i in minimum_degree(_after(list(upper), n, size), size) if i >= n)]
     if all((i, i) in full for i in range(n)) and fill_of(list(upper), order) <= _LARGEST_FILL:
         try:
@@ -143,8 +210,10 @@ def _solve_system(
                 known[step.unknown] = back_substitute(step, known)
             return [known[i] for i in range(size)]
     matrix = [[full.get((i, j), graph.zero) for j in range(size)] for i in range(size)]
-    for (i, j), entry in slopes.items():
+    for (i, j), entry in system.slopes.items():
         matrix[i][j], matrix[j][i] = entry, -entry
+    for i, entry in enumerate(system.diagonal, n):
+        matrix[i][i] = entry
     return [graph.convert(one) for one in solve(matrix, list(right))]
 
 
@@ -222,4 +291,5 @@ def with_known(equations: Equations, read: Mapping[Expression, Expression]) -> E
     """Return equations with functions of the state in place of the multipliers that forces read."""
     known = substitute([*equations.rows, *equations.rates], dict(read))
     rows, rates = tuple(known[: len(equations.rows)]), tuple(known[len(equations.rows) :])
-    return replace(equations, rows=rows, rates=rates, read=dict(read), rows_with_multipliers=equations.rows)
+    made = replace(equations, rows=rows, rates=rates, read=dict(read))
+    return replace(made, rows_with_multipliers=equations.rows, rates_with_multipliers=equations.rates)

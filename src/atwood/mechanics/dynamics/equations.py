@@ -137,8 +137,8 @@ class Equations:
         The multipliers that laws of force read, as functions of the state; `rows` has these in their place.
     states
         Continuous states of parts: the last of the coordinates, which no speed moves.
-    rows_with_multipliers
-        In maximal coordinates, the rows as they are: with the multipliers themselves; empty if they have none.
+    rows_with_multipliers, rates_with_multipliers
+        In maximal coordinates, rows and rates as they are: with the multipliers themselves; empty if none is read.
     decisions
         What was decided by the size of numbers on the way.
     constants
@@ -169,6 +169,7 @@ class Equations:
     integrals: tuple[Integral, ...] = ()
     read: Mapping[Expression, Expression] = field(default_factory=dict)
     rows_with_multipliers: tuple[Expression, ...] = ()
+    rates_with_multipliers: tuple[Expression, ...] = ()
     states: tuple[LocalState, ...] = ()
     decisions: tuple[Decision, ...] = ()
     constants: Mapping[Expression, Constant] = field(default_factory=dict)

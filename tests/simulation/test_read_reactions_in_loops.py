@@ -1,0 +1,129 @@
+"""Forces that read reactions where constraints are redundant: what is determined is read, and nothing else."""
+
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from atwood import Load, Scene, UnsupportedError, Vector, as_vector, dot, force, parameter, simulate, sqrt, sweep
+from atwood_library import Ground, Link, Pivot, RigidBody, Weld
+
+QUANTITIES = ("pivot1.angular_velocity", "pivot2.angular_velocity")
+
+
+class RoughPivot(Pivot):
+    """A hinge whose friction grows with its speed and with its load, across the axis or as a whole."""
+
+    friction: float = parameter(0.05, unit="m*s", doc="Torque for each newton and rad/s.")
+    load: str = parameter("across", choices=("across", "whole"), doc="Which load counts.")
+
+    @force
+    def rub(self) -> Iterable[Load]:
+        """Return the friction."""
+        axis = self.a.to_world(as_vector(self.axis))
+        load = Vector(*(self.reaction(f"force.{one}") for one in "xyz"))
+        if self.load == "across":
+            load -= axis * dot(load, axis)
+        rate = dot(self.b.angular_velocity - self.a.angular_velocity, axis)
+        torque = axis * (-self.friction * rate * sqrt(dot(load, load) + 0.01))
+        return [Load(self.b, Vector(0.0, 0.0, 0.0), torque), Load(self.a, Vector(0.0, 0.0, 0.0), -torque)]
+
+
+def four_bar(turned: float | None = None, load: str = "across") -> Scene:
+    """Return a four-bar linkage in the plane, or in space, turned, where it has three redundant constraints."""
+    scene = Scene(space="plane" if turned is None else "space")
+    ground, foot = scene.add("ground", Ground()), scene.add("foot", Weld(displacement=(2.5, 0.0, 0.0)))
+    links = [scene.add(name, Link(length=size, mass=1.0)) for name, size in (("a", 1.0), ("b", 2.5), ("c", 2.0))]
+    pivots = [scene.add(f"pivot{i}", Pivot() if i else RoughPivot(load=load)) for i in range(4)]
+    base = ground.frame
+    if turned is not None:
+        stand = scene.add("stand", Weld(angle=turned, axis=(0.0, 0.0, 1.0)))
+        scene.connect(base, stand.a)
+        base = stand.b
+    joined = [(base, pivots[0].a), (base, foot.a), (foot.b, pivots[3].b), (links[2].b, pivots[3].a)]
+    joined += [(pivots[i].b, links[i].a) for i in range(3)] + [(links[i].b, pivots[i + 1].a) for i in range(2)]
+    for a, b in joined:
+        scene.connect(a, b)
+    scene.start.update({"pivot1.angle": 1.0, "pivot1.angular_velocity": 3.0})
+    return scene
+
+
+def motion(scene: Scene, **options: Any) -> np.ndarray:
+    result = simulate(scene, t_end=0.5, rtol=1e-9, outputs=6, **options)
+    assert result.energy.max_drift < 1e-7
+    return np.array([result.array(name) for name in QUANTITIES])
+
+
+@cache
+def in_the_plane() -> np.ndarray:
+    return motion(four_bar())
+
+
+@pytest.mark.parametrize(
+    ("turned", "form", "solver"),
+    [
+        (0.0, "reduced", "explicit"),
+        (0.5, "reduced", "explicit"),
+        (0.5, "reduced", "ida"),
+        (0.5, "dae", "ida"),
+        (0.5, "dae", "explicit"),
+    ],
+)
+def test_friction_in_a_redundant_loop_is_that_in_the_plane(turned: float, form: str, solver: str) -> None:
+    """It was refused: constraints are redundant, though the load across the axis of a hinge is determined."""
+    found = motion(four_bar(turned), form=form, solver=solver)
+    np.testing.assert_allclose(found, in_the_plane(), atol=1e-6)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_load_that_redundant_constraints_share_is_refused_by_name(form: str) -> None:
+    with pytest.raises(UnsupportedError, match=r"pivot0\.force\.y, which is not determined") as caught:
+        simulate(four_bar(0.0, "whole"), form=form, t_end=0.1)
+    assert caught.value.where == "pivot0"
+    assert "pivot0.coincidence[1]" in caught.value.message
+
+
+def on_cranks(rough: str) -> Scene:
+    """Return a table on three parallel cranks, of which one is redundant, and a link that hangs on the table."""
+    scene = Scene()
+    ground, table = scene.add("ground", Ground()), scene.add("table", RigidBody(mass=2.0, moments=(0.0, 0.5, 0.0)))
+    for i in range(3):
+        crank = scene.add(f"crank{i}", Link(length=0.5, mass=0.3))
+        low, high = (scene.add(f"{name}{i}", Weld(displacement=(float(i), 0.0, 0.0))) for name in ("low", "high"))
+        foot, head = (
+            scene.add(f"foot{i}", RoughPivot() if f"foot{i}" == rough else Pivot()),
+            scene.add(f"h{i}", Pivot()),
+        )
+        for a, b in ((ground.frame, low.a), (low.b, foot.a), (foot.b, crank.a), (crank.b, head.a)):
+            scene.connect(a, b)
+        scene.connect(table.frame, high.a)
+        scene.connect(high.b, head.b)
+    hook, bob = scene.add("hook", RoughPivot() if rough == "hook" else Pivot()), scene.add("bob", Link(length=0.4))
+    scene.connect(table.frame, hook.a)
+    scene.connect(hook.b, bob.a)
+    scene.start["foot1.angle"] = 1.0
+    return scene
+
+
+def test_from_rest_on_it_counts_what_friction_reads_later() -> None:
+    with pytest.raises(UnsupportedError, match=r"foot0\.force\.x, foot0\.force\.z, which is not determined"):
+        simulate(on_cranks("foot0"), t_end=0.1)
+
+
+def test_a_hinge_beside_redundant_constraints_is_read() -> None:
+    results = [simulate(on_cranks("hook"), form=form, t_end=0.5, rtol=1e-8, outputs=3) for form in ("reduced", "dae")]
+    assert results[0].energy.work[-1] < -1e-3
+    angles = [result.array("bob.angle") for result in results]
+    np.testing.assert_allclose(angles[0], angles[1], atol=1e-5)
+
+
+def test_in_a_sweep() -> None:
+    frictions = [0.02, 0.05]
+    swept = sweep(four_bar(0.5), vary={"pivot0.friction": frictions}, t_end=0.2, quantities=["pivot1.angle"], rtol=1e-9)
+    for friction, found in zip(frictions, swept["pivot1.angle"], strict=True):
+        scene = four_bar()
+        scene["pivot0"].friction = friction
+        alone = simulate(scene, t_end=0.2, rtol=1e-9)["pivot1.angle"][-1]
+        assert float(np.ravel(found)[-1]) == pytest.approx(float(alone), abs=1e-7)
