@@ -192,6 +192,17 @@ def test_what_is_redundant_changes_as_a_plate_turns(make: Callable[[Stand], Scen
     assert max(found.energy.max_drift, expected.energy.max_drift) < 1e-7
 
 
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("angle", [8.3e-11, 8.08e-11, 1e-12])
+def test_what_rounding_makes_of_constraints_is_asked_where_they_are(angle: float) -> None:
+    """Bearings of a loop in a coordinate plane are exactly alike at the start; as it turns away, they round."""
+    found, expected = (
+        simulate(driven(Stand(one)), form="reduced", solver="ida", rtol=1e-10, outputs=13) for one in (angle, 0.0)
+    )
+    assert found.status == "finished"
+    assert max(apart(found, expected, Stand(angle))) < 1e-7
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("reviews", [True, False])
 @pytest.mark.parametrize("make", [driven, governor])

@@ -6,8 +6,6 @@ which must not be taken for additional freedom.
 
 from __future__ import annotations
 
-from dataclasses import field
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,8 +47,6 @@ class RankFinding:
         The same at the start position alone.
     lost_at_start
         Numbers of independent constraints that follow from the others at the start position.
-    errors
-        How far rounding can take the Jacobian's row of each constraint.
     """
 
     kept: tuple[int, ...]
@@ -58,7 +54,6 @@ class RankFinding:
     rank: int
     rank_at_start: int
     lost_at_start: tuple[int, ...] = ()
-    errors: FloatArray = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
 
     @property
     def starts_singular(self) -> bool:
@@ -110,8 +105,7 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     best = max([here, *nearby], key=lambda place: len(place.kept))
     redundant = tuple(i for i in everything if i not in set(best.kept))
     lost = _lost(here, nearby, best.kept)
-    errors = np.max([place.errors for place in (here, *nearby)], axis=0)
-    return RankFinding(tuple(best.kept), redundant, len(best.kept), len(best.kept) - len(lost), lost, errors)
+    return RankFinding(tuple(best.kept), redundant, len(best.kept), len(best.kept) - len(lost), lost)
 
 
 def _hangs_together(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> bool:
@@ -147,7 +141,8 @@ def review_kept(finding: RankFinding, balance: Balance, t: float, q: FloatArray,
     if not finding.redundant or not finding.kept:
         return finding
     jacobian = scaled(balance.constraints_at(t, q, np.zeros_like(scales)).jacobian, scales)
-    kept = tuple(review_rows(jacobian, finding.errors, finding.kept, _holding(balance)))
+    errors = balance.errors.near(t, q, scales)  # what says nothing at the start may say something by now, and round
+    kept = tuple(review_rows(jacobian, errors, finding.kept, _holding(balance)))
     if kept == finding.kept or len(kept) < len(finding.kept):  # at a singular position no choice is a good one
         return finding
     redundant = tuple(i for i in range(balance.constraints) if i not in set(kept))
