@@ -29,10 +29,15 @@ _BELOW = re.compile(rf"{_NUMBER} <=? {_NUMBER}(?![\w.])")
 
 
 def ratio_in(explanation: str) -> float | None:
-    """Return the largest value / bound among the comparisons `value < bound` that an explanation shows, if any."""
+    """Return the largest value / bound among the comparisons `value < bound` that an explanation shows, if any.
+
+    Two whole numbers are a count and its bound: they do not round.
+    """
     first_line = explanation.partition("\n")[0]
     found = (
-        [float(side.removeprefix("np.float64(").rstrip(")")) for side in pair] for pair in _BELOW.findall(first_line)
+        [float(side.removeprefix("np.float64(").rstrip(")")) for side in pair]
+        for pair in _BELOW.findall(first_line)
+        if not all(side.isdecimal() for side in pair)
     )
     return max((value / bound for value, bound in found if 0 <= value <= bound and bound > 0), default=None)
 

@@ -39,7 +39,8 @@ def test_a_run_that_found_no_test_or_crashed_is_not_finished() -> None:
     [
         ("1e-09 < 1e-08", 0.1),
         ("np.float64(2.0e-09) <= 1e-08\n  + where ...", 0.2),
-        ("(3 < 4 and 1 < 4)", 0.75),
+        ("(3.0 < 4.0 and 1.0 < 4.0)", 0.75),
+        ("12 <= 12", None),
         ("5 > 4", None),
         ("(9 - 8) < 3", None),
         ("(5 < 4) == False", None),
