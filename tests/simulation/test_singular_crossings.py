@@ -188,6 +188,50 @@ def test_both_forms_and_drivers_pass_alike() -> None:
         assert abs(result["crank0.angle"][-1] - runs[0]["crank0.angle"][-1]) < 1e-7
 
 
+@pytest.mark.sample(6)
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("windows", "space"), [(1, "plane"), (2, "plane"), (3, "plane"), (1, "space")])
+@pytest.mark.parametrize("rtol", [1e-13, 1e-10, 1e-8, 1e-4])
+def test_steps_do_not_come_near_the_place(windows: int, space: str, form: str, rtol: float) -> None:
+    """It is passed before a solver is there: steps of 1e-13 s lie there, and other ways to move."""
+    result = quiet(FourBarRow(windows=windows, space=space), form=form, rtol=rtol)
+    exact = ExactRow(windows)
+    angle = 0.5 * np.pi - result["foot[0].angle"]
+    assert np.max(np.abs(angle - exact.crank_angle(result.time))) < max(5e3 * rtol, 1e-9)
+    assert [one.ways for one in result.singular_crossings] == 10 * [windows]
+    assert result.statistics.steps < 2000  # 220,000 before
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("rtol", [1e-8, 1e-10, 1e-11, 1e-13])
+@pytest.mark.parametrize("angle", [1.0, 2.86, 2.5])
+def test_a_crossed_four_bar_stays_crossed_wherever_it_begins(form: str, rtol: float, angle: float) -> None:
+    scene = four_bar(crossed=True)
+    scene.start["crank.angle"] = angle
+    other = -2.0 * math.atan(3.0 * math.tan(0.5 * angle))
+    height, width = math.sin(other) - math.sin(angle), 2.0 + math.cos(other) - math.cos(angle)
+    scene.guess.update({"rocker.angle": other, "coupler.angle": math.atan2(height, width)})
+    result = quiet(scene, form=form, rtol=rtol, t_end=0.6)
+    half, across = 0.5 * result["crank.angle"], 0.5 * result["rocker.angle"]
+    assert np.max(np.abs(3.0 * np.sin(half) * np.cos(across) + np.cos(half) * np.sin(across))) < 1e-9
+    assert result.energy.max_drift < 1e3 * rtol  # 4.85 at 1e-10 before: it had leapt into the parallelogram
+    assert result.statistics.steps < 1000
+
+
+def test_what_lies_behind_the_end_is_not_told() -> None:
+    for end in (0.6, 0.7, 0.708, 0.709):
+        result = quiet(FourBarRow(windows=1), rtol=1e-9, t_end=end)
+        assert len(result.singular_crossings) == (end > 0.70845)
+
+
+@pytest.mark.parametrize("outputs", [11, 201, 2001])
+def test_no_output_on_the_way_is_lost(outputs: int) -> None:
+    for rtol in (1e-6, 1e-10):
+        result = quiet(FourBarRow(windows=1, space="space"), rtol=rtol, t_end=1.6, outputs=outputs)
+        assert np.allclose(result.time, np.linspace(0.0, 1.6, outputs), rtol=0.0, atol=1e-12)
+
+
 # -- near it -----------------------------------------------------------------------------------------------------------
 
 

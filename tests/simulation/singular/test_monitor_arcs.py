@@ -78,7 +78,9 @@ def test_states_between_looks_follow_the_motion() -> None:
     q, u = one._between(np.array([2.0, 2.5, 3.0, 4.0, 5.0]))
     assert q[0] == pytest.approx([4.0, 6.25, 9.0, 16.0, 25.0])
     assert u[0] == pytest.approx([4.0, 5.0, 6.0, 8.0, 10.0])
-    for outside in ([1.9, 2.5], [2.5, 5.1]):
+    ahead, _ = one._between(np.array([4.5, 6.0, 9.0]))  # what is of second degree goes on as it was
+    assert ahead[0] == pytest.approx([20.25, 36.0, 81.0])
+    for outside in ([1.9, 2.5], [2.5, 10.1]):
         assert one._between(np.array(outside)) is None
 
 
@@ -269,6 +271,7 @@ def test_a_failed_solver_is_helped_over_what_lay_ahead(status: Status) -> None:
     one._measure = lambda: None  # type: ignore[method-assign]
     one._first_minimum = Asked(None)  # type: ignore[method-assign]
     one._ahead, one._from_start = Asked(None), Asked(found)  # type: ignore[method-assign]
+    one._coming = Asked(None)  # type: ignore[method-assign]
     step = SimpleNamespace(status=status, t=2.2)
     assert one.look(step, True, False) is (found if status is Status.FAILED else None)
     assert one._first_minimum.calls == [(status is Status.FAILED, status is Status.FAILED)]

@@ -157,7 +157,7 @@ class LookoutData:
 
     def restart(self) -> None:
         """Forget what was noted; not how much conditions have changed."""
-        self._state[[AT["count"], AT["is_low"], AT["later"]]] = 0.0
+        self._state[[AT["count"], AT["is_low"], AT["falls"], AT["later"]]] = 0.0
         self._arrays["least"][:] = self._arrays["earlier"][:] = np.inf
 
     def settle(self) -> None:
@@ -186,13 +186,21 @@ class LookoutData:
         """Whether something was low among what was noted and not taken yet."""
         return bool(self._state[AT["is_low"]])
 
+    @property
+    def least_share(self) -> float:
+        """The least that the last look left of a condition, as a share of the most that it has been."""
+        pivots, most = self._arrays["pivots"], self._arrays["most"]
+        with np.errstate(all="ignore"):
+            return float(np.sqrt(np.nanmin(pivots / most, initial=1.0)))
+
     def take(self) -> list[tuple[float, NDArray[np.float64], NDArray[np.float64]]]:
         """Return what was noted, time, y and y' each; it is not asked about again."""
         notes, count, size = self._arrays["notes"], int(self._state[AT["count"]]), self.code.shape.size
         noted = notes[:count].copy()
         carried = noted[-CARRIED:]
         notes[: len(carried)] = carried
-        self._state[[AT["is_low"], AT["later"], AT["count"]]] = 0.0, 0.0, len(carried)
+        is_still_low = self._state[AT["falls"]]  # so that it is asked again when what comes behind is known
+        self._state[[AT["is_low"], AT["later"], AT["count"]]] = is_still_low, 0.0, len(carried)
         self._arrays["least"][:] = self._arrays["earlier"][:] = np.inf
         return [(float(one[0]), one[1 : 1 + size], one[1 + size :]) for one in noted]
 

@@ -32,7 +32,7 @@ _ARRAYS: tuple[str, ...] = ("derived", "scratch", "sizes", "values", "slopes", "
 _ARRAYS += ("pivots", "first", "most", "least", "earlier", "known")
 LISTS = ("kept", "row", "column", "one", "other", "product")
 FIELDS = (*_ARRAYS, *LISTS, "notes", "best", "state")
-STATE = ("next", "count", "is_low", "later", "move", "whole", "idle", "low", "worn", "best")
+STATE = ("next", "count", "is_low", "falls", "later", "move", "whole", "idle", "low", "worn", "best")
 AT = {name: number for number, name in enumerate(STATE)}
 
 
@@ -116,6 +116,10 @@ def _look_text(shape: Shape) -> str:
     over = r.put(f"or i1 {full}, {r.put(f'fcmp oge double {later}, {literal(_LATER)}')}")
     asks = r.put(f"and i1 {over}, {r.put(f'fcmp une double {has}, 0.0')}")
     asks = r.put(f"or i1 {asks}, {r.put(f'fcmp une double {worn}, 0.0')}")
+    was_high = r.put(f"fcmp oeq double {r.load(state, AT['falls'])}, 0.0")
+    begins = r.put(f"and i1 {is_low}, {was_high}")
+    asks = r.put(f"or i1 {asks}, {begins}")
+    r.store(r.put(f"select i1 {is_low}, double 1.0, double 0.0"), state, AT["falls"])
     carries = r.put(f"and i1 {full}, {r.put(f'xor i1 {asks}, true')}")
     with r.when(carries):
         _copy(r, CARRIED * shape.note, r.place(data["notes"], (CAPACITY - CARRIED) * shape.note), data["notes"])

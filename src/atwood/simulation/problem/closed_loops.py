@@ -3,7 +3,7 @@
 Which coordinates these are is a choice, as in the numeric loop (`atwood.simulation.dynamics.partitioning`). Of all that
 formulas can do with, one is preferred that meets no dead centre in a whole turn; else the one that is farthest from
 any. Where a dead centre comes near, others take over; where none are better, the position is singular or nearly so, and
-the rest is left to the numeric loop.
+constraints are kept from there on.
 """
 
 from __future__ import annotations
@@ -38,14 +38,13 @@ __all__ = [
     "TURN",
     "Solved",
     "can_be_solved",
-    "have_formulas",
     "levels",
     "on_branch",
     "solve_at",
 ]
 
 _NEAR = 0.1
-"""Nearer to a dead centre of every choice, as the square of a sine, the numeric loop takes over.
+"""Nearer to a dead centre of every choice, as the square of a sine, the constraints are kept from there on.
 
 That is 18 degrees before links are in line: whoever looks out for singular positions has to see the motion from well
 before one on.
@@ -64,10 +63,11 @@ _AMPLE = 0.5
 """Of several independent coordinates, among which none turns fully for all others, a choice so far is good enough."""
 
 _LARGEST = 4000
-"""More products of freedoms and speeds are left to the numeric loop: formulas know of no entry that is zero."""
+"""With more products of freedoms and speeds constraints are kept: formulas know of no entry that is zero."""
 
-_MOST = 60
-"""More choices of independent coordinates are not tried."""
+_MOST, _FEWEST, _WORK = 60, 3, 120
+"""So many choices of independent coordinates are tried at most; of mechanisms of many coordinates fewer, down to the
+second number: the third divided by the number of coordinates. Each costs formulas for the whole mechanism."""
 
 TURN = 144
 """In so many positions of a whole turn it is seen whether there is a dead centre."""
@@ -163,8 +163,9 @@ class _Choices:
         self.equations = assembly.reduced
         self.loops = Loops(self.equations, _place(plan, t, q))
         every = self.loops.choices(len(self.equations.speeds) - plan.finding.rank)
+        most = min(_MOST, max(_FEWEST, _WORK // len(self.equations.coordinates)))
         fitting = (one for one in itertools.islice(every, 20 * _MOST) if self.loops.can_be_solved(one))
-        self.every = tuple(itertools.islice(fitting, _MOST))
+        self.every = tuple(itertools.islice(fitting, most))
         self._forms: dict[tuple[int, ...], ClosedForm | None] = {}
 
     def form(self, assembly: Assembly, independent: tuple[int, ...]) -> ClosedForm | None:
@@ -230,22 +231,6 @@ def _freedoms_besides(plan: Plan) -> int:
     equations = plan.assembly.reduced
     turning = sum(len(one.speeds) for one in equations.orientation_coordinates)
     return len(equations.speeds) - plan.finding.rank - turning
-
-
-def have_formulas(plan: Plan, t: float, q: FloatArray) -> bool:
-    """Return whether formulas solve the loops of a scene, if perhaps not where it is.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    t, q
-        An admissible position.
-    """
-    if not can_be_solved(plan):
-        return False
-    choices = _choices(plan, t, q)
-    return any(choices.form(plan.assembly, one) is not None for one in choices.every)
 
 
 def solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | None:

@@ -64,19 +64,23 @@ class Choice:
         A key of `SOLVERS`.
     reason
         Why, in words.
-    goes_back
-        Whether formulas solve the loops of the scene elsewhere, and are to go on from there.
+    keeps_constraints
+        Whether an explicit method keeps constraints, also where formulas would solve the loops.
     """
 
     time: float
     solver: str
     reason: str
-    goes_back: bool = False
+    keeps_constraints: bool = False
 
     @property
     def name(self) -> str:
         """The name of the solver."""
         return SOLVERS[self.solver]
+
+    def is_like(self, other: Choice) -> bool:
+        """Return whether another choice is of the same solver for the same equations."""
+        return (self.solver, self.keeps_constraints) == (other.solver, other.keeps_constraints)
 
 
 def check_solver(asked: str) -> None:
@@ -149,14 +153,11 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
 
 def _choose_for_loops(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
     """Return what solves a mechanism with closed loops: an explicit method where formulas solve these."""
-    from atwood.simulation.problem.closed_loops import have_formulas, solve_at
+    from atwood.simulation.problem.closed_loops import solve_at
 
     solved = solve_at(plan, t, q, u)
     if solved is None:
-        reason = "closed loops leave constraints among the coordinates"
-        if have_formulas(plan, t, q):
-            return Choice(t, implicit_solver(), reason, True)
-        return _choose_on_constraints(plan, options, t, q, u, reason)
+        return _choose_on_constraints(plan, options, t, q, u, "closed loops leave constraints among the coordinates")
     found = stiffness_of(plan, options, t, q, u)
     if found is not None and found.is_stiff:
         return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
@@ -190,7 +191,7 @@ def _choose_on_constraints(
     found = stiffness_of(plan, options, t, q, u)
     if found is not None and found.is_stiff:
         return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
-    return Choice(t, "explicit", f"{reason}, on which steps end, and the problem is not stiff")
+    return Choice(t, "explicit", f"{reason}, on which steps end, and the problem is not stiff", True)
 
 
 def _has_closed_series(plan: Plan, options: RunOptions, solved: Solved) -> bool:
@@ -208,9 +209,14 @@ def _has_closed_series(plan: Plan, options: RunOptions, solved: Solved) -> bool:
     return True
 
 
-def dead_centre(t: float) -> Choice:
-    """Return the choice of the numeric loop in the middle of a run, where formulas for it have no value near by."""
-    return Choice(t, implicit_solver(), "a dead centre of every choice of independent coordinates is near", True)
+def dead_centre(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
+    """Return what goes on with the constraints in the middle of a run, where formulas for loops have no value near by.
+
+    Arguments as of `choose`. It keeps them to the end: mechanisms pass such a place twice in each turn, and steps on
+    constraints cost hardly more than formulas whose choice is made anew each time.
+    """
+    reason = "a dead centre of every choice of independent coordinates is near, and constraints are kept"
+    return _choose_on_constraints(plan, options, t, q, u, reason)
 
 
 _HAS_SERIES: Key[bool] = Key("whether accelerations have Taylor series")

@@ -60,7 +60,8 @@ class ClosedLoopSession:
     leave
         See `atwood.integrators.explicit_session.open_explicit`.
     give_up
-        Called with the time where a dead centre of every choice comes near; the session then ends with `Status.STIFF`.
+        Called with the time and the state where a dead centre of every choice comes near; the session then ends with
+        `Status.STIFF`.
     """
 
     def __init__(
@@ -71,7 +72,7 @@ class ClosedLoopSession:
         y: FloatArray,
         solved: Solved,
         leave: Leave | None,
-        give_up: Callable[[float], None] | None,
+        give_up: Callable[[float, FloatArray], None] | None,
     ) -> None:
         self._request, self._solver, self._leave, self._give_up = request, solver, leave, give_up
         self._before = Statistics(error_test_failures=0, convergence_failures=0)
@@ -138,7 +139,7 @@ class ClosedLoopSession:
             solved = self._better(result, y)
             if solved is None:
                 if self._give_up is not None:
-                    self._give_up(result.t)
+                    self._give_up(result.t, y)
                 return replace(full, status=Status.STIFF, message="a dead centre is near")
             self._change(result.t, y, solved)
         elif own and self._reads_counts():

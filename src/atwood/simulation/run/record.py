@@ -172,12 +172,12 @@ class Recorder:
             self._add(_Block(t, q, u, shown.copy(), misses_of(self.plan, t, q, u)))
 
     def note(self, singular_crossings: Sequence[SingularCrossing]) -> None:
-        """Record crossings that the solver made by itself; states quite near the place cannot be projected well."""
+        """Record crossings that the solver made by itself; states on their ways are those of the paths."""
         self.settle()
         for crossing in singular_crossings:
             self.singular_crossings.append(crossing)
             for block in self._samples[0]:
-                inside = crossing.has_in_its_middle(block.time)
+                inside = crossing.covers(block.time)
                 if crossing.path is not None and inside.any():
                     q, u, _ = crossing.path.at(block.time[inside])
                     block.q[:, inside], block.u[:, inside] = self.plan.balance.kinematic_map.normalized(q), u
@@ -230,9 +230,9 @@ class Recorder:
         blocks = self._samples[0]
         q, u, held = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u", "held"))
         time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
-        return SegmentRecord(
-            self.plan, impact, time, q, u, shown, held, tuple(self.singular_crossings), after_time_event
-        )
+        # A path may lead over a place behind the end, or behind an event.
+        crossings = tuple(one for one in self.singular_crossings if one.path is None or one.time <= time[-1])
+        return SegmentRecord(self.plan, impact, time, q, u, shown, held, crossings, after_time_event)
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: _Waiting = ()) -> None:
         q, u = (part.copy() for part in self.plan.program.split(y.T))

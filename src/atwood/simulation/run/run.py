@@ -239,7 +239,7 @@ class _Walk:
         self.segments.append(recorder.segment(self.impact, after_time_event))
         self.statistics = self.statistics + outcome.statistics
         for choice in outcome.choices:
-            if not self.choices or choice.solver != self.choices[-1].solver:
+            if not self.choices or not choice.is_like(self.choices[-1]):
                 self.choices.append(choice)
         self.choice = outcome.choices[-1]
         return recorder, outcome

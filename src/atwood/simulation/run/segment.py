@@ -32,7 +32,6 @@ from atwood.simulation.run.session import SolverRequest, open_explicit_session, 
 from atwood.simulation.run.tolerances import too_tight
 
 if TYPE_CHECKING:
-    from atwood.simulation.run.way_back import WayBack
     from atwood.simulation.singular.crossing import SingularCrossing
     from atwood.simulation.singular.monitor import SingularityMonitor
 
@@ -101,7 +100,6 @@ class _Runner:
         self.before = Statistics(error_test_failures=0, convergence_failures=0)
         self.session: Session | None = None
         self.monitor: SingularityMonitor | None = None
-        self.way_back: WayBack | None = None
         self.request: SolverRequest | None = None
         self.opened: StepResult | None = None
         self.noted: list[EventRecord] = []
@@ -238,7 +236,6 @@ class _Runner:
 
     def _open(self, t: float, y: FloatArray, yp: FloatArray) -> Session:
         segment, choice = self.segment, self.choices[-1]
-        self.way_back = None
         options, spent = segment.options, segment.spent + self.before
         request = SolverRequest(
             segment.plan,
@@ -259,14 +256,12 @@ class _Runner:
             self.request, self.opened = request, here
             self.monitor = singularity_monitor_of(segment.plan, options.relative_tolerance, segment.end, here)
             self.session = open_implicit_session(request, choice.solver, t, y, yp, self.monitor)
-            if choice.goes_back:
-                from atwood.simulation.run.way_back import WayBack
-
-                self.way_back = WayBack(segment.plan, options, segment.end, here)
         else:
             leave = self._is_stiff if options.solver == "auto" else None
             try:
-                self.session = open_explicit_session(request, choice.solver, t, y, leave, self._give_up)
+                self.session = open_explicit_session(
+                    request, choice.solver, t, y, leave, self._give_up, choice.keeps_constraints
+                )
             except StartError:
                 pack_state(segment.plan, t, *segment.plan.program.split(y))  # says what has no value, if it can
                 raise
@@ -294,9 +289,10 @@ class _Runner:
         self.choices.append(turned_stiff(t, found))
         return True
 
-    def _give_up(self, t: float) -> None:
-        """Leave a dead centre to the numeric loop."""
-        self.choices.append(dead_centre(t))
+    def _give_up(self, t: float, y: FloatArray) -> None:
+        """Go on with constraints where every choice of formulas comes to a dead centre."""
+        plan = self.segment.plan
+        self.choices.append(dead_centre(plan, self.segment.options, t, *plan.program.split(y)))
 
     def _change_solver(self, step_result: StepResult) -> tuple[float, FloatArray, FloatArray]:
         """Return the state from which another solver goes on."""
@@ -331,6 +327,11 @@ class _Runner:
     def _sample_watched(self, session: SamplingSession, done: int) -> tuple[int, StepResult | None]:
         """Let an explicit method fill tables, with looks at the motion where constraints stay."""
         while True:
+            crossing = None if self.monitor is None else self.monitor.ahead_of_start()
+            if crossing is not None:
+                done, stopped = self._pass_over(session, crossing)
+                if stopped is not None:
+                    return done, stopped
             done, step_result = self._sample(session, done)
             monitor = self.monitor
             if monitor is None:
@@ -341,6 +342,7 @@ class _Runner:
             turned = self._turned(here) if noticed else None
             crossing = monitor.look(here, noticed, at_end or turned is not None)
             if crossing is not None:
+                self._sample_until(session, done, crossing)
                 done, stopped = self._pass_over(session, crossing)
                 if stopped is not None:
                     return done, stopped
@@ -350,6 +352,18 @@ class _Runner:
                 session = cast("SamplingSession", self._keep(turned, here))
             elif not noticed:
                 return done, step_result
+
+    def _sample_until(self, session: SamplingSession, done: int, crossing: SingularCrossing) -> None:
+        """Take outputs up to where a path begins: the last step may have been looked at beyond those that are taken."""
+        assert crossing.path is not None
+        samples = self.segment.samples
+        first = int(np.searchsorted(samples.times, crossing.path.start, side="right"))
+        while done < first:
+            y, _, step_result = session.sample(samples.times[done:first])
+            self.recorder.take_many(samples.times[done : done + len(y)], y, samples.shown[done : done + len(y)])
+            done += len(y)
+            if step_result.status is not Status.NOTICED:
+                return
 
     def _note_crossings(self, monitor: SingularityMonitor) -> None:
         """Take crossings that the solver made by itself into the record."""
@@ -368,18 +382,23 @@ class _Runner:
         plan, told = segment.plan, -np.inf
         reads, repairs = hasattr(type(session), "read_on"), self._repairs  # protocols are slow to ask
         while done < len(times):
-            moment, monitor, way = times[done], self.monitor, self.way_back
-            look, ask = np.inf if monitor is None else monitor.next, np.inf if way is None else way.next
-            target = min(moment, look, ask)
+            moment, monitor = times[done], self.monitor
+            look = np.inf if monitor is None else monitor.next
+            target = min(moment, look)
+            crossing = None if monitor is None else monitor.ahead_of_start()
+            if crossing is not None:
+                done, stopped = self._pass_over(session, crossing)
+                if stopped is not None:
+                    return done, stopped
+                continue
             step_result = session.advance(target)
             if step_result.status is Status.FAILED and self._repartitioned(session, step_result):
                 step_result = session.advance(target)
             noticed = step_result.status is Status.NOTICED
             between = target < moment or noticed
             looks = noticed or look == target < moment
-            back = way.ask(step_result) if way is not None and step_result.t >= ask else None
-            turned = self._turned(step_result) if back is None and (looks or monitor is None) else None
-            at_end = (moment >= segment.end and not noticed and moment <= ask) or turned is not None or back is not None
+            turned = self._turned(step_result) if looks or monitor is None else None
+            at_end = (moment >= segment.end and not noticed) or turned is not None
             crossing = None if monitor is None else monitor.look(step_result, looks, at_end)
             if crossing is not None:
                 done, stopped = self._pass_over(session, crossing)
@@ -390,10 +409,6 @@ class _Runner:
                 self._note_crossings(monitor)
             if step_result.status not in (Status.REACHED, Status.NOTICED):
                 return done, step_result
-            if back is not None:
-                choice, y = back
-                self.choices.append(choice)
-                return done, replace(step_result, y=y, status=Status.STIFF)
             if turned is not None:
                 session = self._keep(turned, step_result)
             if between:
@@ -420,7 +435,7 @@ class _Runner:
         """Return whether nothing is looked at, or put right, from one output to the next within a step."""
         plan, monitor = self.segment.plan, self.monitor
         looks = plan.finding.redundant if monitor is None else monitor.next < np.inf
-        return not (looks or self.way_back is not None or plan.reviews_outputs or self._repairs)
+        return not (looks or plan.reviews_outputs or self._repairs)
 
     @property
     def _repairs(self) -> bool:
@@ -452,8 +467,6 @@ class _Runner:
             else:
                 behind = StepResult(path.end, *self._packed(path.end, q, u), Status.REACHED)
             self.monitor.restart(behind, is_behind=True)
-            if self.way_back is not None:
-                self.way_back.begin_again(behind)
         return done, None
 
     def _repartitioned(self, session: Session, step_result: StepResult) -> bool:

@@ -188,7 +188,8 @@ def open_explicit_session(
     t: float,
     y: FloatArray,
     leave: Leave | None = None,
-    give_up: Callable[[float], None] | None = None,
+    give_up: Callable[[float, FloatArray], None] | None = None,
+    keeps_constraints: bool = False,
 ) -> ExplicitSession | ClosedLoopSession:
     """Start an explicit method.
 
@@ -204,13 +205,15 @@ def open_explicit_session(
         See `atwood.integrators.explicit_session.open_explicit`.
     give_up
         See `atwood.simulation.run.closed_session.ClosedLoopSession`.
+    keeps_constraints
+        See `atwood.simulation.run.choice.Choice`.
 
     Raises
     ------
     UsageError
         If the scene is not one for explicit methods.
     """
-    if request.plan.balance.constraints:
+    if request.plan.balance.constraints and not keeps_constraints:
         from atwood.simulation.problem.closed_loops import solve_at
         from atwood.simulation.run.closed_session import ClosedLoopSession
 

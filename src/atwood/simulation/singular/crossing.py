@@ -65,6 +65,10 @@ class SingularCrossing:
         """Return which times are so near that states are better taken from the path than projected."""
         return np.asarray(np.abs(t - self.time) < 0.1 * self._half)
 
+    def covers(self, t: FloatArray) -> NDArray[np.bool_]:
+        """Return at which times states are better taken from the path than from between the ends of a solver's step."""
+        return np.zeros(len(t), dtype=bool) if self.path is None else (t > self.path.start) & (t < self.path.end)
+
     def leaves_open(self, t: FloatArray) -> NDArray[np.bool_]:
         """Return at which times reactions are not determined, within rounding."""
         return np.asarray(np.abs(t - self.time) < 1e-6 * self._half) if self.ways else np.zeros(len(t), dtype=bool)

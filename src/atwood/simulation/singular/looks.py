@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from atwood.codegen.sundials.lookout import LookoutCode, LookoutData
 from atwood.late import dataclass
 
-__all__ = ["Look", "as_lookout", "compiled_looks", "cubic", "stride_from"]
+__all__ = ["Look", "as_lookout", "compiled_looks", "cubic", "going_on", "stride_from"]
 
 _LOOKOUT: Key[LookoutCode] = Key("machine code of the singularity monitor")
 
@@ -83,6 +83,27 @@ def cubic(s: FloatArray, ends: tuple[FloatArray, FloatArray], slopes: tuple[Floa
     (a, b), (v, w) = ends, slopes
     found: FloatArray = a + s * v + s**2 * (3.0 * (b - a) - 2.0 * v - w) + s**3 * (2.0 * (a - b) + v + w)
     return found
+
+
+def going_on(plan: Plan, look: Look, times: FloatArray) -> FloatArray:
+    """Return coordinates and speeds at times near a look, about: from the accelerations there, shape (number, times).
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    look
+        A state.
+    times
+        When, s.
+    """
+    n, m = plan.program.coordinates, len(plan.sizes)
+    later = np.asarray(times) - look.t
+    u = look.y[n : n + m, None] + look.yp[n : n + m, None] * later
+    middle = look.y[n : n + m, None] + 0.5 * look.yp[n : n + m, None] * later
+    q = np.repeat(look.y[:n, None], len(later), axis=1)
+    moved = plan.balance.kinematic_map.moved_each(np.full(len(later), look.t), q, middle * later)
+    return np.concatenate([moved, u])
 
 
 def compiled_looks(plan: Plan, whole: float, size: int) -> LookoutData | None:

@@ -19,8 +19,8 @@ from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely, project_states
 from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow
 from atwood.simulation.singular.crossing import SingularCrossing, stuck_at
-from atwood.simulation.singular.looks import Look, as_lookout, compiled_looks, cubic, stride_from
-from atwood.simulation.singular.rank_measure import RankMeasure, find_crossing, find_loss, nearly_lost
+from atwood.simulation.singular.looks import Look, as_lookout, compiled_looks, cubic, going_on, stride_from
+from atwood.simulation.singular.rank_measure import RankMeasure, find_crossing, find_loss, nearly_lost, zero_ahead
 from atwood.tolerances import tolerances
 
 __all__ = ["SingularityMonitor", "singularity_monitor_of"]
@@ -53,6 +53,18 @@ _ACCURATE = 1e-7
 """Arcs over a place are taken whose estimates are smaller, or within the tolerance; errors are far below these."""
 
 _FINE = 17
+
+_AHEAD, _POINTS_AHEAD = 1.6, 9
+"""A position is looked for so far ahead of the last look, in strides between looks, and at so many points."""
+
+_AT_START = 0.7
+"""Where less than this share is left at a start of what constraints are around it, it is looked ahead from there."""
+
+_BEYOND = 2.5
+"""The motion is guessed so far behind the last look, in strides."""
+
+_AROUND = (-2.0, -1.0, 1.0, 2.0)
+"""So many strides from where it begins constraints are looked at to see how independent they are elsewhere."""
 
 _AGREES = 30.0
 """Times the tolerance: a solver whose states behind the place differ by less from the arc has gone the same way."""
@@ -126,6 +138,7 @@ class SingularityMonitor:
             self._compiled.rows[:] = tolerances.TRUSTED * errors
             self._measures.rows = self._compiled.rows
         self._start, self._is_behind = step_result, False
+        self._starts_low = False
         self._begin_looks()
 
     @property
@@ -152,9 +165,26 @@ class SingularityMonitor:
             self.note(self._start)
             return
         self.next = np.inf
+        if not self._is_behind:
+            self._look_around()
         self._compiled.restart()
         self._compiled.note(self._start.t, self._start.y, self._start.yp)
         self._compiled.settle()
+        self._starts_low = self._compiled.least_share < _AT_START and not self._is_behind
+
+    def _look_around(self) -> None:
+        """See how independent constraints are around the start, which may be near a singular position itself."""
+        assert self._compiled is not None
+        here = Look(self._start.t, self._start.y, self._start.yp)
+        stride = stride_from(self.plan, here, np.inf)
+        if not np.isfinite(stride):
+            return
+        times = here.t + stride * np.array(_AROUND)
+        self._compiled.restart()
+        for t, y in zip(times.tolist(), going_on(self.plan, here, times).T, strict=True):
+            self._compiled.note(t, np.concatenate([y, self._start.y[len(y) :]]), self._start.yp)
+        t, q = self._compiled.best
+        self._measures.learn(np.array([t]), q[:, None])
 
     def note(self, step_result: StepResult) -> None:
         """Take up a state, and decide when to look again."""
@@ -186,6 +216,8 @@ class SingularityMonitor:
             self._measure()
             failed = step_result.status is Status.FAILED
             found = self._first_minimum(at_end or ended, failed)
+            if found is None and not (at_end or ended):
+                found = self._coming(step_result.t)
             if found is None and failed:
                 found = self._ahead() or self._from_start(step_result.t)
             self._forget()
@@ -208,6 +240,33 @@ class SingularityMonitor:
         t, q = compiled.best
         self._largest = max(self._largest, float(self._measures.learn(np.array([t]), q[:, None])[0]))
         return True
+
+    def ahead_of_start(self) -> SingularCrossing | None:
+        """Return the singular position just ahead of where it began to look; None where none is known to be near."""
+        if not self._starts_low:
+            return None
+        self._starts_low = False
+        self._looks = [Look(self._start.t, self._start.y, self._start.yp)]
+        self._away = []
+        self._measure()
+        return self._coming(self._start.t)
+
+    def _coming(self, now: float) -> SingularCrossing | None:
+        """Return the singular position just ahead of a solver, which need not come near it; None if there is none.
+
+        Solvers take ever shorter steps close to one, and a small error there can lead to another way to move.
+        """
+        last = self._looks[-1]
+        stride = stride_from(self.plan, last, np.inf)
+        if not (self._away[-1] > 0.0 and stride < np.inf):
+            return None
+        times = last.t + stride * np.linspace(0.0, _AHEAD, _POINTS_AHEAD)
+        near = zero_ahead(times, self._measures.at(times, going_on(self.plan, last, times)[: self._n]))
+        if near is None or not near > now:
+            return None
+        self.plan.compiles_columns = True
+        begin = self._begin(near, 1.0)
+        return None if begin is None else self._over(near, *begin)
 
     def _ahead(self) -> SingularCrossing | None:
         """Return the singular position towards which the motion was going when a solver failed; None if to none."""
@@ -436,7 +495,9 @@ class SingularityMonitor:
     def _between(self, t: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return coordinates and speeds at times, from what the solver gave around them; None beyond that."""
         looks = self._looks
-        if not (looks[0].t <= t[0] and t[-1] <= looks[-1].t):
+        if len(looks) < 2 or not looks[0].t <= t[0]:
+            return None
+        if t[-1] > looks[-1].t + _BEYOND * (looks[-1].t - looks[-2].t):
             return None
         times = np.array([one.t for one in looks])
         y, yp = (np.stack([getattr(one, name)[: self._n + self._m] for one in looks], axis=1) for name in ("y", "yp"))

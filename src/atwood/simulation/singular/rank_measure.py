@@ -19,7 +19,10 @@ from atwood.simulation.problem.projection import ConstraintsAt, constraints_at
 from atwood.simulation.singular.collocation import Arc
 from atwood.tolerances import tolerances
 
-__all__ = ["Loss", "RankMeasure", "find_crossing", "find_loss", "nearly_lost"]
+__all__ = ["Loss", "RankMeasure", "find_crossing", "find_loss", "nearly_lost", "zero_ahead"]
+
+_UNEVEN = 0.5
+"""By so large a share steps on both sides of a zero may differ."""
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
@@ -185,6 +188,27 @@ def _clenshaw(coefficients: list[float], x: float) -> float:
     for k in range(len(coefficients) - 1, 0, -1):
         value, after = coefficients[k] + ((2 * k + 1) * x * value) / (k + 1) - (k + 1) / (k + 2) * after, value
     return coefficients[0] + x * value - 0.5 * after
+
+
+def zero_ahead(times: FloatArray, away: FloatArray) -> float | None:
+    """Return when a measure falls to zero at an even rate, and rises again, between some times; None if it does not.
+
+    Parameters
+    ----------
+    times
+        Equally far from each other.
+    away
+        The measure there.
+    """
+    least = int(np.argmin(away)) if np.all(np.isfinite(away)) else 0
+    if not 0 < least < len(away) - 1:
+        return None
+    before, here, after = away[least - 1 : least + 2].tolist()
+    higher, lower, way = (before, after, 1.0) if before > after else (after, before, -1.0)
+    if not abs((higher - here) - (here + lower)) < _UNEVEN * (higher - here):
+        return None  # it turns back before zero
+    share = way * here / (here + lower)
+    return float(times[least] + share * (times[1] - times[0]))
 
 
 def find_loss(measure: RankMeasure, arc: Arc, t: float, away: float) -> Loss | None:
