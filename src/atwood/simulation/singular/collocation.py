@@ -132,6 +132,8 @@ def find_arc(
     """
     x, _ = _points()
     times = t + 0.5 * (end - t) * (x + 1.0)
+    if not np.all(np.diff(times) > 0.0):  # too short for the digits of time
+        return None
     try:
         with np.errstate(all="ignore"):
             known = None if guess is None else guess(times)

@@ -54,8 +54,9 @@ _ACCURATE = 1e-7
 
 _FINE = 17
 
-_AHEAD, _POINTS_AHEAD = 1.6, 9
-"""A position is looked for so far ahead of the last look, in strides between looks, and at so many points."""
+_AHEAD = -0.8, 1.6, 13
+"""A position is looked for from so far behind to so far ahead of the last look, in strides between looks, at so many
+points: what is just ahead lies between two of them."""
 
 _AT_START = 0.7
 """Where less than this share is left at a start of what constraints are around it, it is looked ahead from there."""
@@ -260,7 +261,7 @@ class SingularityMonitor:
         stride = stride_from(self.plan, last, np.inf)
         if not (self._away[-1] > 0.0 and stride < np.inf):
             return None
-        times = last.t + stride * np.linspace(0.0, _AHEAD, _POINTS_AHEAD)
+        times = last.t + stride * np.linspace(*_AHEAD)
         near = zero_ahead(times, self._measures.at(times, going_on(self.plan, last, times)[: self._n]))
         if near is None or not near > now:
             return None
