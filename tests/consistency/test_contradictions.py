@@ -375,4 +375,79 @@ def test_a_class_is_looked_at_once(monkeypatch):
     for length in (1.0, 2.0, 3.0):
         aw.assemble(scene_with(Fresh(length=length)))
         aw.assemble(scene_with(Fresh(length=length)), form="dae")
-    assert [path for path in looked if path == "held"] == ["held"]
+    assert [path for path in looked if path == "held"] == ["held", "held"]  # where a length is one, and where it is not
+
+
+class WireOfARoot(Wire):
+    """A rod whose placement has a root in the place of a cosine: right as long as it hangs."""
+
+    @aw.joint("a", "b", coordinates=("angle",), solves=("wire",))
+    def swing(self, angle):
+        x = aw.sin(angle + self.offset)
+        return aw.Placement(aw.Vector(self.length * x, 0.0, -self.length * aw.sqrt(1.0 - x * x)))
+
+
+class Bar(aw.Component):
+    """A guide along x, on which a bead keeps on one side of z = 0 from a place on."""
+
+    spaces = ("plane",)
+    a: aw.Point = aw.connector(aw.Point, "Where it begins.")
+    b: aw.Point = aw.connector(aw.Point, "The bead.")
+
+    @aw.constraint(reaction="push", unit="N", doc="Force on the bead.")
+    def guide(self):
+        return self.b.position.z - self.a.position.z
+
+    @aw.joint("a", "b", coordinates=("way",), solves=("guide",))
+    def slide(self, way):
+        return aw.Placement(aw.Vector(way, 0.0, aw.maximum(-way - 5.0, 0.0)))
+
+    @aw.observable(unit="m", doc="How far it is.")
+    def way(self):
+        return self.b.position.x - self.a.position.x
+
+
+@pytest.mark.parametrize(("part", "text"), [(WireOfARoot(), "the observable 'angle' is"), (Bar(), "solves 'guide'")])
+def test_what_is_wrong_far_from_zero_only_is_found(part, text):
+    assert text in refused(part)
+
+
+class BarThatIsSquared(aw.Component):
+    """A guide on a frame, whose constraint is the square of a distance, which nothing can be held by."""
+
+    spaces = ("plane",)
+    a: aw.Frame = aw.connector(aw.Frame, "Where it begins.")
+    b: aw.Point = aw.connector(aw.Point, "The bead.")
+
+    def seen(self):
+        return self.a.to_frame(self.b.position - self.a.position)
+
+    @aw.constraint(reaction="push", unit="N", doc="Force on the bead.")
+    def guide(self):
+        return self.seen().z ** 2
+
+    @aw.joint("a", "b", coordinates=("way",), solves=("guide",))
+    def slide(self, way):
+        return aw.Placement(aw.Vector(way, 0.0, 0.0), axes="a")
+
+    @aw.observable(unit="m", doc="How far it is.")
+    def way(self):
+        return self.seen().x
+
+
+def test_a_square_that_is_to_be_zero_holds_nothing():
+    assert "of 2 ways in which 'b' can move it holds 1, and the constraints" in refused(BarThatIsSquared())
+
+
+class WireWithALengthTooFew(Wire):
+    """A rod whose rate forgets a length, which does not matter while that is one."""
+
+    @aw.observable(unit="rad/s", doc="Rate of the angle.")
+    def angular_velocity(self):
+        r, v = self.b.position - self.a.position, self.b.velocity - self.a.velocity
+        return (r.x * v.z - r.z * v.x) / self.length
+
+
+def test_a_power_of_one_does_not_hide_what_is_wrong_with_other_values():
+    aw.assemble(scene_with(WireWithALengthTooFew()))
+    assert "its rate 'angular_velocity' is" in refused(WireWithALengthTooFew(length=2.0))

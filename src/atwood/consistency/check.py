@@ -78,17 +78,25 @@ def _refuse(
 
 
 def _shape_of(part: Part, space: Space) -> Hashable:
-    """Return what decides which terms there are in a part's laws: choices and counts, and which numbers are zero."""
+    """Return what decides which terms there are in a part's laws: choices and counts, and which numbers are 0 or 1.
+
+    What has a factor too many, or a power, is right where that is one.
+    """
     line = () if space.line is None else tuple(space.line)
     shape: list[Hashable] = [space.name, line]
     for name, value in part.values.items():
         if line and isinstance(value, tuple) and part.component.parameter_specs()[name].direction:
             shape.append(value)  # what points along the line, and what does not
         elif isinstance(value, tuple) and not part.component.parameter_specs()[name].array:
-            shape.append(tuple(one == 0.0 for one in value))
+            shape.append(tuple(map(_special, value)))
         else:
-            shape.append(value == 0.0 if isinstance(value, float) else value)
+            shape.append(_special(value))
     return tuple(shape)
+
+
+def _special(value: Hashable) -> Hashable:
+    """Return a value; of floating-point numbers only those that hide terms."""
+    return value if not isinstance(value, float) or value in (0.0, 1.0, -1.0) else None
 
 
 def contradictions(part: Part, space: Space) -> Iterator[DeclarationError]:

@@ -15,8 +15,15 @@ from atwood.model.values.vector import ZERO, Vector, dot, norm
 __all__ = ["make_trial"]
 
 
+_WIDE_LENGTH, _WIDE_ANGLE = 10.0, 3.0
+"""By how much coordinates are larger in every second trial: up to ten lengths, and to nearly half a turn.
+
+A root in the place of a cosine is right within a quarter turn, and an absolute value on one side.
+"""
+
+
 def make_trial(part: Part, space: Space, seed: int) -> Trial:
-    """Return a component in a random state, the same for the same seed.
+    """Return a component in a random state, the same for the same seed; with odd seeds its joints are far from zero.
 
     Parameters
     ----------
@@ -49,8 +56,10 @@ def make_trial(part: Part, space: Space, seed: int) -> Trial:
     units = {law.name: law.options.unit for law in component.laws("observable")}
     for law in component.laws("joint"):
         for name in law.options.coordinates:
-            size = length if units.get(name) == "m" else 1.0
-            coordinates.setdefault(name, (number() * size, number() * size))
+            is_length = units.get(name) == "m"
+            size = length if is_length else 1.0
+            reach = 1.0 if seed % 2 == 0 else _WIDE_LENGTH if is_length else _WIDE_ANGLE
+            coordinates.setdefault(name, (reach * number() * size, number() * size))
     inputs = {}
     for name, signal in component.signal_specs().items():
         size = length if signal.unit.exponents == (0, 1, 0, 0) else 1.0

@@ -107,9 +107,13 @@ def _freedoms(trial: Trial, name: str) -> int:
 def _slopes(
     trial: Trial, law: Law, solved: Sequence[Law], poses: Mapping[str, Pose], moving: Mapping[str, Motion]
 ) -> dict[str, np.ndarray]:
-    """Return how constraints change with each way in which the joint's end can move: a row for each scalar."""
+    """Return how constraints change with each way in which the joint's end can move: a row for each scalar.
+
+    What changes alike both ways, as a square does, has no slope, and holds nothing.
+    """
     mover, directions = _mover(law), len(trial.space.basis)
     columns: dict[str, list[np.ndarray]] = {one.name: [] for one in solved}
+    sizes: dict[str, np.ndarray] = {one.name: np.zeros(1) for one in solved}
     for column in range(_freedoms(trial, mover)) if solved else ():
         by = 1e-4 * (trial.length if column < directions else 1.0)
         ends = [
@@ -118,7 +122,10 @@ def _slopes(
         ]
         for one, up, down in zip(solved, *ends, strict=True):
             columns[one.name].append((np.array(up) - np.array(down)) / 2e-4)
+            sizes[one.name] = np.maximum(sizes[one.name], np.maximum(np.abs(up), np.abs(down)) / 1e-4)
     found = {name: np.array(made).T for name, made in columns.items()}
+    for name, rows in found.items():
+        found[name] = np.where(np.abs(rows) > TOLERANCE * sizes[name][:, None], rows, 0.0) if rows.size else rows
     for one in solved:
         if found[one.name].size and not found[one.name].any():  # it depends on velocities alone
             found[one.name] = _velocity_jacobian(trial, mover, one, poses, moving)
