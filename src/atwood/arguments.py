@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ANYTHING",
+    "ARRAY",
     "BY_PATH",
     "CALLBACK",
     "DOC",
@@ -324,6 +325,18 @@ def each(kind: Kind, what: str, least: int = 0, single: bool = True) -> Kind:
     return Kind(what, read)
 
 
+def _array(value: Any) -> Any:
+    import numpy as np
+
+    found = np.asarray(value)
+    if found.dtype.kind not in "fiu" and found.size:  # text and truth values are no numbers, and None is none
+        raise Refused
+    found = found.astype(np.float64)
+    if not np.isfinite(found).all():
+        raise Refused("All must be finite.")
+    return found
+
+
 def _text(value: Any) -> str:
     if not isinstance(value, str):
         raise Refused
@@ -373,6 +386,7 @@ def _by_path(value: Any) -> Mapping[str, Any]:
 ANYTHING = Kind("anything", lambda value: value)
 """For what the function itself looks at."""
 
+ARRAY = Kind("a finite number, or an array of them", _array)
 TEXT = Kind("text", _text)
 NAME = Kind("a name, as text", _not_blank)
 DOC = Kind("one line of meaning", _not_blank)

@@ -17,7 +17,8 @@ import numpy as np
 
 from atwood import AtwoodError
 
-from .calls import Call, calls
+from .call import Call
+from .calls import calls
 from .trial import Finding, Trial
 
 
@@ -63,6 +64,13 @@ BAD: dict[str, list[Any]] = {
     "optional error": [*(one for one in NOT_POSITIVE if one is not None), 0.5, 1.0, 1e-16],
     "optional order": [*NOTHING_SOUND, "x", 3, 7, 2.5, -2, 0, [], True, math.nan],
     "texts": [3, 2.5, b"x", 1j, object(), Odd(), [3], [None], {"x": 1}, ["no.such.thing"], True],
+    "some objects": [one for one in [*NOTHING_SOUND, 3, "x", math.nan, True] if not isinstance(one, range)],
+    "some texts": [3, 2.5, b"x", 1j, object(), Odd(), [3], [None], {"x": 1}, ["no.such"], True, None, "no.such"],
+    "optional size": [*(one for one in NO_NUMBER if one is not None), -1.0],
+    "numbers": [*NOTHING_SOUND, "x", None, [], ["x"], [1j], [0.1, 0.2, 0.3, 0.4, 0.5], [[0.1]] * 3, True],
+    "some numbers": [*NOTHING_SOUND, "x", [], ["x"], [0.1] * 5, True],
+    "array out": [*NOTHING_SOUND, 3, "x", [0.0], np.zeros(7), np.zeros(1, dtype=int), np.zeros((1, 1, 1))],
+    "expression": [b"x", object(), {1, 2}, Odd(), Odd, [1.0], None, "(", "x y z +", math.nan],
     "file": [*NOTHING_SOUND, 3, "", " ", "a\0b.npz", None, "no/such/directory/x.npz", "."],
     "picture": [b"x", 1j, object(), Odd(), 3, "", "a\0b.png", "no/such/directory/x.png", ".", "x.unknown"],
     "callback": [3, "x", 2.5, [], {}, 1j, b"x"],

@@ -8,11 +8,14 @@ import pytest
 
 import atwood
 
+from . import calls_of_theory
 from .arguments import attempts, make, parameters_of
 from .calls import calls
 
 _SLOW = ("plot", "plot_mechanism", "animate", "plot_comparison", "plot_sweep", "Result.plot", "compare")
-"""What draws, or runs many times, before it comes to a bad file; tried in the soak alone but for two values."""
+"""What draws, or runs many times, before it comes to a bad file; tried in the soak alone but for one value."""
+
+_OF_THEORY = {call.name for call in calls_of_theory.calls()}
 
 
 def _chosen() -> list[object]:
@@ -21,7 +24,7 @@ def _chosen() -> list[object]:
         by_argument.setdefault(one.label, []).append(one)
     found = []
     for some in by_argument.values():
-        found += chance.sample(some, min(len(some), 1 if some[0].call.name in _SLOW else 2))
+        found += chance.sample(some, min(len(some), 1 if some[0].call.name in (*_SLOW, *_OF_THEORY) else 2))
     return found
 
 

@@ -11,8 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
-from atwood.analysis.number_functions import Function, Numbers, at_time
+from atwood.analysis.number_functions import Function, Numbers, as_numbers, as_time, at_time
 from atwood.analysis.velocity_jacobians import by_speeds, velocity_jacobian
+from atwood.arguments import NAME, check
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError, UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute
@@ -240,6 +241,7 @@ class Dynamics:
         UsageError
             If there is no such quantity, or it depends on accelerations or reactions.
         """
+        path = check(NAME, path, "path", self._name)
         if path not in self._jacobians:
             entries, shape = velocity_jacobian(self.assembly, self.equations, path)
             self._jacobians[path] = self._function(f"jacobian of {path}", lambda: entries, "q", shape)
@@ -325,8 +327,8 @@ class Dynamics:
     def _mass_by_columns(self, q: Numbers, u: Numbers, t: float | None, out: FloatArray | None) -> FloatArray:
         """Return a mass matrix that is too long to be written out, column by column."""
         time, n = self._time(t), len(self.equations.speeds)
-        states = np.atleast_2d(np.asarray(q, dtype=float))
-        speeds = np.zeros((len(states), n)) if u is None else np.atleast_2d(np.asarray(u, dtype=float))
+        states = np.atleast_2d(as_numbers(q, len(self.coordinates), "q", self._name))
+        speeds = np.zeros((len(states), n)) if u is None else np.atleast_2d(as_numbers(u, n, "u", self._name))
         assembly = at_time(self.assembly, time)
         found = np.stack([mass_at(assembly, assembly.form, time, *one) for one in zip(states, speeds, strict=True)])
         result = found.reshape(*np.shape(q)[:-1], n, n)
@@ -336,12 +338,12 @@ class Dynamics:
         return result
 
     def _time(self, t: float | None) -> float:
-        return self.assembly.flat.t_start if t is None else float(t)
+        return self.assembly.flat.t_start if t is None else as_time(t, self._name)
 
     def _solved(self, q: Numbers, u: Numbers, tau: Numbers, t: float | None) -> tuple[FloatArray, FloatArray]:
         mass, right = self.mass_matrix(q, u=u, t=t), -self.bias(q, u, t=t)
         if tau is not None:
-            right = right + np.asarray(tau, dtype=float)
+            right = right + as_numbers(tau, len(self.equations.speeds), "tau", self._name)
         if not self.equations.constraints:
             try:
                 a = np.linalg.solve(mass, right[..., None])[..., 0]

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from atwood.arguments import check, number, show
 from atwood.arrays import FloatArray
 from atwood.codegen import NativeProgram, compile_native, compile_program
 from atwood.errors import KernelEvaluationError, UsageError
@@ -16,12 +17,64 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.simulation.problem.not_compilable import find_not_compilable
 
-__all__ = ["Function", "Numbers", "at_time"]
+__all__ = ["Function", "Numbers", "as_numbers", "as_time", "at_time", "shape_of_states"]
 
 _NATIVE: Key[NativeProgram] = Key("machine code for one state")
 
 Numbers = Any
 """An array of floats, or what NumPy makes one of."""
+
+
+_TIME = number("a time in seconds, as a finite number, or None")
+
+
+def as_time(t: Any, where: str) -> float:
+    """Return a time that was given, or refuse it."""
+    return float(check(_TIME, t, "t", where))
+
+
+def as_numbers(given: Numbers, size: int, name: str, where: str) -> FloatArray:
+    """Return what was given for a state as an array of floats, or refuse it.
+
+    Parameters
+    ----------
+    given
+        Numbers, shape (..., size).
+    size
+        How many there are of one state.
+    name, where
+        What they are called, and of what.
+
+    Raises
+    ------
+    UsageError
+        If it is no array of real numbers, or has another shape.
+    """
+    if type(given) is np.ndarray and given.dtype == np.float64:
+        array = given
+    else:
+        try:
+            array = np.asarray(given)
+        except Exception:  # to look at a value of any class can raise anything
+            array = np.asarray(None)
+        array = array.astype(np.float64) if array.dtype.kind in "fiu" else np.asarray(None)
+    advice = f"Give an array of {size} numbers, or one with a row of so many for each state."
+    if array.dtype != np.float64:
+        raise UsageError(f"{name} cannot be {show(given)}", where=where, advice=advice)
+    if array.ndim == 0 or array.shape[-1] != size:
+        message = f"{name} has the shape {array.shape}, and the scene has {size} of them"
+        raise UsageError(message, where=where, advice=advice)
+    return array
+
+
+def shape_of_states(arrays: Sequence[FloatArray], names: Sequence[str], where: str) -> tuple[int, ...]:
+    """Return how many states there are, as the shape in front of that of one; refuse arrays that do not fit."""
+    try:
+        return np.broadcast_shapes(*(one.shape[:-1] for one in arrays))
+    except ValueError:
+        shapes = ", ".join(f"{name} has the shape {one.shape}" for name, one in zip(names, arrays, strict=True))
+        advice = "Give one state, or as many rows of each."
+        raise UsageError(f"these are different numbers of states: {shapes}", where=where, advice=advice) from None
 
 
 def at_time(assembly: Assembly, t: float) -> Assembly:
@@ -72,13 +125,11 @@ class Function:
 
     def _general(self, t: float | None, given: tuple[Numbers, ...], out: FloatArray | None) -> FloatArray:
         arrays = [self._checked(one, size, i) for i, (one, size) in enumerate(zip(given, self.sizes, strict=True))]
-        batch = np.broadcast_shapes(*(one.shape[:-1] for one in arrays))
+        t = None if t is None else as_time(t, self.program.name)
+        batch = shape_of_states(arrays, [group.name for group in self.program.inputs[1:]], self.program.name)
         whole = (*batch, *self.shape)
-        if out is not None and (out.shape != whole or out.dtype != np.float64 or not out.flags.c_contiguous):
-            raise UsageError(
-                f"out must be float64, contiguous and of shape {whole}, not {out.dtype} of shape {out.shape}",
-                where=self.program.name,
-            )
+        if out is not None:
+            self._check_out(out, whole)
         result = np.empty(whole) if out is None else out
         count, size = int(np.prod(batch, dtype=int)), int(np.prod(self.shape, dtype=int))
         if not count or not size:
@@ -99,15 +150,16 @@ class Function:
         return result
 
     def _checked(self, given: Numbers, size: int, position: int) -> FloatArray:
-        array = np.asarray(given, dtype=float)
-        if array.ndim == 0 or array.shape[-1] != size:
-            name = self.program.inputs[position + 1].name
-            raise UsageError(
-                f"{name} has the shape {array.shape}, and the scene has {size} of them",
-                where=self.program.name,
-                advice=f"Give an array of {size} numbers, or one with a row of so many for each state.",
-            )
-        return array
+        return as_numbers(given, size, self.program.inputs[position + 1].name, self.program.name)
+
+    def _check_out(self, out: FloatArray, whole: tuple[int, ...]) -> None:
+        is_array = isinstance(out, np.ndarray)
+        if is_array and out.shape == whole and out.dtype == np.float64 and out.flags.c_contiguous:
+            return
+        said = f"{out.dtype} of shape {out.shape}" if is_array else show(out)
+        advice = f"Give np.empty({whole}), or no out."
+        message = f"out must be float64, contiguous and of shape {whole}, not {said}"
+        raise UsageError(message, where=self.program.name, advice=advice)
 
     def _compile(self) -> None:
         if find_not_compilable(self.assembly, self.program):

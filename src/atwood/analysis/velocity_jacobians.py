@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from atwood.errors import UsageError, suggestion
+from atwood.errors import UsageError, suggestion_in_parts
 from atwood.expr import Expression, depends_on, jacobian, jvp
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.dynamics.equations import Equations
@@ -33,7 +33,7 @@ def velocity_jacobian(assembly: Assembly, equations: Equations, path: str) -> tu
     vector = [f"{path}.{axis}" for axis in "xyz" if f"{path}.{axis}" in observables]
     if path not in observables and not vector:
         known = sorted({one.rpartition(".")[0] if one[-2:] in (".x", ".y", ".z") else one for one in observables})
-        raise UsageError("there is no such quantity", where=path, advice=suggestion(path, known))
+        raise UsageError("there is no such quantity", where=path, advice=suggestion_in_parts(path, known))
     values = [observables[one].value for one in ([path] if path in observables else vector)]
     others = [*e.accelerations, *(one.symbol for one in assembly.reactions)]
     if any(depends_on(value, others) for value in values):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, get_args
 
+from atwood.arguments import ANYTHING, FLAG, show, takes
 from atwood.checking.expressions import wrong_on_expressions
 from atwood.checking.forces import wrong_forces
 from atwood.checking.report import CheckReport, Finding
@@ -44,6 +45,7 @@ class _Book:
                 self.found.setdefault((one.gravity, one.test, one.law, one.space), one)
 
 
+@takes(component=ANYTHING, run=FLAG)
 def check(component: Component | type[Component], *, run: bool = True) -> CheckReport:
     """Test a component as the parts of the library are tested.
 
@@ -79,7 +81,7 @@ def check(component: Component | type[Component], *, run: bool = True) -> CheckR
     """
     cls = component if isinstance(component, type) else type(component)
     if not issubclass(cls, Component):
-        raise UsageError(f"{component!r} is no component", advice="Pass a Component, or a class of them.")
+        raise UsageError(f"component cannot be {show(component)}", advice="Give a Component, or a class of them.")
     if issubclass(cls, Model):
         raise UsageError(f"{cls.__name__} is a model", advice="Check the classes of its parts, one by one.")
     book = _Book()

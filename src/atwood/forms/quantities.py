@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from typing import TYPE_CHECKING
 
-from atwood.errors import ParameterError, suggestion
+from atwood.errors import ParameterError, suggestion_in_parts
 from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
@@ -39,7 +39,7 @@ def find_observables(assembly: Assembly, paths: Sequence[str]) -> list[Observabl
     known = assembly.observables
     for path in paths:
         if path not in known:
-            raise ParameterError("there is no such quantity", where=path, advice=suggestion(path, list(known)))
+            raise ParameterError("there is no such quantity", where=path, advice=suggestion_in_parts(path, known))
     return [known[path] for path in paths]
 
 

@@ -12,7 +12,7 @@ from atwood.analysis.dynamics import Dynamics
 from atwood.analysis.number_functions import Function
 from atwood.arguments import BY_PATH, TEXT, each, takes
 from atwood.arrays import FloatArray
-from atwood.errors import AtwoodError, SolveError, UsageError, suggestion
+from atwood.errors import AtwoodError, SolveError, UsageError, suggestion_in_parts
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jvp
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
@@ -115,7 +115,9 @@ class _Problem:
         quantity, rates = _split(path)
         if quantity not in self.first.observables:
             raise UsageError(
-                "there is no such quantity", where=path, advice=suggestion(quantity, self.first.observables)
+                "there is no such quantity",
+                where=path,
+                advice=suggestion_in_parts(quantity, self.first.observables),
             )
         if isinstance(value, str):
             unit = self.first.observables[quantity].unit

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from atwood.analysis.number_functions import Function, Numbers
+from atwood.analysis.number_functions import Function, Numbers, as_numbers, shape_of_states
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute, vjp
@@ -80,9 +80,9 @@ class LegendreTransform:
 
     def mass_matrix(self, q: Numbers, v: Numbers = None, t: float | None = None) -> FloatArray:
         """Return ``d2L/dq'2``, shape (n, n), or (states, n, n); velocities where it depends on them."""
-        coordinates = np.asarray(q, dtype=float)
-        n = self.size
-        still = np.zeros(n) if v is None else np.asarray(v, dtype=float)
+        n, name = self.size, self.assembly.flat.name
+        coordinates = as_numbers(q, n, "q", name)
+        still = np.zeros(n) if v is None else as_numbers(v, n, "v", name)
         if self.has_moving_mass:
             return self._hessian(t, (coordinates, np.broadcast_to(still, coordinates.shape)), None)
         shape = (*coordinates.shape[:-1], n, n)
@@ -98,7 +98,9 @@ class LegendreTransform:
         SolveError
             If the momenta do not determine them.
         """
-        q, p = np.broadcast_arrays(np.asarray(q, dtype=float), np.asarray(p, dtype=float))
+        q, p = (as_numbers(one, self.size, letter, self.assembly.flat.name) for one, letter in ((q, "q"), (p, "p")))
+        shape = (*shape_of_states((q, p), "qp", self.assembly.flat.name), self.size)
+        q, p = np.broadcast_to(q, shape), np.broadcast_to(p, shape)
         v = np.zeros(q.shape)
         if not self.has_moving_mass:
             return self._solved(self.mass_matrix(q, t=t), p - self.momenta(q, v, t))

@@ -90,6 +90,7 @@ def accelerations_at(
     return _solved(assembly, form, (t, q, u), kept, values)[0]
 
 
+_UNITS: Key[FloatArray] = Key("size of a displacement along each speed of a balance")
 _STATES: Key[States] = Key("balance of forces at many states")
 
 
@@ -138,20 +139,64 @@ def _solved(
 ) -> tuple[FloatArray, FloatArray]:
     """Return accelerations and the multipliers of the independent constraints."""
     program, (t, q, u) = assembly.balance(form), state
-    n, m, samples = program.speeds, program.constraints, len(t)
     mass, bias, _, _, gamma, jacobian, _ = values
-    if not _is_full(program):
-        return _states(assembly, form, kept).solve(t, (mass, bias, gamma, jacobian))
+    # Along displacements and rotations of like size, and with forces of the size of masses, so that no unit has a say.
+    units = assembly.kept.get(
+        _UNITS, lambda: motion_scales(assembly.in_coordinates(form), scene_length(assembly)), form
+    )
+    step = max(1, _CHUNK // max(1, program.speeds**2))
+    if program.mass_product is not None and len(t) > step:
+        parts = [slice(first, first + step) for first in range(0, len(t), step)]
+        some = [
+            _solved(assembly, form, (t[part], q[:, part], u[:, part]), kept, tuple(one[:, part] for one in values))
+            for part in parts
+        ]
+        return np.concatenate([one[0] for one in some], axis=1), np.concatenate([one[1] for one in some], axis=1)
+    if program.mass_product is not None:
+        mass = np.moveaxis(masses_at(assembly, t, q.T, u.T, assembly.parameter_values), 0, -1)
+        mass = mass.reshape(program.speeds**2, -1) * np.outer(units, units).reshape(-1, 1)
+    else:
+        mass = mass * (units[program.mass_rows] * units[program.mass_columns])[:, None]
+    jacobian = jacobian * units[program.jacobian_columns][:, None]
+    forces = _force_sizes(program, mass, jacobian)
+    jacobian, gamma = jacobian * forces[program.jacobian_rows], gamma * forces
+    even = mass, bias * units[:, None], gamma, jacobian
+    if _is_full(program):
+        a, multipliers = _solved_full(program, kept, len(t), even)
+    else:
+        a, multipliers = _states(assembly, form, kept).solve(t, even)
+    return a * units[:, None], multipliers * forces[kept]
+
+
+def _force_sizes(program: BalanceProgram, mass: FloatArray, jacobian: FloatArray) -> FloatArray:
+    """Return by how much to multiply each constraint so that its row is of the size of masses, (number, samples)."""
+    sizes = np.zeros((program.constraints, jacobian.shape[1]))
+    places = np.asarray(program.jacobian_rows, dtype=np.intp)
+    if len(places):
+        order = np.argsort(places, kind="stable")
+        filled, starts = np.unique(places[order], return_index=True)
+        sizes[filled] = np.maximum.reduceat(np.abs(jacobian[order]), starts, axis=0)
+    largest = np.max(np.abs(mass), axis=0, initial=0.0)
+    found = largest / np.where(sizes > 0.0, sizes, 1.0)
+    return np.where(found > 0.0, found, 1.0)
+
+
+def _solved_full(
+    program: BalanceProgram, kept: NDArray[np.intp], samples: int, values: tuple[FloatArray, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Return what `_solved` does, from mass, bias, gamma and Jacobian, with dense matrices."""
+    n, m = program.speeds, program.constraints
+    mass, bias, gamma, jacobian = values
     found_a, found_l = np.zeros((n, samples)), np.zeros((len(kept), samples))
     size = n + len(kept)
     step = max(1, _CHUNK // max(1, size * size))
     for first in range(0, samples, step):
         part = slice(first, min(first + step, samples))
         count = part.stop - part.start
+        full_mass = np.zeros((count, n, n))
         if program.mass_product is not None:
-            full_mass = masses_at(assembly, t[part], q[:, part].T, u[:, part].T, assembly.parameter_values)
+            full_mass[:] = mass[:, part].T.reshape(count, n, n)
         else:
-            full_mass = np.zeros((count, n, n))
             full_mass[:, program.mass_rows, program.mass_columns] = mass[:, part].T
         full_jacobian = np.zeros((count, m, n))
         full_jacobian[:, program.jacobian_rows, program.jacobian_columns] = jacobian[:, part].T

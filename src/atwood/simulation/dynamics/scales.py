@@ -20,6 +20,7 @@ __all__ = [
     "Scales",
     "coordinate_scales",
     "find_scales",
+    "is_length",
     "motion_names",
     "motion_scales",
     "multiplier_sizes",
@@ -105,6 +106,13 @@ def motion_scales(equations: Equations, length: float) -> FloatArray:
     return np.array([length if one.unit == "m/s" else 1.0 for one in equations.speed_names])
 
 
+def is_length(equations: Equations, key: tuple[str, str, int]) -> bool:
+    """Return whether a constraint misses by a length: then its multiplier is a force, else a torque."""
+    local = equations.locals_[key[0]]
+    law = next(c.law for c in local.constraints if (c.law.name, c.index) == key[1:])
+    return str(law.options.unit) == "N"
+
+
 def multiplier_sizes(assembly: Assembly, form: FormName) -> FloatArray:
     """Return the size of each constraint's multiplier beside that of a force: for a moment, the extent.
 
@@ -112,8 +120,12 @@ def multiplier_sizes(assembly: Assembly, form: FormName) -> FloatArray:
     lengths nor in angles, its multiplier counts by its own powers of a length.
     """
     length = extent(assembly.mechanism) or scene_length(assembly)
-    units = {one.key[:2]: one.unit for one in assembly.reactions}
-    found = [units.get(one.key[:2], "N") for one in assembly.in_coordinates(form).constraints]
+    equations = assembly.in_coordinates(form)
+    parts = dict.fromkeys(one.key[0] for one in equations.constraints)
+    units = {
+        (path, one.law.name): str(one.law.options.unit) for path in parts for one in equations.locals_[path].constraints
+    }
+    found = [units[one.key[:2]] for one in equations.constraints]
     # A force is of one power of a length.
     return np.array([length ** (parse_unit(unit).exponents[1] - 1) for unit in found])
 

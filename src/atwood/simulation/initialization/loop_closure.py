@@ -16,9 +16,10 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.linalg.matrices import LARGEST_FULL, scaled, to_array
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.simulation.dynamics.scales import is_length
 from atwood.simulation.initialization.system import System
 
-__all__ = ["Nearest", "closest", "closest_of_all", "is_length", "places_around", "units_of_rows"]
+__all__ = ["Nearest", "closest", "closest_of_all", "places_around", "units_of_rows"]
 
 
 _SHIFTS = (0.1, 0.2, 0.3, 0.5, 0.5, 0.8, 0.8, 1.2, 1.2, 1.8, 1.8, 2.5, 2.5, 3.1, 3.1)
@@ -65,13 +66,6 @@ def units_of_rows(assembly: Assembly, equations: Equations, system: System, leng
             found.append(length if is_length(equations, one.key) else 1.0)
     found += [length if target.observable.unit == "m" else 1.0 for target in system.targets]
     return np.array(found)
-
-
-def is_length(equations: Equations, key: tuple[str, str, int]) -> bool:
-    """Return whether a constraint misses by a length: then its multiplier is a force, else a torque."""
-    local = equations.locals_[key[0]]
-    law = next(c.law for c in local.constraints if (c.law.name, c.index) == key[1:])
-    return str(law.options.unit) == "N"
 
 
 def closest(

@@ -19,8 +19,7 @@ from atwood.model.declare.component import Component
 from atwood.model.declare.law import Kind
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.rank import independent_rows
-from atwood.simulation.dynamics.scales import motion_scales, scene_length
-from atwood.simulation.initialization.loop_closure import is_length
+from atwood.simulation.dynamics.scales import is_length, motion_scales, scene_length
 from atwood.simulation.initialization.start import Start, maximal_state
 from atwood.tolerances import tolerances
 

@@ -125,7 +125,8 @@ def motions_between(
     target = _read(end, names, place, assembly.flat.name)
     missing = [one.name for one in names if one.name not in end]
     if missing:
-        raise UsageError(f"the end leaves out {', '.join(missing)}", where=assembly.flat.name)
+        advice = "Give the end of each coordinate."
+        raise UsageError(f"the end leaves out {', '.join(missing)}", where=assembly.flat.name, advice=advice)
     shooter = Shooter(assembly, place, begun.length, begun.time, last)
     found = _joining(shooter, target, assembly.flat.name)
     made = []

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from atwood.arrays import FloatArray
-from atwood.errors import UsageError, suggestion
+from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.late import dataclass
+from atwood.theory.arguments import as_expression
 
 __all__ = ["Nodes", "curves_at", "panels"]
 
@@ -116,10 +117,10 @@ def _read(given: Any, name: str) -> tuple[Function, Function | None]:
 
     t = sympy.Symbol("t")
     try:
-        made = sympy.sympify(given, locals={"t": t})
-    except (sympy.SympifyError, TypeError, AttributeError):
+        made = as_expression(given)
+    except Exception:  # text is read as Python
         made = None
-    if made is None or not made.free_symbols <= {t}:
+    if made is None or not made.free_symbols <= {t} or made.is_real is False:
         raise UsageError(
             f"{given!r} is no function of time", where=name, advice="Write it in t, as 'sin(2*t)', or give a function."
         )
@@ -127,11 +128,18 @@ def _read(given: Any, name: str) -> tuple[Function, Function | None]:
 
 
 def _called(function: Function, t: FloatArray, name: str) -> FloatArray:
-    found = np.asarray(function(t), dtype=float)
+    try:
+        found = np.asarray(function(t), dtype=float)
+    except AtwoodError:
+        raise
+    except Exception as error:  # a function of somebody else
+        advice = "Give a function of an array of times, in seconds, that returns as many numbers."
+        raise UsageError(f"it fails: {type(error).__name__}: {error}", where=name, advice=advice) from error
     try:
         found = np.broadcast_to(found, t.shape)
     except ValueError:
-        raise UsageError(f"gives {found.shape} values for {t.shape} times", where=name) from None
+        advice = "Give a function of an array of times that returns as many numbers."
+        raise UsageError(f"gives {found.shape} values for {t.shape} times", where=name, advice=advice) from None
     if not np.all(np.isfinite(found)):
         raise UsageError(f"has no finite value at t = {t[~np.isfinite(found)][0]:.6g}", where=name)
     return found

@@ -10,13 +10,14 @@ import numpy as np
 
 from atwood.analysis.formulas.objects import Sympy
 from atwood.analysis.hamiltonian import Hamiltonian
-from atwood.arguments import ANYTHING, instance, optional, takes
+from atwood.arguments import BY_PATH, check, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.theory.action.quadrature import Level, level_through
+from atwood.theory.arguments import EXPRESSION
 from atwood.theory.hamiltonian import hamiltonian
 
 __all__ = ["SeparatedMotion", "Separation", "separation"]
@@ -201,7 +202,7 @@ class Separation:
 
 @takes(
     scene=instance("a scene, an assembly of one, or a Hamiltonian", Model, Assembly, Hamiltonian),
-    coordinates=optional(ANYTHING),
+    coordinates=optional(BY_PATH),
 )
 def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, Any] | None = None) -> Separation:
     """Return whether the equation of Hamilton and Jacobi of a scene separates in given coordinates.
@@ -241,7 +242,9 @@ def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, 
     new = tuple(sorted(named, key=str))
     if len(new) != len(old):
         raise UsageError(
-            f"its {len(old)} coordinates are given by {len(new)} others: {', '.join(map(str, new))}", where=h.name
+            f"its {len(old)} coordinates are given by {len(new)} others: {', '.join(map(str, new)) or 'none'}",
+            where=h.name,
+            advice=f"Write them in terms of {len(old)} others.",
         )
     momenta = tuple(sympy.Symbol(f"p_{one}") for one in new)
     along = _old_momenta([[places[path].diff(one) for path in old] for one in new], momenta)
@@ -287,21 +290,16 @@ def _tidied(made: Sympy) -> Sympy:
     return sympy.expand(sympy.expand(made).replace(is_even, without))
 
 
-def _read(given: Any, paths: list[str], where: str) -> dict[str, Sympy]:
-    import sympy
-
-    if not isinstance(given, Mapping):
-        raise UsageError("coordinates are a dictionary by path", where=where)
+def _read(given: Mapping[str, Any], paths: list[str], where: str) -> dict[str, Sympy]:
     for path in given:
         if path not in paths:
-            raise UsageError(f"{path!r} is no coordinate of it", where=where, advice=suggestion(path, paths))
+            advice = suggestion(path, paths) or f"There are {', '.join(paths)}."
+            raise UsageError(f"{path!r} is no coordinate of it", where=where, advice=advice)
     missing = [path for path in paths if path not in given]
     if missing:
-        raise UsageError(f"the coordinates leave out {', '.join(missing)}", where=where)
-    try:
-        return {path: sympy.sympify(given[path]) for path in paths}
-    except (sympy.SympifyError, TypeError) as error:
-        raise UsageError(f"a coordinate is no expression: {error}", where=where) from None
+        advice = f"Give {', '.join(paths)}, each in terms of others."
+        raise UsageError(f"the coordinates leave out {', '.join(missing)}", where=where, advice=advice)
+    return {path: check(EXPRESSION, given[path], path, where) for path in paths}
 
 
 def _worst(

@@ -6,20 +6,22 @@ from collections.abc import Sequence
 from typing import Any
 
 from atwood.analysis.hamiltonian import Hamiltonian
-from atwood.arguments import takes_names
+from atwood.arguments import instance, takes
+from atwood.theory.arguments import EXPRESSION, EXPRESSIONS, PHASE_SPACE
 from atwood.theory.canonical.phase_space import PhaseSpace, Sympy, phase_space_of, short
 
 __all__ = ["bracket", "fundamental_brackets", "poisson_bracket", "poisson_brackets", "total_derivative"]
 
 
-@takes_names
+@takes(f=EXPRESSION, g=EXPRESSION, hamiltonian=PHASE_SPACE)
 def poisson_bracket(f: Any, g: Any, hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]) -> Sympy:
     """Return the Poisson bracket ``{f, g} = sum df/dq dg/dp - df/dp dg/dq``.
 
     Parameters
     ----------
     f, g
-        Functions of coordinates, momenta and time: sympy expressions in the symbols of the Hamiltonian.
+        Functions of coordinates, momenta and time: sympy expressions in the symbols of the Hamiltonian, or text of
+        them: ``"theta"`` is the coordinate theta(t).
     hamiltonian
         What `atwood.hamiltonian` returns, or a pair: coordinates and momenta.
 
@@ -37,7 +39,7 @@ def poisson_bracket(f: Any, g: Any, hamiltonian: Hamiltonian | tuple[Sequence[Sy
     return space.shown(short(bracket(space.read(f), space.read(g), space)))
 
 
-@takes_names
+@takes(functions=EXPRESSIONS, hamiltonian=PHASE_SPACE)
 def poisson_brackets(
     functions: Sequence[Any], hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]
 ) -> Sympy:
@@ -59,7 +61,7 @@ def poisson_brackets(
     )
 
 
-@takes_names
+@takes(coordinates=EXPRESSIONS, momenta=EXPRESSIONS, hamiltonian=PHASE_SPACE)
 def fundamental_brackets(
     coordinates: Sequence[Any],
     momenta: Sequence[Any],
@@ -77,7 +79,7 @@ def fundamental_brackets(
     return poisson_brackets([*coordinates, *momenta], hamiltonian)
 
 
-@takes_names
+@takes(f=EXPRESSION, hamiltonian=instance("what `atwood.hamiltonian` returns", Hamiltonian))
 def total_derivative(f: Any, hamiltonian: Hamiltonian) -> Sympy:
     """Return the rate of a function along motions, ``df/dt = {f, H} + df/dt`` (Goldstein, equation 9.94).
 

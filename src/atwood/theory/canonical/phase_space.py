@@ -43,15 +43,21 @@ class PhaseSpace:
     momenta: tuple[Sympy, ...]
     given: tuple[Sympy, ...]
 
-    def read(self, value: Any) -> Sympy:
-        """Return an expression on the plain symbols."""
+    def read(self, value: Sympy, new: Sequence[Sympy] = ()) -> Sympy:
+        """Return an expression on the plain symbols; a symbol with the name of one of the given stands for it.
+
+        Parameters
+        ----------
+        value
+            The expression.
+        new
+            Symbols that stand for themselves.
+        """
         import sympy
 
-        try:
-            found = sympy.sympify(value)
-        except (sympy.SympifyError, TypeError, AttributeError):
-            raise UsageError(f"{value!r} is no sympy expression", where="phase space") from None
-        found = found.xreplace(dict(zip(self.given, self._own, strict=True)))
+        found = value.xreplace(dict(zip(self.given, self._own, strict=True)))
+        named = {sympy.Symbol(_plain(given)): own for given, own in zip(self.given, self._own, strict=True)}
+        found = found.xreplace({name: own for name, own in named.items() if name not in new})
         stray = found.atoms(sympy.Derivative) | found.atoms(sympy.core.function.AppliedUndef)
         if stray:
             names = ", ".join(map(str, self.given))
@@ -81,15 +87,17 @@ def phase_space_of(given: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]])
     """
     import sympy
 
-    try:
-        pair: Any = given if isinstance(given, (tuple, list)) else (given.coordinates, given.momenta)
-        q, p = (tuple(map(sympy.sympify, one)) for one in pair)
-    except (TypeError, ValueError, AttributeError, sympy.SympifyError):
-        raise UsageError(
-            "a Hamiltonian is needed, or a pair of coordinates and momenta", where=str(given)[:80]
-        ) from None
+    q, p = given if isinstance(given, (tuple, list)) else (given.coordinates, given.momenta)
+    q, p = tuple(q), tuple(p)
     if len(q) != len(p) or not q or len({*q, *p}) != 2 * len(q):
-        raise UsageError(f"{len(q)} coordinates and {len(p)} momenta are no phase space", where=f"{q}, {p}"[:80])
+        advice = "Give as many momenta as coordinates, all different."
+        raise UsageError(
+            f"{len(q)} coordinates and {len(p)} momenta are no phase space", where=f"{q}, {p}"[:80], advice=advice
+        )
+    for one in (*q, *p):
+        if not one.is_Symbol and not isinstance(one, sympy.core.function.AppliedUndef):
+            advice = "Give symbols of sympy, or functions of t."
+            raise UsageError(f"{one} is no coordinate and no momentum", where="phase space", advice=advice)
     own = [sympy.Symbol(_plain(one)) if one.is_Symbol else sympy.Dummy(_plain(one)) for one in (*q, *p)]
     n = len(q)
     return PhaseSpace(tuple(own[:n]), tuple(own[n:]), (*q, *p))

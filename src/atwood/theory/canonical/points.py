@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from atwood.analysis.hamiltonian import Hamiltonian
-from atwood.arguments import BY_PATH, check, takes_names
+from atwood.arguments import BY_PATH, check, takes
 from atwood.errors import UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
+from atwood.theory.arguments import EXPRESSION, SYMBOLS
 from atwood.theory.canonical.phase_space import Sympy, collected, phase_space_of, short
 from atwood.theory.equations import equations
 from atwood.theory.hamiltonian import hamiltonian
@@ -57,7 +58,7 @@ class PointTransformation:
         return f"<PointTransformation to {', '.join(map(str, self.coordinates))}: K = {self.hamiltonian}>"
 
 
-@takes_names
+@takes(scene=SCENE, old=BY_PATH, coordinates=SYMBOLS)
 def point_transformation(
     scene: Model | Assembly, old: Mapping[str, Any], coordinates: Sequence[Any]
 ) -> PointTransformation:
@@ -86,26 +87,31 @@ def point_transformation(
     """
     import sympy
 
-    h: Hamiltonian = hamiltonian(check(SCENE, scene, "scene", "point_transformation"))
-    old = check(BY_PATH, old, "old", "point_transformation")
+    h: Hamiltonian = hamiltonian(scene)
+    old = {path: check(EXPRESSION, value, path, "point_transformation") for path, value in old.items()}
     for path in old:
         if path not in h.paths:
             told = suggestion(path, h.paths) or f"There are {', '.join(h.paths)}."
             raise UsageError("no coordinate has this path", where=path, advice=told)
     missing = [path for path in h.paths if path not in old]
     n = len(h.paths)
-    new = tuple(sympy.Symbol(one) if isinstance(one, str) else one for one in coordinates)
-    if missing or len(set(new)) != n:
+    new = tuple(coordinates)
+    if missing or len(new) != n or len(set(new)) != n:
         told = f"{missing[0]} is not given" if missing else f"{n} new coordinates are needed"
-        raise UsageError(f"the coordinates are not all transformed: {told}", where=h.name)
-    values = [sympy.sympify(old[path]) for path in h.paths]
+        advice = f"Give {', '.join(h.paths)}, each in terms of {n} new ones that are all different."
+        raise UsageError(f"the coordinates are not all transformed: {told}", where=h.name, advice=advice)
+    values = [old[path] for path in h.paths]
     rates = tuple(sympy.Symbol(f"{one.name}'") for one in new)
     momenta = tuple(sympy.Symbol(f"p_{one.name}") for one in new)
     t = sympy.Symbol("t")
     by_new = sympy.Matrix([[one.diff(x) for x in new] for one in values])
     determinant = short(by_new.det(method="berkowitz"))
     if determinant == 0:
-        raise UsageError("the new coordinates do not determine the old ones: they depend on each other", where=h.name)
+        raise UsageError(
+            "the new coordinates do not determine the old ones: they depend on each other",
+            where=h.name,
+            advice="Give as many independent coordinates as the scene has.",
+        )
     inverse = by_new.adjugate().applyfunc(lambda one: short(one / determinant))
     explicit = sympy.Matrix([one.diff(t) for one in values])
     space = phase_space_of(h)

@@ -11,9 +11,10 @@ from functools import cached_property
 from typing import Any
 
 from atwood.analysis.hamiltonian import Hamiltonian
-from atwood.arguments import takes_names
+from atwood.arguments import takes, whole
 from atwood.errors import UnsupportedError, UsageError
 from atwood.late import dataclass
+from atwood.theory.arguments import BY_SYMBOL, EXPRESSION, INVERSE, PHASE_SPACE, SYMBOLS
 from atwood.theory.canonical.phase_space import PhaseSpace, Sympy, Verdict, phase_space_of, short, vanishes
 
 __all__ = ["CanonicalTransformation", "canonical_transformation", "generated_transformation"]
@@ -110,7 +111,7 @@ class CanonicalTransformation:
         return f"<CanonicalTransformation to {', '.join(map(str, self.coordinates))}: {told}, {self.verdict.sentence}>"
 
 
-@takes_names
+@takes(hamiltonian=PHASE_SPACE, coordinates=BY_SYMBOL, momenta=BY_SYMBOL, inverse=INVERSE)
 def canonical_transformation(
     hamiltonian: Space,
     coordinates: Mapping[Any, Any],
@@ -139,20 +140,20 @@ def canonical_transformation(
     UsageError
         If there are not as many new coordinates and momenta as old ones.
     """
-    import sympy
-
     space = phase_space_of(hamiltonian)
     n = len(space.coordinates)
-    new = [*_symbols(coordinates), *_symbols(momenta)]
+    new = [*coordinates, *momenta]
     if len(coordinates) != n or len(momenta) != n or len(set(new)) != 2 * n:
-        raise UsageError(f"{n} new coordinates and {n} new momenta are needed", where=f"{new}"[:80])
+        raise _not_as_many(n, coordinates, momenta)
     values = [space.read(one) for one in (*coordinates.values(), *momenta.values())]
     old = [*space.coordinates, *space.momenta]
     if inverse is not None:
-        by = {space.read(key): sympy.sympify(value) for key, value in inverse.items()}
+        by = {space.read(key): value for key, value in inverse.items()}
         if set(by) != set(old):
             raise UsageError(
-                "the inverse does not give every old coordinate and momentum", where=f"{list(inverse)}"[:80]
+                "the inverse does not give every old coordinate and momentum",
+                where=f"{list(inverse)}"[:80],
+                advice=f"Give {', '.join(map(str, space.given))}, each in terms of the new ones.",
             )
     else:
         by = _solved([value - one for value, one in zip(values, new, strict=True)], old)
@@ -168,7 +169,9 @@ def canonical_transformation(
     )
 
 
-@takes_names
+@takes(
+    function=EXPRESSION, kind=whole("1, 2, 3 or 4", 1, 4), hamiltonian=PHASE_SPACE, coordinates=SYMBOLS, momenta=SYMBOLS
+)
 def generated_transformation(
     function: Any, kind: int, hamiltonian: Space, coordinates: Sequence[Any], momenta: Sequence[Any]
 ) -> CanonicalTransformation:
@@ -193,13 +196,11 @@ def generated_transformation(
     """
     import sympy
 
-    if kind not in _KINDS:
-        raise UsageError(f"there is no generating function of kind {kind!r}", where="kind", advice="Give 1, 2, 3 or 4.")
     space = phase_space_of(hamiltonian)
-    f, n = space.read(function), len(space.coordinates)
-    new_q, new_p = [tuple(map(sympy.sympify, one)) for one in (coordinates, momenta)]
+    n, new_q, new_p = len(space.coordinates), tuple(coordinates), tuple(momenta)
+    f = space.read(function, (*new_q, *new_p))
     if len(new_q) != n or len(new_p) != n:
-        raise UsageError(f"{n} new coordinates and {n} new momenta are needed", where=f"{coordinates}, {momenta}"[:80])
+        raise _not_as_many(n, coordinates, momenta)
     variables = {"q": space.coordinates, "p": space.momenta, "Q": new_q, "P": new_p}
     used = _KINDS[kind]
     wrong = [one for name, own in variables.items() if name not in used for one in own if f.has(one)]
@@ -236,10 +237,12 @@ def generated_transformation(
     )
 
 
-def _symbols(given: Mapping[Any, Any]) -> list[Sympy]:
-    import sympy
-
-    return [sympy.Symbol(one) if isinstance(one, str) else one for one in given]
+def _not_as_many(n: int, coordinates: Iterable[Sympy], momenta: Iterable[Sympy]) -> UsageError:
+    given = (
+        f"coordinates {', '.join(map(str, coordinates)) or 'none'}; momenta {', '.join(map(str, momenta)) or 'none'}"
+    )
+    advice = f"Give as many of each as the old ones, {n}, all different."
+    return UsageError(f"{n} new coordinates and {n} new momenta are needed", where=given[:80], advice=advice)
 
 
 def _old_hamiltonian(given: Space, space: PhaseSpace) -> Sympy | None:

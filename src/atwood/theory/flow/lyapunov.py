@@ -96,7 +96,12 @@ class LyapunovExponents:
 
 
 @takes(
-    scene=SCENE, t_end=T_END, count=optional(whole("a number of exponents", 1)), settle=T_END, rtol=RTOL, solver=SOLVER
+    scene=SCENE,
+    t_end=T_END,
+    count=optional(whole("a number of exponents, at most 10,000", 1, 10_000)),
+    settle=T_END,
+    rtol=RTOL,
+    solver=SOLVER,
 )
 def lyapunov_exponents(
     scene: Model | Assembly,
@@ -143,6 +148,8 @@ def lyapunov_exponents(
     edges, sizes, where = found.edges, found.sizes, found.motion.assembly.flat.name
     begin, end = float(edges[0]), float(edges[-1])
     begun = begin + (0.1 * (end - begin) if settle is None else float(settle))
+    if begun < begin:
+        raise UsageError(f"settle cannot be {settle}", where=where, advice="Give a time of at least zero, in seconds.")
     if not begun < end:
         raise UsageError(f"after {settle} s nothing is left to be counted", where=where, advice="Give a later t_end.")
     start = found.start / sizes[:, None]

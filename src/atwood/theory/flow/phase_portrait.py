@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from atwood.analysis.dynamics import Dynamics
 from atwood.analysis.flow.plane_field import Field, Window, separatrices, spaced_curves
 from atwood.analysis.linear.variations import LinearScene
-from atwood.arguments import Kind, optional, takes
+from atwood.arguments import Kind, Refused, optional, real, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
@@ -123,7 +123,9 @@ Bounds = tuple[float | str, float | str]
 
 
 def _read_bounds(value: Any) -> Bounds:
-    low, high = (one if isinstance(one, str) else float(one) for one in value)
+    if isinstance(value, (set, frozenset)):
+        raise Refused
+    low, high = (one if isinstance(one, str) else real(one) for one in value)
     return low, high
 
 

@@ -73,7 +73,7 @@ class PoincareSection:
 @takes(
     scene=SCENE,
     surface=TEXT,
-    quantities=each(TEXT, "paths of quantities, as a list of texts", single=True),
+    quantities=each(TEXT, "paths of quantities, at least one, as a list of texts", least=1),
     starts=optional(each(BY_PATH, "start values by path, one mapping for each motion")),
     t_end=T_END,
     rtol=RTOL,

@@ -10,7 +10,7 @@ import numpy as np
 from atwood.analysis.linear.continuation import Curve, Problem, Residual, branch_directions, follow
 from atwood.analysis.linear.rest import difference, slopes_at
 from atwood.analysis.linear.variations import LinearScene
-from atwood.arguments import BY_PATH, TEXT, Kind, optional, takes
+from atwood.arguments import BY_PATH, TEXT, Kind, Refused, optional, real, takes
 from atwood.arrays import BoolArray, FloatArray
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
@@ -122,7 +122,9 @@ class EquilibriumBranches:
 
 
 def _read_span(value: Any) -> tuple[float, float]:
-    low, high = (float(one) for one in value)
+    if isinstance(value, (set, frozenset)):
+        raise Refused
+    low, high = (real(one) for one in value)
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ValueError
     return low, high

@@ -17,6 +17,7 @@ from atwood.analysis.linear.realization import (
     transmission_zeros,
 )
 from atwood.analysis.linear.spectrum import Spectrum, find_spectrum
+from atwood.arguments import ARRAY, check
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.errors import UsageError
 from atwood.late import dataclass
@@ -152,8 +153,8 @@ class LinearModel:
         numpy.ndarray
             Complex, shape (frequencies, outputs, inputs).
         """
-        omega = np.array([float(one) for one in angular_frequencies])
-        return frequency_response(self.matrices, omega)
+        omega = check(ARRAY, angular_frequencies, "angular_frequencies", "frequency_response")
+        return frequency_response(self.matrices, np.ravel(omega))
 
     def to_scipy(self) -> Any:
         """Return it as `scipy.signal.StateSpace`."""

@@ -12,7 +12,7 @@ from atwood.analysis.linear.modes import find_modes
 from atwood.analysis.linear.state_space import find_state_space
 from atwood.analysis.linear.steady import find_steady, still
 from atwood.analysis.linear.switches import refuse_switches
-from atwood.arguments import check, takes, whole
+from atwood.arguments import check, number, takes, whole
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
@@ -25,6 +25,9 @@ from atwood.theory.linearization.mode_motion import mode_motion
 from atwood.theory.linearization.operating_point import AT, At, OperatingPoint, find_operating_point, values_at
 
 __all__ = ["NormalModes", "modes_of", "normal_modes", "shape_text"]
+
+
+_AMPLITUDE = number("a number above 0, in radians or in extents of the scene", above=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +100,8 @@ class NormalModes:
             As `simulate` returns it; closed loops are met. A mode that does not oscillate is shown swinging too.
         """
         index = check(whole(f"the number of a mode, 0 to {len(self) - 1}", 0, len(self) - 1), mode, "mode", "motion")
+        amplitude = check(_AMPLITUDE, amplitude, "amplitude", "motion")
+        frames = check(whole("a number of times, 2 to 100,000", 2, 100_000), frames, "frames", "motion")
         return mode_motion(
             self.point, self.displacements[:, index], float(self.angular_frequencies[index]), amplitude, frames
         )

@@ -10,7 +10,7 @@ from atwood.analysis.linear.maximal import image_of
 from atwood.analysis.linear.minimal import Minimal
 from atwood.analysis.linear.variations import Flow
 from atwood.arrays import FloatArray
-from atwood.errors import ParameterError, UnsupportedError, suggestion
+from atwood.errors import ParameterError, UnsupportedError, suggestion_in_parts
 from atwood.expr import InputGroup, OutputGroup, Program, jacobian, live
 from atwood.theory.linearization.operating_point import OperatingPoint
 
@@ -37,7 +37,7 @@ def output_rows(point: OperatingPoint, flow: Flow, minimal: Minimal, paths: Sequ
     found, known = [], point.assembly.start_observables
     for path in paths:
         if path not in known:
-            raise ParameterError("there is no such quantity", where=path, advice=suggestion(path, list(known)))
+            raise ParameterError("there is no such quantity", where=path, advice=suggestion_in_parts(path, known))
         found.append(known[path].value)
     scene, now, inputs = point.scene, flow.variation, len(point.scene.inputs)
     total = np.zeros((len(found), minimal.states + inputs))

@@ -62,6 +62,8 @@ class RootLocus:
 
 
 def _read_values(value: Any) -> FloatArray:
+    if isinstance(value, (str, bytes, set, frozenset)):
+        raise ValueError
     found = np.array([float(one) for one in value])
     if found.ndim != 1 or len(found) < 2 or not np.all(np.isfinite(found)):
         raise ValueError

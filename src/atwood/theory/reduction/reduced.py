@@ -12,7 +12,7 @@ from atwood.analysis.conservation.quantities import Quantities
 from atwood.analysis.reduction.parts import parts_of
 from atwood.analysis.reduction.quadrature import Path, find_path
 from atwood.analysis.reduction.radial import Radial
-from atwood.arguments import TEXT, instance, optional, takes
+from atwood.arguments import ARRAY, TEXT, check, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.expr import OutputGroup, Program, depends_on
@@ -110,7 +110,8 @@ class ReducedMotion:
 
     def effective_potential(self, values: Any) -> FloatArray:
         """Return the effective potential at values of the coordinate, J."""
-        found = self.radial.at(np.ravel(np.asarray(values, dtype=float))).potential
+        values = check(ARRAY, values, "values", "effective_potential")
+        found = self.radial.at(np.ravel(values)).potential
         return np.asarray(found.reshape(np.shape(values)))
 
     def at(self, times: Any) -> dict[str, FloatArray]:
@@ -126,7 +127,8 @@ class ReducedMotion:
         UnsupportedError
             If the motion does not come back.
         """
-        t = np.ravel(np.asarray(times, dtype=float))
+        times = check(ARRAY, times, "times", "at")
+        t = np.ravel(times)
         s, moved = self.path.at(t - self.t_start)
         found = {self.coordinate: s.reshape(np.shape(times))}
         for path, values in zip(self.ignorable, moved, strict=True):

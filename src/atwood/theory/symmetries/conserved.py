@@ -14,7 +14,7 @@ from atwood.analysis.formulas import latex, objects, text
 from atwood.analysis.formulas.notation import notation_of
 from atwood.analysis.formulas.objects import Sympy
 from atwood.analysis.formulas.tree import Sum
-from atwood.arguments import Kind, each, instance, optional, takes
+from atwood.arguments import Kind, check, each, instance, optional, takes
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of
@@ -186,6 +186,7 @@ class Conserved(Sequence[ConservedQuantity]):
         UsageError
             If it is a run of another scene.
         """
+        result = check(instance("what `simulate` returned", Result), result, "result", "along")
         if not self.quantities:
             return ConservedLedger(())
         source = self.quantities[0].formulas

@@ -14,15 +14,51 @@ from atwood.analysis.conservation.quantities import Quantities
 from atwood.analysis.conservation.states import RandomStates, State
 from atwood.analysis.equation_formulas import EquationFormulas
 from atwood.analysis.formulas import objects
+from atwood.arguments import BY_PATH, NAME, TEXT, Kind, Refused, check_fields, show
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression
 from atwood.expr.formulas.sympy_bridge import from_sympy
 from atwood.late import dataclass
 from atwood.mechanics.outputs.observables import add_up
+from atwood.model.values.units import parse_unit
 
 __all__ = ["Symmetry", "check_symmetry"]
 
 _STATES = 16
+
+
+def _readable(value: Any) -> Any:
+    if value is None or isinstance(value, (bool, bytes, type)) or not (value == value):
+        raise Refused
+    import sympy
+
+    if not isinstance(sympy.sympify(value), sympy.Expr):
+        raise Refused
+    return value
+
+
+def _generator(value: Any) -> Mapping[str, Any]:
+    for path, one in BY_PATH.read(value).items():
+        try:
+            _readable(one)
+        except Exception:
+            raise Refused(f"{path} cannot be displaced by {show(one)}.") from None
+    if not value:
+        raise Refused
+    return BY_PATH.read(value)  # type: ignore[no-any-return]
+
+
+_GENERATOR = Kind("displacements by path, as sympy expressions or numbers, such as {'body.angle': 1}", _generator)
+
+
+def _unit(value: Any) -> str:
+    if TEXT.read(value):
+        parse_unit(value)
+    return str(value)
+
+
+_UNIT = Kind("a unit, such as 'kg*m^2/s', or no text where it is not known", _unit)
+_FUNCTION = Kind("a sympy expression or a number", _readable)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +86,9 @@ class Symmetry:
     f: Any = 0.0
     name: str = "stated symmetry"
     unit: str = ""
+
+    def __post_init__(self) -> None:
+        check_fields(self, generator=_GENERATOR, f=_FUNCTION, name=NAME, unit=_UNIT)
 
 
 def check_symmetry(symmetry: Symmetry, quantities: Quantities, prover: Prover, formulas: EquationFormulas) -> Finding:
