@@ -132,3 +132,20 @@ def test_a_wrong_target_is_an_error(target: str, text: str) -> None:
     assert text in done.output
     assert "Traceback" not in done.output
     assert sys.exc_info() == (None, None, None)
+
+
+class NoNumber(aw.Component):
+    """An energy that is a list."""
+
+    a: aw.Point = aw.connector(aw.Point, "Where it acts.")
+
+    @aw.potential
+    def energy(self) -> aw.Scalar:
+        """Return nothing of use."""
+        return []  # type: ignore[return-value]
+
+
+def test_an_energy_that_is_an_empty_list_is_told() -> None:
+    found = aw.check(NoNumber)
+    assert not found.ok
+    assert any("energy" in one.law and "list" in one.message for one in found.failures)

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from atwood import Scene, StartError, TopologyError, assemble, simulate
+from atwood import (
+    AtwoodError,
+    Component,
+    Frame,
+    Scalar,
+    Scene,
+    StartError,
+    TopologyError,
+    assemble,
+    connector,
+    constraint,
+    simulate,
+)
 from atwood_library import Ground, Pivot, RigidBody, Slider, Spring, Weld
 
 
@@ -55,3 +69,23 @@ def test_other_angles_are_decided_anew() -> None:
     other = assembly.with_values({"one_mount.angle": "-160 deg"})
     expected = simulate(guided("-160 deg", "-160 deg", on_arm=True), outputs=3).array("body.position.x")
     np.testing.assert_allclose(simulate(other, outputs=3).array("body.position.x"), expected, atol=1e-9)
+
+
+class Undefined(Component):
+    """A constraint that has no value."""
+
+    a: Frame = connector(Frame, "Where it acts.")
+
+    @constraint(reaction="lock", unit="N*m", doc="Torque.")
+    def nowhere(self) -> Scalar:
+        """Return what is no number."""
+        return math.nan
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_lock_that_has_no_value_is_named(form: str) -> None:
+    scene = Scene()
+    part = scene.add("part", Undefined())
+    scene.connect(scene.add("ground", Ground()).frame, part.a)
+    with pytest.raises(AtwoodError, match="nowhere"):
+        simulate(scene, form=form, t_end=0.1, structure=True)

@@ -81,7 +81,7 @@ def check(component: Component | type[Component], *, run: bool = True) -> CheckR
     """
     cls = component if isinstance(component, type) else type(component)
     if not issubclass(cls, Component):
-        raise UsageError(f"component cannot be {show(component)}", advice="Give a Component, or a class of them.")
+        raise UsageError(f"{show(component)} is no component", advice="Give a Component, or a class of them.")
     if issubclass(cls, Model):
         raise UsageError(f"{cls.__name__} is a model", advice="Check the classes of its parts, one by one.")
     book = _Book()

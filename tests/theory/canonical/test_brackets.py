@@ -89,5 +89,16 @@ def test_what_is_no_phase_space_is_refused() -> None:
         poisson_bracket(x, y, ((x, y), (px,)))
     with pytest.raises(UsageError, match="neither a coordinate"):
         poisson_bracket(sympy.Function("f")(x), px, SPACE)
-    with pytest.raises(UsageError, match="a Hamiltonian is needed"):
+    with pytest.raises(UsageError, match=r"hamiltonian cannot be 'kepler'.*or a pair"):
         poisson_bracket(x, px, "kepler")
+
+
+def test_names_in_text_are_coordinates_and_momenta() -> None:
+    """A symbol of the name of theta(t) is that coordinate: otherwise the bracket of both would be zero."""
+    h = hamiltonian(SCENES["simple-pendulum"]())
+    [theta], [momentum] = h.coordinates, h.momenta
+    assert poisson_bracket("theta", "p_theta", h) == 1
+    assert poisson_bracket(sympy.Symbol("theta"), momentum, h) == 1
+    assert total_derivative("cos(theta)", h) == total_derivative(sympy.cos(theta), h) != 0
+    with pytest.raises(UsageError, match="no finite value"):
+        poisson_bracket("1/0", theta, h)

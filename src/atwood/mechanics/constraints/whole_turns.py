@@ -71,4 +71,5 @@ def _ends(
 
 
 def _turns(miss: Expression, mechanism: Mechanism) -> int:
-    return round(evaluate([miss], mechanism.table.values)[0] / (2.0 * math.pi))
+    turns = evaluate([miss], mechanism.table.values)[0] / (2.0 * math.pi)
+    return round(turns) if math.isfinite(turns) else 0  # what has no finite value is refused where it is checked
