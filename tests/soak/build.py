@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 import atwood_library as lib
-from atwood import Component, Scene, sin
+from atwood import Component, Scene, select, sin
 
 from .description import Array, Body, Mechanism, Mount, Signal, Tie, axis_and_angle, rotation
+from .oracle_own import GAPS
+from .oracle_parts import GEARS
+from .own_parts import OWN
 
 POINTS = {
     "spring": ("a", "b"),
@@ -20,18 +24,24 @@ POINTS = {
     "point_on_line": ("b",),
     "point_on_plane": ("b",),
     "point_on_circle": ("b",),
+    "own_spring": ("a", "b"),
+    "own_swirl": ("a", "b"),
+    "own_surface": ("b",),
+    "own_wire": ("b",),
 }
 """Connectors that are points, which a material point can be joined to."""
 
 
-def class_name(sort: str) -> str:
-    """Return the name of the library's part."""
-    return "".join(word.capitalize() for word in sort.split("_"))
+def class_of(sort: str) -> type[Component]:
+    """Return the part of the library, or of a user."""
+    name = "".join(word.capitalize() for word in sort.split("_"))
+    found: type[Component] = OWN[sort] if sort in OWN else getattr(lib, name)
+    return found
 
 
 def connectors(tie: Tie) -> tuple[str, ...]:
     """Return the connectors of a part in the order of the tie's mounts."""
-    if tie.sort == "drag":
+    if tie.sort in ("drag", "own_leak"):
         return ("point",)
     if tie.sort == "force":
         return {"world": ("point",), "body": ("frame",), "other": ("point", "other")}[tie.values["resolved_in"]]
@@ -133,13 +143,16 @@ def start_values(mechanism: Mechanism, body: Body) -> tuple[dict[str, float], di
 
 def _value(value: Any) -> Any:
     if isinstance(value, Signal):
-        if not value.amplitude and not value.slope:
+        if not value.amplitude and not value.slope and not value.jump:
             return value.offset
         return _function(value)
     return tuple(float(x) for x in value) if isinstance(value, np.ndarray) else value
 
 
 def _function(signal: Signal) -> Callable[[Any], Any]:
+    if signal.jump:
+        smooth, at = _function(replace(signal, jump=0.0)), signal.kink
+        return lambda t: smooth(t) + select(t < at, 0.0, 0.5 * signal.jump * (t - at) * (t - at))
     return lambda t: (
         signal.offset + signal.slope * t + signal.amplitude * sin(signal.frequency * t + signal.phase)
         if signal.slope
@@ -150,7 +163,12 @@ def _function(signal: Signal) -> Callable[[Any], Any]:
 def _add_tie(scene: Scene, mechanism: Mechanism, tie: Tie) -> None:
     values = {name: _value(value) for name, value in tie.values.items() if name != "attracted"}
     if tie.grips:
-        part = scene.add(tie.name, getattr(lib, class_name(tie.sort))(**values))
+        against = {"against": "ground"} if tie.sort in GAPS else {}
+        part = scene.add(tie.name, class_of(tie.sort)(**values, **against))
+        if tie.sort not in GEARS:
+            (joint, coordinate), own = tie.grips[0], "b" if tie.sort in GAPS else "shaft"
+            scene.connect(getattr(scene[joint], grip(coordinate)), getattr(part, own))
+            return
         names = {"rack_and_pinion": ("rack", "pinion"), "planetary_gear": ("sun", "carrier", "ring")}
         for name, (joint, coordinate) in zip(names.get(tie.sort, ("a", "b")), tie.grips, strict=True):
             scene.connect(getattr(part, name), getattr(scene[joint], grip(coordinate)))
@@ -166,11 +184,27 @@ def _add_tie(scene: Scene, mechanism: Mechanism, tie: Tie) -> None:
                 at = pulley.groove
             scene.connect(at, end)
         return
-    part = scene.add(tie.name, getattr(lib, class_name(tie.sort))(**values))
+    if tie.sort == "sampled":
+        _add_feedback(scene, mechanism, tie)
+        return
+    part = scene.add(tie.name, class_of(tie.sort)(**values))
     for name, mount in zip(connectors(tie), tie.mounts, strict=True):
         as_point = name in POINTS.get(tie.sort, ()) or name in ("point", "source")
         at = _mounted(scene, mechanism, mount, f"{tie.name}_{name}", as_point)
         scene.connect(at, getattr(part, name))
+
+
+def _add_feedback(scene: Scene, mechanism: Mechanism, tie: Tie) -> None:
+    """Add a feedback of a body's place and speed along an axis of the world, worked out at sample times."""
+    values, body = tie.values, scene[tie.mounts[0].body]
+    axis = "xyz"[int(np.argmax(np.abs(values["axis"])))]
+    gains = values["stiffness"], values["damping"]
+    control = scene.add(tie.name, lib.SampledFeedback(gains=gains, period=values["period"]))
+    push = scene.add(f"{tie.name}_force", lib.Force(direction=tuple(map(float, values["axis"]))))
+    for quantity, number in (("position", 1), ("velocity", 2)):
+        scene.connect(body.output(f"{quantity}.{axis}"), control.input(f"u_{number}"))
+    scene.connect(control.output("y"), push.input("value"))
+    scene.connect(_mounted(scene, mechanism, tie.mounts[0], tie.name, as_point=True), push.point)
 
 
 def grip(coordinate: str) -> str:

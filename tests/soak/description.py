@@ -61,21 +61,41 @@ class Mount:
 
 @dataclass(frozen=True)
 class Signal:
-    """A function of time, ``offset + slope t + amplitude sin(frequency t + phase)``."""
+    """A function of time, ``offset + slope t + amplitude sin(frequency t + phase)``.
+
+    From the time `kink` on its second derivative is larger by `jump`, so that its rate has a kink there.
+    """
 
     offset: float = 0.0
     slope: float = 0.0
     amplitude: float = 0.0
     frequency: float = 1.0
     phase: float = 0.0
+    kink: float = 0.0
+    jump: float = 0.0
 
     def at(self, t: Any) -> Any:
         """Return the value; `t` may be complex."""
-        return self.offset + self.slope * t + self.amplitude * np.sin(self.frequency * t + self.phase)
+        late = t - self.kink if np.real(t) > self.kink else 0.0
+        smooth = self.offset + self.slope * t + self.amplitude * np.sin(self.frequency * t + self.phase)
+        return smooth + 0.5 * self.jump * late * late
 
     def rate(self, t: Any) -> Any:
         """Return the derivative."""
-        return self.slope + self.amplitude * self.frequency * np.cos(self.frequency * t + self.phase)
+        late = t - self.kink if np.real(t) > self.kink else 0.0
+        return self.slope + self.amplitude * self.frequency * np.cos(self.frequency * t + self.phase) + self.jump * late
+
+    def scaled(self, factor: float, second: float) -> Signal:
+        """Return what has other values, in another unit of time."""
+        return Signal(
+            factor * self.offset,
+            factor * self.slope / second,
+            factor * self.amplitude,
+            self.frequency / second,
+            self.phase,
+            second * self.kink,
+            factor * self.jump / second**2,
+        )
 
 
 @dataclass(frozen=True)
@@ -146,7 +166,7 @@ class Mechanism:
                 joined = [piece for piece in pieces if piece & ends]
                 count += len(joined) == 1
                 pieces = [piece for piece in pieces if not piece & ends] + [set().union(*joined)]
-            count += bool(tie.grips)  # a gear relates coordinates that there are already
+            count += tie.sort in held and bool(tie.grips)  # a gear relates coordinates that there are already
         return count
 
     def turned(self, mount: Mount) -> Array:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from .description import Array, Body, Mechanism, Mount, Tie
+from .description import Mechanism, Mount, Tie
+from .draft import Draft
+from .draw_own import add_own
 from .draw_values import Chance, joint_at
 from .oracle import Oracle
 from .trial import Discarded
@@ -39,48 +40,15 @@ ON_POINTS = ("rod", "point_on_line", "point_on_plane", "point_on_circle", "free"
 """Joints by which a material point may hang."""
 
 
-@dataclass
-class Draft:
-    """A mechanism in the making."""
-
-    chance: Chance
-    bodies: list[Body]
-    ties: list[Tie]
-
-    def pose(self, name: str) -> tuple[Array, Array]:
-        """Return position and rotation of a body's frame, or of the world."""
-        body = next((body for body in self.bodies if body.name == name), None)
-        return (np.zeros(3), np.eye(3)) if body is None else (body.position, body.rotation)
-
-    def mount_at(self, name: str, position: Array, turned: Array) -> Mount:
-        """Return the mount on a body that is at a place in the world."""
-        p, r = self.pose(name)
-        return Mount(name, r.T @ (position - p), r.T @ turned)
-
-    def is_point(self, name: str) -> bool:
-        """Whether this is a material point."""
-        return any(body.name == name and body.is_point for body in self.bodies)
-
-    def random_mount(self, name: str) -> Mount:
-        """Return a mount anywhere on a body."""
-        if self.is_point(name):
-            return Mount(name, np.zeros(3))
-        return Mount(name, self.chance.place(0.7), self.chance.turn())
-
-    def placed(self, mount: Mount) -> tuple[Array, Array]:
-        """Return where a mount is in the world."""
-        p, r = self.pose(mount.body)
-        return p + r @ mount.position, r @ mount.rotation
-
-    def add(self, sort: str, mounts: tuple[Mount, ...], values: dict[str, Any], grips: Any = ()) -> Tie:
-        """Add a tie."""
-        tie = Tie(f"{sort.replace('_', '')}{len(self.ties)}", sort, mounts, values, tuple(grips))
-        self.ties.append(tie)
-        return tie
-
-
-def draw(seed: int) -> Mechanism:
+def draw(seed: int, own: bool = True) -> Mechanism:
     """Return the mechanism of a seed, consistent at its start.
+
+    Parameters
+    ----------
+    seed
+        Of all random numbers.
+    own
+        Whether it may have a user's components, stops, feedback at sample times, kinks and wheels in loops.
 
     Raises
     ------
@@ -98,14 +66,30 @@ def draw(seed: int) -> Mechanism:
         _load(draft)
     if chance.random.random() < 0.25:
         _gear(draft, draft.ties[:hung])  # joints that close loops may be a turn away, and turns are counted
+    if own:
+        _add_own(draft, seed)
     gravity = 0.0 if chance.random.random() < 0.2 else 9.81
     return settled(Mechanism(chance.space, gravity, tuple(draft.bodies), tuple(draft.ties)))
+
+
+def _add_own(draft: Draft, seed: int) -> None:
+    chance = draft.chance
+    other = Chance(np.random.default_rng([seed, 5]))
+    other.space, other.is_round = chance.space, chance.is_round
+
+    def coordinate_of(tie: Tie, name: str) -> float:
+        oracle = Oracle(Mechanism(chance.space, 0.0, tuple(draft.bodies), tuple(draft.ties)))
+        return float(np.real(oracle.coordinate(tie, name, oracle.start()[0])[0]))
+
+    draft.chance = other
+    add_own(draft, coordinate_of)
+    draft.chance = chance
 
 
 def is_driven(mechanism: Mechanism) -> bool:
     """Whether something moves as a function of time."""
     signals = [tie.values.get("motion") or tie.values.get("rotation") for tie in mechanism.ties]
-    return any(signal is not None and signal.amplitude != 0.0 for signal in signals)
+    return any(signal is not None and (signal.amplitude or signal.jump) for signal in signals)
 
 
 def settled(mechanism: Mechanism) -> Mechanism:

@@ -112,13 +112,16 @@ def _stop(command: list[str], options: dict[str, Any], sent: signal.Signals, aft
         assert process.stdout is not None
         process.stdout.readline()
         time.sleep(after)
+        if process.poll() is not None:
+            errors = process.communicate()[1]
+            return [Finding("crash", f"it ends with status {process.returncode}", errors)] if process.returncode else []
         process.send_signal(sent)
         try:
             _, errors = process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             process.kill()
             return [Finding("hang", "Ctrl-C does not end it", f"sent after {after:.3f} s")]
-    is_quiet = errors.strip() in ("", "Interrupted.") and "Traceback" not in errors
+    is_quiet = not errors.strip() or (errors.startswith("Interrupted") and "Traceback" not in errors)
     if process.returncode not in (-signal.SIGKILL, 130) or (sent == signal.SIGINT and not is_quiet):
         said = errors.strip().rpartition("\n")[2]
         return [Finding("crash", f"{sent.name}: status {process.returncode}, {said[:60]}", errors)]

@@ -45,7 +45,7 @@ SOLVERS = (
 def check(seed: int) -> Trial:
     """Solve the scene of a seed in one way and in some others, and ask for its accuracy, a sweep and a stop."""
     random = np.random.default_rng([seed, 3])
-    mechanism = draw(seed)
+    mechanism = draw(seed, own=False)
     if len(mechanism.bodies) > LARGEST:
         raise Discarded("large")
     pushed = random.random() < 0.4

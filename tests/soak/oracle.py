@@ -16,10 +16,11 @@ from itertools import count, pairwise
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .description import Array, Mechanism, Mount, Tie, cross_matrix, rotation
+from .description import Array, Mechanism, Mount, Signal, Tie, cross_matrix, rotation
+from .oracle_own import ALL_ROWS, GAPS, beyond, own_energy, own_force, wheel_inertia
 from .oracle_parts import (
+    GEARS,
     LOADED,
-    ROWS,
     FrameState,
     Row,
     applied,
@@ -65,6 +66,7 @@ class Oracle:
 
     mechanism: Mechanism
     _turns: dict[tuple[str, str], float] = field(default_factory=dict)
+    _samples: list[tuple[float, dict[str, float]]] = field(default_factory=list)
 
     # -- what there is ----------------------------------------------------------------------------------------------
 
@@ -157,9 +159,9 @@ class Oracle:
 
     def rows_of(self, tie: Tie, place: Place, t: complex) -> list[Row]:
         """Return the constraints of a tie in the directions that the space has."""
-        if tie.sort in ROWS:
-            return ROWS[tie.sort](tie, [self.frame(mount, place) for mount in tie.mounts], t)
-        if tie.grips:
+        if tie.sort in ALL_ROWS:
+            return ALL_ROWS[tie.sort](tie, [self.frame(mount, place) for mount in tie.mounts], t)
+        if tie.sort in GEARS:
             held = [self.coordinate(self.mechanism.tie(joint), name, place) for joint, name in tie.grips]
             return [meshing(tie, held)]
         return []
@@ -235,7 +237,30 @@ class Oracle:
             if k or c or push:
                 value, row = self.coordinate(tie, name, place)
                 total += (push - k * (value - tie.values.get(natural, 0.0)) - c * (row @ speeds)) * row
+        if tie.sort in GAPS:
+            value, row = self._gripped(tie, place)
+            total -= tie.values["stiffness"] * beyond(tie, float(np.real(value))) * row
         return total
+
+    def _gripped(self, tie: Tie, place: Place) -> tuple[Array, Array]:
+        """Return the joint coordinate that a part holds, and the row of its rate."""
+        joint, name = tie.grips[0]
+        return self.coordinate(self.mechanism.tie(joint), name, place)
+
+    def _command(self, tie: Tie, t: float) -> float:
+        """Return what a feedback puts out, since the last sample that it took."""
+        return next((held[tie.name] for since, held in reversed(self._samples) if since <= t), 0.0)
+
+    def _sample(self, place: Place, speeds: Array, t: float) -> None:
+        """Take up the commands of all feedbacks that are due."""
+        held = dict(self._samples[-1][1]) if self._samples else {}
+        v, _ = self.velocities(speeds)
+        for tie in self.mechanism.ties:
+            if tie.sort == "sampled" and abs(t / tie.values["period"] - round(t / tie.values["period"])) < 1e-9:
+                i, axis = self._index[tie.mounts[0].body], tie.values["axis"]
+                position = axis @ place.centers[i]
+                held[tie.name] = -float(tie.values["stiffness"] * position + tie.values["damping"] * (axis @ v[i]))
+        self._samples.append((t, held))
 
     def forces(self, place: Place, speeds: Array, t: float) -> Array:
         """Return the generalized forces of all that acts, weight included, constraints not."""
@@ -248,18 +273,23 @@ class Oracle:
             mass = tie.values.get("mass", 0.0) if tie.sort == "rod" else 0.0
             total += 0.5 * mass * sum((frame.v.T @ down for frame in frames), np.zeros(self.size)) if mass else 0.0
             total += self._load(tie, place, speeds, t)
+            if tie.sort == "own_leak":
+                total += tie.values["mass"].at(t) * (frames[0].v.T @ down)
+            if tie.sort == "sampled":
+                total += self._command(tie, t) * (frames[0].v.T @ tie.values["axis"])
             if frames:
                 for one in (
                     friction(tie, frames, speeds),
                     applied(tie, frames, t),
+                    own_force(tie, frames, speeds, t),
                     self._energy_force(tie, frames, place),
                 ):
                     total += 0.0 if one is None else one
         return total
 
-    def energy(self, place: Place, speeds: Array) -> tuple[float, float]:
+    def energy(self, place: Place, speeds: Array, t: float) -> tuple[float, float]:
         """Return the kinetic and the potential energy; that of springs on joints included."""
-        mass, _ = self._inertia(place, speeds)
+        mass, _ = self._inertia(place, speeds, t)
         potential = 0.0
         for i, body in enumerate(self.mechanism.bodies):
             potential += body.mass * self.mechanism.gravity * place.centers[i][2]
@@ -271,7 +301,13 @@ class Oracle:
                 if tie.values.get(stiffness):
                     stretch = self.coordinate(tie, name, place)[0] - tie.values.get(natural, 0.0)
                     potential += 0.5 * tie.values[stiffness] * stretch**2
+            if tie.sort == "own_leak":
+                potential += tie.values["mass"].at(t) * self.mechanism.gravity * frames[0].p[2]
+            if tie.sort in GAPS:
+                depth = beyond(tie, float(np.real(self._gripped(tie, place)[0])))
+                potential += 0.5 * tie.values["stiffness"] * depth**2
             if frames:
+                potential += own_energy(tie, frames, t)
                 a, b = frames[0], frames[-1]
                 near, along = self._twist_near(tie, frames, place), self._sides.get(tie.name)
                 potential += spring_energy(tie, a.p, a.axes, b.p, b.axes, near, along) or 0.0
@@ -285,7 +321,7 @@ class Oracle:
         turned = [now + 1j * STEP * (cross_matrix(spin) @ now) for spin, now in zip(w, place.rotations, strict=True)]
         return Place(place.centers + 1j * STEP * v, np.array(turned), place.turns)
 
-    def _inertia(self, place: Place, speeds: Array) -> tuple[Array, Array]:
+    def _inertia(self, place: Place, speeds: Array, t: float) -> tuple[Array, Array]:
         """Return the mass matrix and the inertial forces that depend on speeds."""
         mass, bias = np.zeros((self.size, self.size)), np.zeros(self.size)
         _, spins = self.velocities(speeds)
@@ -304,11 +340,21 @@ class Oracle:
                     m = tie.values["mass"] / share
                     mass += m * one.real.T @ other.real
                     bias += m * one.real.T @ (np.imag(other) / STEP @ speeds)
+            if tie.sort == "own_leak":
+                m, v = tie.values["mass"].at(t), self.frame(tie.mounts[0], moving).v
+                mass += m * v.real.T @ v.real
+                bias += m * v.real.T @ (np.imag(v) / STEP @ speeds)
+            if tie.sort == "own_flywheel":
+                angle, row = self._gripped(tie, moving)
+                moment, slope = wheel_inertia(tie, float(np.real(angle)))
+                rate = float(row.real @ speeds)
+                mass += moment * np.outer(row.real, row.real)
+                bias += (moment * float(np.imag(row) / STEP @ speeds) + 0.5 * slope * rate * rate) * row.real
         return mass, bias
 
     def accelerations(self, place: Place, speeds: Array, t: float) -> tuple[Array, Array]:
         """Return accelerations and multipliers, both of least norm where they are not unique."""
-        mass, bias = self._inertia(place, speeds)
+        mass, bias = self._inertia(place, speeds, t)
         _, rows, rates = self.constraints(self._moving(place, speeds), t + 1j * STEP)
         matrix = rows.real
         n, m = self.size, len(matrix)
@@ -338,7 +384,7 @@ class Oracle:
         _, rows, _ = self.constraints(place, t)
         if not len(rows):
             return np.zeros(0)
-        scaled = rows.real / np.sqrt(np.diag(self._inertia(place, np.zeros(self.size))[0]))
+        scaled = rows.real / np.sqrt(np.diag(self._inertia(place, np.zeros(self.size), t)[0]))
         return np.linalg.svd(scaled / np.linalg.norm(scaled, axis=1)[:, None], compute_uv=False)
 
     @cached_property
@@ -420,7 +466,7 @@ class Oracle:
         found, n = {}, 0
         for tie in self.mechanism.ties:
             kept = self._kept[tie.name]
-            if kept and tie.sort in ROWS:
+            if kept and tie.sort in ALL_ROWS:
                 loads = self._loads_on_b(tie, place, t)
                 whole = np.zeros((len(loads), len(kept)))
                 whole[kept] = np.eye(len(kept))
@@ -438,10 +484,16 @@ class Oracle:
         frames, six = [self.frame(mount, place) for mount in tie.mounts], np.eye(6)
         none = [FrameState(frame.p, frame.axes, six[:3] * 0.0, six[3:] * 0.0) for frame in frames]
         none[-1] = FrameState(frames[-1].p, frames[-1].axes, six[:3], six[3:])
-        return np.array([np.real(row) for _, row, _ in ROWS[tie.sort](tie, none, t)])
+        return np.array([np.real(row) for _, row, _ in ALL_ROWS[tie.sort](tie, none, t)])
+
+    def _pieces(self, since: float, until: float) -> list[float]:
+        """Return the times between which the motion is smooth, first and last included."""
+        marks = {time for tie in self.mechanism.ties for time in _marks(tie, until)}
+        return [since, *sorted(time for time in marks if since < time < until), until]
 
     def run(self, times: Array, rtol: float = 1e-11) -> list[tuple[Place, Array]]:
-        """Return the states at given times, of which the first is the start's."""
+        """Return the states at given times, of which the first is the start's; at an event a time is there twice."""
+        times, places = np.unique(times, return_inverse=True)
         place, speeds = self.start()
         shape = place.centers.shape
 
@@ -459,18 +511,34 @@ class Oracle:
         began = dict(self._turns)
         fine = np.unique(np.concatenate([np.linspace(p, q, 11) for p, q in pairwise(times)]))
         y = np.concatenate([place.centers.ravel(), place.rotations.ravel(), speeds])
-        done = solve_ivp(rates, (times[0], times[-1]), y, method="DOP853", t_eval=fine, rtol=rtol, atol=rtol)
-        if not done.success:
-            raise ArithmeticError(f"the oracle's integration fails: {done.message}")
+        columns = [y]
+        self._samples = []
+        for since, until in pairwise(self._pieces(float(times[0]), float(times[-1]))):
+            self._sample(*_unpack(y, shape), since)
+            inside = fine[(fine > since) & (fine <= until)]
+            at = np.unique(np.append(inside, until))
+            done = solve_ivp(rates, (since, until), y, method="DOP853", t_eval=at, rtol=rtol, atol=rtol)
+            if not done.success:
+                raise ArithmeticError(f"the oracle's integration fails: {done.message}")
+            y = done.y[:, -1]
+            columns += list(done.y.T[: len(inside)])
         states = []
         self._turns = began
-        for i, (t, column) in enumerate(zip(fine, done.y.T, strict=True)):
+        for i, (t, column) in enumerate(zip(fine, columns, strict=True)):
             place, speeds = _unpack(column, shape)
             self.forces(place, speeds, float(t))  # counts turns
             if i % 10 == 0:
                 place = replace(_orthogonal(place), turns=dict(self._turns))
                 states.append(self.project(place, speeds, float(t)))
-        return states
+        return [states[k] for k in places]
+
+
+def _marks(tie: Tie, until: float) -> list[float]:
+    """Return the times before which something of a part is smooth: kinks of functions, and samples."""
+    found = [value.kink for value in tie.values.values() if isinstance(value, Signal) and value.jump]
+    if tie.sort == "sampled":
+        found += [float(time) for time in np.arange(0.0, until, tie.values["period"])]
+    return found
 
 
 def _unpack(y: Array, shape: tuple[int, ...]) -> tuple[Place, Array]:

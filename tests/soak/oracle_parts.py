@@ -235,6 +235,10 @@ def coordinates(tie: Tie, frames: list[FrameState]) -> dict[str, tuple[Any, Arra
     return found
 
 
+GEARS = ("gear", "slide_gear", "rack_and_pinion", "planetary_gear")
+"""Parts that hold coordinates of joints together."""
+
+
 def meshing(tie: Tie, held: list[tuple[Any, Array]]) -> Row:
     """Return the constraint of a gear between coordinates."""
     values = tie.values

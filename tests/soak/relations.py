@@ -69,6 +69,8 @@ def renamed(mechanism: Mechanism, random: np.random.Generator) -> Related:
 
 def moved_and_turned(mechanism: Mechanism, random: np.random.Generator) -> Related:
     """Return the mechanism elsewhere and turned: about the vertical, or in any way where there is no weight."""
+    if any(tie.sort == "sampled" for tie in mechanism.ties):  # which looks along an axis of the world
+        raise NotAdmitted
     angle = float(random.uniform(-np.pi, np.pi))
     up, across = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
     shift = 3.0 * random.uniform(-1.0, 1.0, 3)
@@ -115,13 +117,16 @@ def _placed(tie: Tie, turn: Array, shift: Array) -> Tie:
     values = dict(tie.values)
     if tie.sort == "drag":
         values["wind"] = turn @ values["wind"]
+    if tie.sort == "own_swirl":
+        values["axis"] = turn @ values["axis"]
     if tie.sort in ("force", "torque") and values["resolved_in"] == "world":
         name = "direction" if tie.sort == "force" else "axis"
         values[name] = turn @ values[name]
     return replace(tie, mounts=mounts, values=values)
 
 
-LINEAR = ("slider", "cylindrical", "planar", "point_on_line", "point_on_plane", "spring", "bushing", "damper")
+LINEAR = ("slider", "cylindrical", "planar", "point_on_line", "point_on_plane", "spring", "bushing", "damper",
+          "own_spring", "translational_gap", "sampled")  # fmt: skip
 """Parts whose stiffness and damping are of displacements."""
 
 
@@ -129,10 +134,17 @@ def dimensions(sort: str, name: str) -> tuple[int, int, int]:
     """Return the exponents of mass, length and time of a part's parameter."""
     if name == "offset":
         return (0, 0, 0) if sort in ("gear", "planetary_gear") else (0, 1, 0)
-    lengths = ["length", "natural_length", "radius", "pitch", "free_displacement", "motion"]
+    if name in ("lower", "upper"):
+        return (0, 1, 0) if sort == "translational_gap" else (0, 0, 0)
+    lengths = ["length", "natural_length", "radius", "radius_1", "radius_2", "pitch", "free_displacement", "motion"]
     known = {
         "mass": (1, 0, 0),
         "linear": (1, 0, -1),
+        "mean": (1, 2, 0),
+        "swing": (1, 2, 0),
+        "twisting": (1, 0, -1),
+        "pulling": (1, 0, -2),
+        "period": (0, 0, 1),
         "quadratic": (1, -1, 0),
         "wind": (0, 1, -1),
         "gravitational_parameter": (0, 3, -2),
@@ -152,23 +164,26 @@ def dimensions(sort: str, name: str) -> tuple[int, int, int]:
     return 0, 0, 0
 
 
+DECADES = 6.0
+"""Decades by which mass, length and time are scaled at most, each by itself."""
+
+
 def scaled(mechanism: Mechanism, random: np.random.Generator) -> Related:
     """Return the mechanism in other units of mass, length and time."""
-    kilogram, metre, second = (float(10.0 ** random.uniform(-3.0, 3.0)) for _ in range(3))
+    kilogram, metre, second = (float(10.0 ** random.uniform(-DECADES, DECADES)) for _ in range(3))
 
     def times(value: Any, exponents: tuple[int, int, int]) -> Any:
         m, l, t = exponents
         factor = kilogram**m * metre**l * second**t
         if isinstance(value, Signal):
-            offset, amplitude = factor * value.offset, factor * value.amplitude
-            return Signal(offset, factor * value.slope / second, amplitude, value.frequency / second, value.phase)
+            return value.scaled(factor, second)
         return value if isinstance(value, str) or exponents == (0, 0, 0) else factor * value
 
     def part(tie: Tie) -> Tie:
         values = {name: times(value, dimensions(tie.sort, name)) for name, value in tie.values.items()}
         for name, value in tie.values.items():
             if isinstance(value, Signal) and dimensions(tie.sort, name) == (0, 0, 0):
-                values[name] = replace(value, slope=value.slope / second, frequency=value.frequency / second)
+                values[name] = value.scaled(1.0, second)
         mounts = tuple(replace(mount, position=metre * mount.position) for mount in tie.mounts)
         return replace(tie, mounts=mounts, values=values)
 
@@ -189,7 +204,16 @@ def scaled(mechanism: Mechanism, random: np.random.Generator) -> Related:
     return Related(new, str, metre * np.eye(3), np.zeros(3), second, kilogram * metre / second**2)
 
 
-TURNING = ("pivot", "rotary_drive", "universal", "torque", "torsion_spring", "torsion_damper", "rolling_disc")
+TURNING = (
+    "own_swirl",
+    "pivot",
+    "rotary_drive",
+    "universal",
+    "torque",
+    "torsion_spring",
+    "torsion_damper",
+    "rolling_disc",
+)
 """Parts whose axes are those of a rotation, which a mirror turns round."""
 
 UNMIRRORED = ("screw", "cylindrical", "planar", "point_on_plane", "point_on_circle", "rack_and_pinion", "drag")
@@ -210,7 +234,7 @@ def mirrored(mechanism: Mechanism, random: np.random.Generator) -> Related:
         for name in ("motor_x", "motor_z"):
             if name in values:
                 signal = values[name]
-                values[name] = replace(signal, offset=-signal.offset, amplitude=-signal.amplitude)
+                values[name] = replace(signal, offset=-signal.offset, amplitude=-signal.amplitude, jump=-signal.jump)
         mounts = tuple(
             replace(mount, position=mirror @ mount.position, rotation=mirror @ mount.rotation @ mirror)
             for mount in tie.mounts
@@ -236,7 +260,7 @@ def mirrored(mechanism: Mechanism, random: np.random.Generator) -> Related:
 def split(mechanism: Mechanism, random: np.random.Generator) -> Related:
     """Return the mechanism with one of its bodies made of two that are welded together."""
     whole = [body for body in mechanism.bodies if body.inertia is not None]
-    if not whole:
+    if not whole or any(tie.sort == "sampled" for tie in mechanism.ties):  # which looks at the centre of mass
         raise NotAdmitted
     body = whole[random.integers(len(whole))]
     share, arm = float(random.uniform(0.2, 0.8)), 0.05 * random.uniform(-1.0, 1.0, 3)

@@ -15,7 +15,8 @@ from .build import build_scene, moving_axes
 from .description import Array, Body, Mechanism, Tie, outline, rotation
 from .draw import draw
 from .oracle import Oracle, Place
-from .oracle_parts import ROWS
+from .oracle_own import ALL_ROWS
+from .oracle_parts import GEARS
 from .trial import Discarded, Finding, Trial
 
 T_END = 0.3
@@ -65,6 +66,7 @@ def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
     findings: list[Finding] = []
     tried = [*covered(mechanism), *dict.fromkeys(word for way in some_ways for word in way.words())]
     known: tuple[Oracle, list[tuple[Place, Array]]] | None = None
+    times = np.zeros(0)
     for way in some_ways:
         words = f"{way.form} {way.level if way.form == 'dae' else way.orientation} {way.solver} start={way.start}"
         try:
@@ -87,7 +89,8 @@ def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
         if not started.is_clear:
             tried.append("nearly singular where it starts")
             continue
-        if known is None or not _start_alike(known[0], started):
+        if known is None or not _start_alike(known[0], started) or not np.array_equal(times, result.time):
+            times = result.time
             try:
                 known = started, started.run(result.time, 1e-10)
             except Discarded as reason:
@@ -106,7 +109,7 @@ def check_mechanism(mechanism: Mechanism, some_ways: tuple[Way, ...]) -> Trial:
 def covered(mechanism: Mechanism) -> list[str]:
     """Return what is counted of a mechanism: its space, how many bodies and loops it has, and its parts."""
     parts = {tie.sort for tie in mechanism.ties}
-    holding = {tie.sort for tie in mechanism.ties if tie.sort in ROWS or tie.grips}
+    holding = {tie.sort for tie in mechanism.ties if tie.sort in (*ALL_ROWS, *GEARS)}
     return [
         f"space: {mechanism.space}",
         f"bodies: {len(mechanism.bodies)}",
@@ -275,7 +278,7 @@ def _motion(result: Result, oracle: Oracle, states: list[tuple[Place, Array]]) -
         if oracle.mechanism.space == "space" and not body.is_point:
             turned = np.array([place.rotations[i][:, 0] for place, _ in states]).T
             yield "orientation", _apart(np.array([result.array(f"{body.name}.x_axis.{a}") for a in "xyz"]), turned)
-    energies = np.array([oracle.energy(*state) for state in states])
+    energies = np.array([oracle.energy(*state, float(t)) for state, t in zip(states, result.time, strict=True)])
     ledger = result.energy
     yield "kinetic energy", _apart(ledger.kinetic, energies[:, 0])
     yield "potential energy", _apart(ledger.potential - ledger.potential[0], energies[:, 1] - energies[0, 1])
@@ -322,6 +325,8 @@ def named_reactions(
         "planar": {"normal_force": (0, 1.0)},
         "point_on_plane": {"normal_force": (0, 1.0)},
         "point_on_circle": {"axial_force": (0, 1.0), "radial_force": (1, 1.0)},
+        "own_surface": {"normal": (0, 1.0)},
+        "own_wire": {"normal": (0, 1.0), "across": (1, 1.0)},
         "point_on_line": {"side_force_1": (0, 1.0), "side_force_2": (1, 1.0)},
         "cylindrical": {"guide_1": (0, 1.0), "guide_2": (1, 1.0)},
     }

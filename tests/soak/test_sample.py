@@ -16,9 +16,27 @@ WAYS = Way("reduced", solver="ida-sundae"), Way("dae", solver="ida-sundae")
 
 @pytest.mark.parametrize("seed", [1, 2, 10, 16, 23])
 def test_scenes_agree_with_the_oracle(seed: int) -> None:
-    trial = check_mechanism(draw(seed), WAYS)
+    trial = check_mechanism(draw(seed, own=False), WAYS)
     assert "compared reduced" in trial.tried
     assert "compared dae" in trial.tried
+    assert not trial.findings, trial.findings[0].detail
+
+
+@pytest.mark.parametrize(
+    ("seed", "sorts"),
+    [
+        (400003, {"sampled"}),
+        (400106, {"own_flywheel", "own_leak"}),
+        (400130, {"own_flywheel", "own_spring", "rotational_gap"}),
+        (400165, {"own_wire"}),
+        (400267, {"own_swirl"}),
+    ],
+)
+def test_own_components_stops_and_feedback_agree_with_the_oracle(seed: int, sorts: set[str]) -> None:
+    mechanism = draw(seed)
+    assert sorts <= {tie.sort for tie in mechanism.ties}
+    trial = check_mechanism(mechanism, WAYS)
+    assert {"compared reduced", "compared dae"} <= set(trial.tried)
     assert not trial.findings, trial.findings[0].detail
 
 
