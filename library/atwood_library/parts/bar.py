@@ -15,7 +15,7 @@ class Bar(StraightShape):
 
     It is a rigid body with frames, where a `Rod` joins two points; and like a `Link`, but with its frame at its centre.
     In space its spin about its own axis has no inertia: it is left at rest where nothing acts on it, as between two
-    balls, and refused where something does. A `Cylinder` has some.
+    balls or along a guide, and refused where something does. A `Cylinder` has some.
     """
 
     synonyms = ("Slender rod",)

@@ -7,14 +7,15 @@ velocity along the axis is zero. This constraint needs no force, so that all the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, Scalar, depends_on, evaluate, is_zero
+from atwood.expr import Expression, Scalar, depends_on, evaluate, is_zero, jacobian, substitute
 from atwood.late import dataclass, replace
+from atwood.mechanics.constraints.shared_spin import Axis, spinning_together
 from atwood.mechanics.dynamics.inertia import RigidMass, add_masses
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, derivation_of
 from atwood.mechanics.kinematics.motion import Movement
@@ -42,6 +43,10 @@ _ON_AXIS = 1e-12
 """Relative to the size of the body: how far off its axis a point may be that is on it but for rounding."""
 
 
+_Layouts = Mapping[int, tuple[dict[int, Vector], dict[int, NodeTurn]]]
+"""Offset and turn of each node of each body, in the axes of the body."""
+
+
 @dataclass(frozen=True)
 class _Slender:
     """A body whose spin may be without inertia.
@@ -58,25 +63,33 @@ class _Slender:
     touched: tuple[tuple[int, Vector], ...]
 
 
-def idle_speeds(derivation: Derivation, state: Movement) -> dict[Expression, Expression]:
-    """Return, for each spin that is held, one component of the angular velocity in terms of the two others.
+def idle_speeds(derivation: Derivation, state: Movement) -> dict[Expression, Expression] | None:
+    """Return, for each spin that is held, one speed in terms of the others; None if one has no constant coefficient.
 
     Parameters
     ----------
     derivation, state
         The mechanism, and how it moves.
     """
-    found: dict[Expression, Expression] = {}
+    graph, speeds = derivation.table.graph, list(state.speeds)
+    solved: dict[Expression, Expression] = {}
     for index, axis in derivation.idle_spins.items():
-        spin = state.kinematics.angular_velocities[index]
-        along = decide(derivation, partial(_largest, axis))
-        others = [axis[i] * spin[i] for i in range(3) if i != along]
-        found[spin[along]] = derivation.table.graph.convert(-(others[0] + others[1]) / axis[along])
-    return found
+        (rate,) = substitute([graph.convert(dot(axis, Vector(*state.kinematics.angular_velocities[index])))], solved)
+        slopes = jacobian([rate], speeds)
+        even = {c: e for c, e in zip(slopes.columns, slopes.entries, strict=True) if e.is_parametric}
+        if not even:
+            return None
+        columns = sorted(even)
+        chosen = columns[decide(derivation, partial(_largest, tuple(even[c] for c in columns)))]
+        speed = speeds[chosen]
+        value = -substitute([rate], {speed: graph.zero})[0] / even[chosen]
+        solved = dict(zip(solved, substitute(list(solved.values()), {speed: value}), strict=True))
+        solved[speed] = value
+    return solved
 
 
-def _largest(axis: Vector, mechanism: Mechanism) -> int:
-    return int(np.argmax(np.abs(_numbers(mechanism, axis, mechanism.known_at_start()))))
+def _largest(coefficients: Sequence[Expression], mechanism: Mechanism) -> int:
+    return int(np.argmax(np.abs(evaluate(list(coefficients), mechanism.known_at_start()))))
 
 
 def hold_idle_spins(mechanism: Mechanism) -> Mechanism:
@@ -89,26 +102,58 @@ def hold_idle_spins(mechanism: Mechanism) -> Mechanism:
     """
     if not mechanism.space.is_spatial:
         return mechanism
-    free = _free_to_spin(mechanism)
-    if not free:
+    oriented = [index for index in sorted(mechanism.bodies.oriented) if index]
+    if not oriented:
         return mechanism
     derivation = derivation_of(mechanism)
     layouts = {body.index: body_offsets(body, mechanism.space) for body in mechanism.bodies.bodies}
     masses = add_masses(mechanism.graph, mechanism.bodies, mechanism.locals_, layouts, mechanism.space).bodies
+    held: dict[int, tuple[_Slender, _How]] = {}
+    for index, nodes in _free_to_spin(mechanism).items():
+        if index in masses:
+            slender = _Slender(masses[index], tuple((node, layouts[index][0][node]) for node in nodes))
+            how = decide(derivation, partial(_axis, slender))
+            if how is not None:
+                held[index] = slender, how
+    others = {index: _Slender(masses[index], ()) for index in oriented if index in masses and index not in held}
+    if others:
+        shared = decide(derivation, partial(_sharing, others, layouts))
+        held |= {index: (others[index], how) for index, how in shared}
     locals_, axes = dict(mechanism.locals_), dict(mechanism.idle_spins)
-    for index, nodes in free.items():
-        if index not in masses:
-            continue
-        offsets, turns = layouts[index]
-        slender = _Slender(masses[index], tuple((node, offsets[node]) for node in nodes))
-        how = decide(derivation, partial(_axis, slender))
+    for index, (slender, how) in held.items():
+        path, name = _frame_of(mechanism, index, slender.mass)
+        turn = layouts[index][1][mechanism.graph.node_of[path, name]]
+        axis = axes[index] = _direction(slender, how)
+        locals_[path] = _held(mechanism, locals_[path], locals_[path].connectors[name], axis, turn)
+    if not held and not derivation.decided:
+        return mechanism
+    return replace(mechanism, locals_=locals_, idle_spins=axes, decisions=tuple(derivation.decided))
+
+
+def _sharing(slender: Mapping[int, _Slender], layouts: _Layouts, mechanism: Mechanism) -> tuple[tuple[int, _How], ...]:
+    """Return bodies whose spin is to be held though joints read how they are turned, with how their axes are found."""
+    known, found, axes = mechanism.known_at_start(), {}, {}
+    for index, one in slender.items():
+        how = _axis(one, mechanism)
         if how is None:
             continue
-        path, name = _frame_of(mechanism, index, slender.mass)
-        connector = locals_[path].connectors[name]
-        axis = axes[index] = _direction(slender, how)
-        locals_[path] = _held(mechanism, locals_[path], connector, axis, turns[mechanism.graph.node_of[path, name]])
-    return replace(mechanism, locals_=locals_, idle_spins=axes, decisions=tuple(derivation.decided))
+        offsets, turns = layouts[index]
+        axes[index] = Axis(
+            _numbers(mechanism, _direction(one, how), known),
+            _numbers(mechanism, one.mass.center, known),
+            {node: _numbers(mechanism, offset, known) for node, offset in offsets.items()},
+            {node: _matrix(mechanism, turn, known) for node, turn in turns.items()},
+        )
+        found[index] = how
+    if not axes:
+        return ()
+    return tuple((index, found[index]) for index in spinning_together(mechanism, axes, known))
+
+
+def _matrix(mechanism: Mechanism, turn: NodeTurn, known: Mapping[Expression, float]) -> FloatArray:
+    """Return the axes of a frame as the columns of a matrix."""
+    assert isinstance(turn, tuple)
+    return np.array([_numbers(mechanism, axis, known) for axis in turn]).T
 
 
 def _free_to_spin(mechanism: Mechanism) -> dict[int, list[int]]:

@@ -137,9 +137,10 @@ def without_idle_spins(
     idle = tuple(one for one in on_velocities if one[1].law is IDLE_SPIN)
     if not idle:
         return taken
-    if taken.left or any(value is not SOLVED for _, _, value in values):
+    alone = not taken.left and all(value is SOLVED for _, _, value in values)
+    spins = idle_speeds(derivation, state) if alone else None
+    if spins is None:
         return replace(taken, left=(*taken.left, *idle))
-    spins = idle_speeds(derivation, state)
     rolling = dict(zip(taken.speeds, substitute(list(taken.speeds.values()), spins), strict=True))
     return replace(taken, speeds={**rolling, **spins})
 

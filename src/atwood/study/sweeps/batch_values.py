@@ -285,6 +285,9 @@ class StartRows:
             except AtwoodError:
                 found[place] = False
                 continue
+            if (len(start.coordinates), len(start.speeds)) != (q.shape[1], u.shape[1]):
+                found[place] = False  # of another structure
+                continue
             q[place], u[place], lengths[place] = start.coordinates, start.speeds, start.length
         return q, u, lengths, found
 
