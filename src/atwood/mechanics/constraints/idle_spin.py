@@ -15,7 +15,6 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, Scalar, depends_on, evaluate, is_zero, jacobian, substitute
 from atwood.late import dataclass, replace
-from atwood.mechanics.constraints.shared_spin import Axis, spinning_together
 from atwood.mechanics.dynamics.inertia import RigidMass, add_masses
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, derivation_of
 from atwood.mechanics.kinematics.motion import Movement
@@ -132,11 +131,15 @@ def hold_idle_spins(mechanism: Mechanism) -> Mechanism:
 
 def _sharing(slender: Mapping[int, _Slender], layouts: _Layouts, mechanism: Mechanism) -> tuple[tuple[int, _How], ...]:
     """Return bodies whose spin is to be held though joints read how they are turned, with how their axes are found."""
-    known, found, axes = mechanism.known_at_start(), {}, {}
-    for index, one in slender.items():
-        how = _axis(one, mechanism)
-        if how is None:
-            continue
+    hows = {index: _axis(one, mechanism) for index, one in slender.items()}
+    found = {index: how for index, how in hows.items() if how is not None}
+    if not found:
+        return ()
+    from atwood.mechanics.constraints.shared_spin import Axis, spinning_together  # few scenes have such bodies
+
+    known, axes = mechanism.known_at_start(), {}
+    for index, how in found.items():
+        one = slender[index]
         offsets, turns = layouts[index]
         axes[index] = Axis(
             _numbers(mechanism, _direction(one, how), known),
@@ -144,9 +147,6 @@ def _sharing(slender: Mapping[int, _Slender], layouts: _Layouts, mechanism: Mech
             {node: _numbers(mechanism, offset, known) for node, offset in offsets.items()},
             {node: _matrix(mechanism, turn, known) for node, turn in turns.items()},
         )
-        found[index] = how
-    if not axes:
-        return ()
     return tuple((index, found[index]) for index in spinning_together(mechanism, axes, known))
 
 

@@ -19,7 +19,6 @@ from atwood.model.declare.binding import Binding
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.laws import LocalPart
-from atwood.model.local.output_values import reported_axes
 from atwood.model.values.rotation import from_axes, to_axes
 from atwood.model.values.space import FIXED_AXES
 from atwood.model.values.vector import Vector, dot
@@ -134,7 +133,7 @@ def take(
     """Add a quantity to those found, component by component if it is a vector."""
     graph = mechanism.table.graph
     if isinstance(value, Vector):
-        for axis in reported_axes(mechanism.space, value, unit):
+        for axis in mechanism.space.reported(value, unit):
             name = f"{path}.{'xyz'[axis]}"
             found[name] = Observable(name, unit, doc, periodic, graph.convert(value[axis]))
     else:

@@ -7,35 +7,14 @@ from functools import partial
 from typing import Any
 
 from atwood.errors import DeclarationError, suggestion
-from atwood.expr import Scalar, is_zero
+from atwood.expr import Scalar
 from atwood.model.declare.law import Law
 from atwood.model.local.flatten import Part
 from atwood.model.returned import call_law, law_value
 from atwood.model.values.space import WHERE, Space
 from atwood.model.values.vector import Vector
 
-__all__ = ["output_value", "reported_axes"]
-
-_AXIAL_UNITS = ("rad/s", "rad/s^2", "N*m", "kg*m^2/s")
-"""Units of vectors that are about the plane's normal where everything moves in the plane."""
-
-
-def reported_axes(space: Space, value: Vector, unit: str) -> Sequence[int]:
-    """Return which components of a vector are reported: of what is about a plane's normal that along it, y.
-
-    Parameters
-    ----------
-    space
-        What the scene lives in.
-    value
-        The vector, in world axes.
-    unit
-        Its unit: angular velocities, torques and angular momenta are about the normal, also where they are zero.
-    """
-    in_plane_is_zero = all(is_zero(value[axis]) for axis in space.reported_axes)
-    if space.is_planar and in_plane_is_zero and (unit in _AXIAL_UNITS or not is_zero(value.y)):
-        return (1,)
-    return space.reported_axes
+__all__ = ["output_value"]
 
 
 def output_value(part: Part, bound: Any, name: str, space: Space) -> Scalar:
@@ -69,7 +48,7 @@ def output_value(part: Part, bound: Any, name: str, space: Space) -> Scalar:
         value = call_law(part.path, law, partial(law_value, bound, stem))
         if isinstance(value, Vector):
             if axis not in ("x", "y", "z"):
-                axes = reported_axes(space, value, law.options.unit)
+                axes = space.reported(value, law.options.unit)
                 raise _no_component(axis, [f"{stem}.{'xyz'[i]}" for i in axes], where)
             value = getattr(value, axis)
         elif axis:

@@ -11,7 +11,6 @@ from atwood.late import dataclass
 from atwood.model.declare.binding import Binding, bind
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.local.flatten import FlatScene, Part
-from atwood.model.local.output_values import output_value
 from atwood.model.local.states import state_values
 from atwood.model.values.space import make_space
 from atwood.model.values.vector import Vector
@@ -115,6 +114,8 @@ def _is_source(part: Part, flat: FlatScene) -> bool:
 
 def _source_value(source: Part, observable: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
     """Return the output of a part that depends on time and parameters alone."""
+    from atwood.model.local.output_values import output_value  # few scenes have links
+
     values = {name: read_parameter(source, spec, table) for name, spec in source.component.parameter_specs().items()}
     values |= {name: read_signal(source, name, given, flat, time, table, {}) for name, given in source.signals.items()}
     values |= state_values(source, table.graph)

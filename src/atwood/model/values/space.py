@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from atwood.expr import Scalar, cos, sin
+from atwood.expr import Scalar, cos, is_zero, sin
 from atwood.late import dataclass
 from atwood.model.values.vector import Vector, dot
 
 __all__ = ["Space", "make_space"]
+
+_AXIAL_UNITS = ("rad/s", "rad/s^2", "N*m", "kg*m^2/s")
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,16 @@ class Space:
     def is_spatial(self) -> bool:
         """Whether orientations are rotations in space."""
         return len(self.turn_axes) == 3
+
+    def reported(self, vector: Vector, unit: str) -> tuple[int, ...]:
+        """Return which components of a vector are reported: of what is about a plane's normal that along it, y.
+
+        Angular velocities, torques and angular momenta, as their unit tells, are so also where they are zero.
+        """
+        is_across = all(is_zero(vector[axis]) for axis in self.reported_axes)
+        if self.is_planar and is_across and (unit in _AXIAL_UNITS or not is_zero(vector.y)):
+            return (1,)
+        return self.reported_axes
 
     def turn_components(self, vector: Vector) -> tuple[Scalar, ...]:
         """Return the components of a torque or an angular velocity about the axes that frames can turn about."""
