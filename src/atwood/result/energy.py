@@ -45,7 +45,7 @@ class EnergyLedger:
         - what goes to and fro: the mean absolute deviations from their means of the potential energy, and of the
           kinetic energy of each part for an observer who moves with the mean velocity of the centre of mass; but no
           more than the kinetic energy for that observer,
-        - the range of the work,
+        - the range of the work, also between samples where it is integrated in the steps of the solver,
         - 1e-6 of the mean kinetic energy.
 
         Kinetic energies are geometric means over the time in which something moves, so that a short fast part, as the
@@ -241,7 +241,7 @@ def _weights(t: FloatArray) -> FloatArray:
 
 
 def make_ledger(
-    pieces: Sequence[Piece], work: Sequence[FloatArray], unsure: float, shown: NDArray[np.bool_]
+    pieces: Sequence[Piece], work: Sequence[FloatArray], unsure: float, shown: NDArray[np.bool_], swing: float = 0.0
 ) -> EnergyLedger:
     """Return the ledger of a run.
 
@@ -255,6 +255,8 @@ def make_ledger(
         Estimated error of all this work, J.
     shown
         Which of all samples are outputs.
+    swing
+        Range of the work between samples, J, where it is known: a drive may have the period of the samples.
     """
     done, carried = [], 0.0
     for i, (piece, inside) in enumerate(zip(pieces, work, strict=True)):
@@ -264,7 +266,7 @@ def make_ledger(
     kinetic, potential = (np.concatenate([getattr(one, name) for one in pieces]) for name in ("kinetic", "potential"))
     all_work = np.concatenate(done)
     balance = kinetic + potential - all_work
-    exchanged, rounding = exchange(pieces, all_work), 2.0 * max(one.rounding for one in pieces)
+    exchanged, rounding = max(swing, exchange(pieces, all_work)), 2.0 * max(one.rounding for one in pieces)
     beyond = float(np.maximum(0.0, np.max(np.abs(balance - balance[0])) - rounding))  # nan stays nan
     share = beyond / max(exchanged, rounding) if beyond else 0.0
     return EnergyLedger(kinetic[shown], potential[shown], all_work[shown], share, exchanged, rounding + unsure)

@@ -167,22 +167,25 @@ def _balanced(run: Run, pieces: Sequence[Piece], shown: NDArray[np.bool_]) -> En
             found = _work_in_steps(run, pieces, nodes_in_steps(run))
     except TimeIsUp:
         return ledger
-    return ledger if found is None else make_ledger(pieces, *found, shown)
+    if found is None:
+        return ledger
+    work, unsure, swing = found
+    return make_ledger(pieces, work, unsure, shown, swing)
 
 
-def _work_in_steps(run: Run, pieces: Sequence[Piece], count: int) -> tuple[list[FloatArray], float] | None:
-    """Return the work at all samples, integrated within each step of the solver, and its estimated error."""
+def _work_in_steps(run: Run, pieces: Sequence[Piece], count: int) -> tuple[list[FloatArray], float, float] | None:
+    """Return the work at all samples, integrated in each step, its estimated error, and its range at all steps."""
     found = samples_in_steps(run, [one.time for one in pieces], count)
     if found is None:
         return None
-    work, unsure = [], 0.0
+    work, unsure, swing = [], 0.0, 0.0
     for one, piece in zip(found, pieces, strict=True):
         power = power_into(SegmentQuantities(one.segment))
         rows = np.zeros((len(one.grid) - 1, count)) if power is None else power[one.places].reshape(-1, count)
         done, error = integral_in_steps(one.grid, rows)
         work.append(done[np.searchsorted(one.grid, piece.time)])
-        unsure += float(error)
-    return work, unsure
+        unsure, swing = unsure + float(error), max(swing, float(np.ptp(done)))
+    return work, unsure, swing
 
 
 @dataclass(frozen=True, eq=False)
