@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 
 from atwood.errors import UsageError, suggestion
-from atwood.expr import Expression, substitute
+from atwood.expr import Expression, depends_on, live, select, sqrt, substitute
 from atwood.forms.program import FormProgram, Level, either_sign, kinematic_rows, make_form_program
 from atwood.late import replace
 from atwood.mechanics.dynamics.equations import Equations
@@ -13,6 +13,9 @@ from atwood.mechanics.dynamics.equations import Equations
 __all__ = ["LEVELS", "check_level", "dae_form", "keep_constraints"]
 
 LEVELS: tuple[Level, ...] = ("ggl", "index1", "index1-projected")
+
+_TINY = 1e-300
+"""In place of a square that is zero."""
 
 
 def check_level(level: str, form: str) -> None:
@@ -72,7 +75,7 @@ def dae_form(
     if level not in LEVELS:
         raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
     multipliers = equations.multipliers
-    rows = equations.rows_with_multipliers or equations.rows
+    rows = _smooth_at_zero(equations.rows_with_multipliers, multipliers) or equations.rows
     dynamic = [r - f for r, f in zip(rows, equations.constraint_rows, strict=True)]
     if not multipliers:
         return make_form_program(name, "dae", "ggl", equations, parameters, tidy(kinematic_rows(equations) + dynamic))
@@ -87,6 +90,19 @@ def dae_form(
     chosen: Level = "ggl" if level == "ggl" else ("index1" if level == "index1" else "index1-projected")
     residual = tidy(kinematic + dynamic + held)
     return make_form_program(name, "dae", chosen, equations, parameters, residual, multipliers, extra)
+
+
+def _smooth_at_zero(rows: Sequence[Expression], multipliers: Sequence[Expression]) -> list[Expression]:
+    """Return rows in which roots of multipliers, such as the size of a force, have the slope zero at zero.
+
+    Newton's method asks for it where nothing presses; the values are the same but for 1e-150.
+    """
+    if not rows:
+        return []
+    roots = [node for node in live(rows) if node.operation == "sqrt" and depends_on(node, multipliers)]
+    inside = {root: root.arguments[0] for root in roots}
+    guarded = {root: sqrt(select(one > 0.0, one, _TINY)) for root, one in inside.items()}
+    return substitute(list(rows), guarded) if guarded else list(rows)
 
 
 def _shifted(equations: Equations) -> tuple[list[Expression], tuple[Expression, ...]]:

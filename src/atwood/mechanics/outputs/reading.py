@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from atwood.errors import AtwoodError
-from atwood.expr import Expression
+from atwood.expr import Expression, is_zero
 from atwood.late import replace
 from atwood.mechanics.build import Mechanism, resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
@@ -212,7 +212,9 @@ class Reader:
             Whether that includes energies and totals of the model around it.
         """
         path = local.part.path
-        known, own = self._known.get(path, {}), self._reactions.get(path, {})
+        known, zero = self._known.get(path, {}), self._mechanism.table.graph.zero
+        across = {name: zero for name, value in local.binding.reactions.items() if is_zero(value)}  # of a plane
+        own = {**across, **self._reactions.get(path, {})}
         energies: Mapping[str, Any] = self._around_part(local) if with_energies else {}
         return make_binding(self._mechanism, self._equations, local, own, known, energies, self._signals)
 
