@@ -54,12 +54,10 @@ def finalized(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def test_nothing_of_llvm_is_left_to_finalizers(finalized: list[str]) -> None:
     gc.collect()
-    code = made(1)
-    assert not finalized
-    gone = weakref.ref(code)
-    del code
+    gone = weakref.ref(made(1))
     gc.collect()
     assert gone() is None
+    assert not finalized
     assert engine._dead
     code = made(2)
     assert code.addresses
