@@ -310,6 +310,35 @@ def test_what_comes_to_rest_there_is_never_told_without_saying_where_it_is() -> 
     assert "coincidence" in told[0]
 
 
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-13])
+@pytest.mark.parametrize("solver", ["auto", "ida"])
+def test_what_just_comes_to_rest_there_is_not_told_as_if_it_were_known(form: str, rtol: float, solver: str) -> None:
+    # Its energy is that of the singular position: it could turn back, or fold either way.
+    scene = parallel_four_bar(2, angle=-1.0, rate=parallelogram_speed(-1.0, 0.0))
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        try:
+            simulate(scene, form=form, rtol=rtol, t_end=0.8, solver=solver)
+            told = [str(one.message) for one in warned]
+        except SolveError as error:
+            told = [str(error)]
+    assert any("singular position" in one for one in told)  # nothing was said at 1e-4 before
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("rate", [1e-6, 0.01, 1e3])
+def test_a_slow_motion_without_forces_passes(form: str, rate: float) -> None:
+    # Slow beside nothing: it never comes to rest.
+    scene = four_bar(rate=rate)
+    scene.gravity = 0.0
+    result = quiet(scene, form=form, rtol=1e-4, t_end=3.0 / rate)
+    assert [one.ways for one in result.singular_crossings] == [1]
+    assert np.max(np.abs(result["crank.angle"] - 1.0 - rate * result.time)) < 1e-2
+
+
 # -- what is recorded --------------------------------------------------------------------------------------------------
 
 

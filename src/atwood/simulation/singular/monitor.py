@@ -21,6 +21,7 @@ from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow
 from atwood.simulation.singular.crossing import SingularCrossing, stuck_at
 from atwood.simulation.singular.looks import Look, as_lookout, compiled_looks, cubic, going_on, stride_from
 from atwood.simulation.singular.rank_measure import RankMeasure, find_crossing, find_loss, nearly_lost, zero_ahead
+from atwood.simulation.singular.rest import is_slow, rests_at, slowest
 from atwood.tolerances import tolerances
 
 __all__ = ["SingularityMonitor", "singularity_monitor_of"]
@@ -336,6 +337,10 @@ class SingularityMonitor:
             is_least = away[i] <= min(before, behind, _LOW * self._largest)
             if not is_least and not away[i] <= _FALLEN * self._largest < before < np.inf:
                 continue
+            rest = self._rest(max(i - 1, 0), min(i + 1, len(away) - 1)) if is_least else None
+            if rest is not None:
+                self.agreed.append(rest)
+                continue
             near = self._closest(max(i - 1, 0), min(i + 1, len(away) - 1)) if is_least else None
             found = None if near is None else self._pass(*near, failed)
             heading = self._heading(i) if found is None else None
@@ -377,6 +382,32 @@ class SingularityMonitor:
         places = (kinematic_map.normalized(y[:n]) - kinematic_map.normalized(q)) / self.plan.coordinate_sizes[:, None]
         speeds = (y[n : n + m] - u) / self.plan.sizes[:, None] * self.plan.scales.time
         return max(float(np.max(np.abs(places))), float(np.max(np.abs(speeds)))) < _AGREES * self.tolerance
+
+    def _rest(self, first: int, last: int) -> SingularCrossing | None:
+        """Return that the motion between some looks comes to rest where it is singular; None if it does not."""
+        one, other = self._looks[first], self._looks[last]
+        times = np.linspace(one.t, other.t, 65)
+        known = self._between(times) if first < last else None
+        near = None if known is None else slowest(times, known[1], self.plan.sizes)
+        if near is None:
+            return None
+        assert known is not None
+        away = self._measures.at(np.array([near]), known[0][:, [int(np.argmin(np.abs(times - near)))]])[0]
+        begin = self._state(one) if away < _CLOSE * self._largest else None
+        arc = None if begin is None else find_arc(self.plan, *begin, 2.0 * near - one.t, self._between)
+        if arc is None or not arc.error < max(self.tolerance, _ACCURATE):
+            return None
+        rest = rests_at(self.plan, self._measures, arc, self._largest, self._fastest, self.tolerance)
+        if rest is None:
+            return None
+        lost = nearly_lost(self._measures, rest, arc.at(np.array([rest]))[0][:, 0])
+        return SingularCrossing(rest, 0, *self._said((lost,)), None)
+
+    @property
+    def _fastest(self) -> float:
+        """The largest speed at the looks that are kept, in units of the scene's sizes."""
+        speeds = slice(self._n, self._n + self._m)
+        return max(float(np.max(np.abs(one.y[speeds]) / self.plan.sizes)) for one in self._looks)
 
     def _closest(self, first: int, last: int) -> tuple[float, float] | None:
         """Return when the motion between some looks is closest to a singular position, and how close; if it is."""
@@ -511,6 +542,8 @@ class SingularityMonitor:
 
     def _crossing(self, arc: Arc, t: float, away: float) -> SingularCrossing | None:
         """Return the singular crossing that an arc makes at a time; None if that is no singular position."""
+        if is_slow(self.plan, arc, t, self._fastest, self.tolerance):
+            return None
         loss = find_loss(self._measures, arc, t, away)
         return (
             None
