@@ -7,14 +7,24 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import StartError
 from atwood.forms.assembly import Assembly
-from atwood.linalg.matrices import Matrix, is_full, scaled
+from atwood.linalg.matrices import Matrix, is_full, scaled, to_array
+from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.rank import open_directions
+from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_names
 
 __all__ = ["check_massless_directions"]
 
+_APART = 1e8
+"""Masses that differ by less do not explain why inertia is lost."""
 
-def check_massless_directions(assembly: Assembly, mass: Matrix, jacobian: Matrix, sizes: FloatArray) -> None:
+
+State = tuple[float, FloatArray, FloatArray]
+
+
+def check_massless_directions(
+    assembly: Assembly, mass: Matrix, jacobian: Matrix, sizes: FloatArray, state: State
+) -> None:
     """Refuse a direction in which something can move without inertia.
 
     Parameters
@@ -25,6 +35,8 @@ def check_massless_directions(assembly: Assembly, mass: Matrix, jacobian: Matrix
         The mass matrix, and the derivatives of the independent constraints, along the speeds.
     sizes
         Size of a displacement along each speed.
+    state
+        Time, coordinates and speeds of the form.
 
     Raises
     ------
@@ -40,7 +52,7 @@ def check_massless_directions(assembly: Assembly, mass: Matrix, jacobian: Matrix
 
         moving = massless_directions(mass, jacobian, sizes)
         if moving is not None:
-            raise _massless_directions(assembly, moving)
+            raise _massless_directions(assembly, moving, state)
         return
     weighed = mass * sizes[:, None] * sizes[None, :]
     if _is_clearly_positive(weighed):
@@ -54,7 +66,7 @@ def check_massless_directions(assembly: Assembly, mass: Matrix, jacobian: Matrix
     values, vectors = np.linalg.eigh(free @ weighed @ free.T)
     if values[0] > 1e-14 * max(values[-1], 1e-300):
         return
-    raise _massless_directions(assembly, np.abs(vectors[:, 0] @ free))
+    raise _massless_directions(assembly, np.abs(vectors[:, 0] @ free), state)
 
 
 def _is_clearly_positive(weighed: FloatArray) -> bool:
@@ -79,9 +91,16 @@ def _sizes_of_inertia(mass: Matrix, sizes: FloatArray) -> FloatArray:
     return np.where(has, even, sizes * _median(even[has] / sizes[has]))
 
 
-def _massless_directions(assembly: Assembly, moving: FloatArray) -> StartError:
+def _massless_directions(assembly: Assembly, moving: FloatArray, state: State) -> StartError:
     every = motion_names(assembly.own_equations)
     names = [name for name, size in zip(every, moving, strict=True) if size > 0.1 * np.max(moving)]
+    apart = _masses_apart(assembly, *state) if assembly.form == "reduced" else ""
+    if apart:
+        return StartError(
+            f"the inertia along {', '.join(names)} is lost to rounding: {apart}, and a sum of them keeps 16 digits",
+            where=_part_of(assembly, names[0]),
+            advice="Simulate it with form='dae', where masses are not added up, or leave out what is so light.",
+        )
     units = dict(zip(every, (one.unit for one in assembly.own_equations.speed_names), strict=True))
     turns = all(units[name] == "rad/s" for name in names)
     where = _part_of(assembly, names[0])
@@ -92,6 +111,26 @@ def _massless_directions(assembly: Assembly, moving: FloatArray) -> StartError:
         where=where,
         advice=f"Give it a {'moment of inertia' if turns else 'mass'}, or hold it with a joint.",
     )
+
+
+def _masses_apart(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> str:
+    """Return by how much masses differ where every body has inertia in all directions of its own; else nothing."""
+    maximal = assembly.maximal
+    big_q, big_u = (one[:, 0] for one in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
+    mass = to_array(balance_of(assembly, "dae").at(t, big_q, big_u).mass)
+    own = np.diag(mass)
+    moved = [i for i, one in enumerate(maximal.speed_names) if one.unit == "m/s"]
+    if not np.all(own > 0.0) or not moved:
+        return ""
+    units = np.sqrt(own)
+    if np.linalg.eigvalsh(mass / units[:, None] / units[None, :])[0] < 1e-12:
+        return ""
+    names = motion_names(maximal)
+    light, heavy = min(moved, key=lambda i: own[i]), max(moved, key=lambda i: own[i])
+    if own[heavy] < _APART * own[light]:
+        return ""
+    said = [f"{_part_of(assembly, names[i])} has {own[i]:.3g} kg" for i in (light, heavy)]
+    return f"masses differ by too much ({' and '.join(said)})"
 
 
 def _part_of(assembly: Assembly, name: str) -> str:

@@ -71,7 +71,7 @@ def _make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, lengt
             advice=ADVICE_AT_START,
         ) from error
     constraint_jacobian = now.jacobian[list(finding.kept)] if finding.kept else now.jacobian[:0]
-    check_massless_directions(assembly, now.mass, constraint_jacobian, sizes)
+    check_massless_directions(assembly, now.mass, constraint_jacobian, sizes, (t, q, u))
     if finding.starts_singular:
         raise _singular_start(assembly, finding)
     dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
