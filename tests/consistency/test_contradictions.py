@@ -451,3 +451,41 @@ class WireWithALengthTooFew(Wire):
 def test_a_power_of_one_does_not_hide_what_is_wrong_with_other_values():
     aw.assemble(scene_with(WireWithALengthTooFew()))
     assert "its rate 'angular_velocity' is" in refused(WireWithALengthTooFew(length=2.0))
+
+
+class GuideThatTurnsALittle(aw.Component):
+    """A guide that keeps its end from turning, with a placement that turns it by less than what counts as wrong."""
+
+    spaces = ("plane",)
+    a: aw.Frame = aw.connector(aw.Frame, "What carries it.")
+    b: aw.Frame = aw.connector(aw.Frame, "What slides.")
+
+    @aw.constraint(reaction="push", unit="N", doc="Force on b.")
+    def guide(self):
+        return self.a.to_frame(self.b.position - self.a.position).z
+
+    @aw.constraint(reaction="torque", unit="N*m", doc="Torque on b.")
+    def lock(self):
+        return self.b.angle - self.a.angle
+
+    @aw.joint("a", "b", coordinates=("way",), solves=("guide", "lock"))
+    def slide(self, way):
+        return aw.Placement(aw.Vector(way, 0.0, 0.0), 1e-8 * way, axes="a")
+
+    @aw.observable(unit="m", doc="How far it is.")
+    def way(self):
+        return self.a.to_frame(self.b.position - self.a.position).x
+
+
+def test_a_turn_too_small_to_be_told_from_none_is_refused_by_name():
+    scene = aw.Scene()
+    ground, guide, body = (
+        scene.add("ground", Ground()),
+        scene.add("guide", GuideThatTurnsALittle()),
+        RigidBody(mass=1.0),
+    )
+    scene.add("body", body)
+    scene.connect(ground.frame, guide.a)
+    scene.connect(guide.b, body.frame)
+    with pytest.raises(aw.UnsupportedError, match=r"guide.slide: a coordinate of it turns b"):
+        aw.simulate(scene)

@@ -233,6 +233,12 @@ def _across_joint(
     angle_a = angles[a] + shape_of[a].turns[joint.a] if a in angles else None
     values = iter(own)
     for symbol in joint.moves:
+        if symbol in joint.turns and b not in angles:
+            raise UnsupportedError(
+                "a coordinate of it turns b, and its constraints keep b from turning",
+                where=joint.label,
+                advice="Mend the placement's rotation or the constraint: they differ by very little.",
+            )
         if symbol in joint.turns:
             angle_b = angles[b] + shape_of[b].turns[joint.b]
             known[symbol] = graph.convert(_turned_by(joint, symbol, angle_b - angle_a))
