@@ -9,12 +9,14 @@ from atwood import (
     Point,
     connector,
     constraint,
+    discrete_state,
     dissipation,
     force,
     joint,
     observable,
     parameter,
     potential,
+    update,
 )
 
 
@@ -199,3 +201,59 @@ class Uneven(_Pair):
     @constraint(reaction="tension", unit="N*m", doc="Multiplier.")
     def together(self):
         return self.arm().x
+
+
+class HalfTheForce(_Pair):
+    """Its loads are half of what the energy that it reports asks for."""
+
+    @force
+    def pull(self):
+        yield Load(self.a, 0.5 * self.stiffness * self.arm())
+        yield Load(self.b, -0.5 * self.stiffness * self.arm())
+
+    @observable(unit="J", doc="Energy.")
+    def energy(self):
+        return 0.5 * self.stiffness * aw.dot(self.arm(), self.arm())
+
+
+class PushingDamper(_Pair):
+    """A damper with the wrong sign."""
+
+    damping: float = parameter(0.4, unit="N*s/m", minimum=0.0, doc="Damping.")
+
+    @force
+    def rub(self):
+        speed = self.b.velocity - self.a.velocity
+        yield Load(self.a, -self.damping * speed)
+        yield Load(self.b, self.damping * speed)
+
+
+class _Sampled(Component):
+    """What the controllers below have in common."""
+
+    period: float = parameter(0.1, unit="s", doc="Sample time.")
+    y: aw.Scalar = discrete_state(unit="N", doc="Command.")
+
+
+class Wordy(_Sampled):
+    """Its command is a word."""
+
+    @update(every="period", sets="y")
+    def step(self):
+        return "full"
+
+
+class Generous(_Sampled):
+    """It gives two numbers for one state."""
+
+    @update(every="period", sets="y")
+    def step(self):
+        return 1.0, 2.0
+
+
+class Raising(_Sampled):
+    """Its update fails."""
+
+    @update(every="period", sets="y")
+    def step(self):
+        return {}["gain"]

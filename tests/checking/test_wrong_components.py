@@ -32,6 +32,10 @@ WRONG = [
     (mine.WrongName, "names", "level", "its target 'stopp' is no mode"),
     (mine.BadPicture, "outline", "outline", "it raises MissingNameError"),
     (mine.Uneven, "units", "together", "and is in m"),
+    (mine.HalfTheForce, "forces", "pull", "its loads are 0.5 times the forces of the energy 'energy'"),
+    (mine.Wordy, "updates", "step", "it returns 'full' where a number is wanted"),
+    (mine.Generous, "updates", "step", "it returns 2 values where it sets 1"),
+    (mine.Raising, "updates", "step", "it raises KeyError: 'gain'"),
 ]
 
 
@@ -47,7 +51,11 @@ def test_each_mistake_is_found(cls: type[aw.Component], test: str, law: str, tex
 
 @pytest.mark.parametrize(
     ("cls", "text"),
-    [(mine.NoReaction, "is a reaction missing?"), (mine.AgainstTheWorld, "when the whole scene is moved or turned")],
+    [
+        (mine.NoReaction, "is a reaction missing?"),
+        (mine.AgainstTheWorld, "when the whole scene is moved or turned"),
+        (mine.PushingDamper, "give power to every motion that was tried: is a sign wrong?"),
+    ],
 )
 def test_what_may_be_meant_is_a_note(cls: type[aw.Component], text: str) -> None:
     report = aw.check(cls, run=False)

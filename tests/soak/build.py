@@ -66,7 +66,7 @@ def build_scene(mechanism: Mechanism, start: str = "all") -> Scene:
     scene = Scene(space=mechanism.space, gravity=mechanism.gravity, line_axis=tuple(mechanism.line))
     for body in mechanism.bodies:
         scene.add(body.name, _part_of(body))
-    for tie in mechanism.ties:
+    for tie in sorted(mechanism.ties, key=lambda tie: bool(tie.grips)):  # what takes hold of a joint needs it there
         _add_tie(scene, mechanism, tie)
     for body in mechanism.bodies:
         places, speeds = start_values(mechanism, body)
@@ -82,6 +82,8 @@ def plane_angles(mechanism: Mechanism) -> dict[str, float]:
     In a plane angles are absolute and count turns: along a joint, the angle of a body is that of the other one, plus
     what welds and the joint turn, which are within half a turn each.
     """
+    if mechanism.angles is not None:
+        return mechanism.angles
     found = {"": 0.0}
     for body in mechanism.bodies:
         angle = _counter_clockwise(body.rotation)

@@ -133,6 +133,8 @@ class Mechanism:
         ``"line"`` (along x), ``"plane"`` (x-z) or ``"space"``.
     gravity
         Along -z.
+    angles
+        In a plane, the angle of each body with its turns, where they do not follow from the order of the bodies.
     """
 
     space: str
@@ -140,6 +142,7 @@ class Mechanism:
     bodies: tuple[Body, ...]
     ties: tuple[Tie, ...]
     line: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    angles: dict[str, float] | None = None
 
     def body(self, name: str) -> Body:
         """Return the body of a name."""

@@ -74,10 +74,8 @@ def _stop_command(arguments: tuple[str, ...], sent: signal.Signals, after: float
         place = Path(directory, "files")
         place.mkdir()
         _, options = _command(place, Path(directory, "kernels"), 1)
-        program = (
-            "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); print('ready', flush=True); "
-        )
-        program += "from atwood.cli import main; main()"
+        program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        program += "from atwood.cli import main; print('ready', flush=True); main()"
         words = [word.format(place=place) for word in arguments]
         findings = _stop([sys.executable, "-c", program, *words], options, sent, after)
         for file in sorted(place.iterdir()):

@@ -11,7 +11,7 @@ from atwood import AtwoodError, Result
 
 from .build import moving_axes
 from .description import Array, Mechanism, Signal, outline
-from .draw import draw
+from .draw import draw, settled
 from .oracle import Oracle
 from .relations import RELATIONS, NotAdmitted, Related
 from .scenes import T_END, Way, run_scene, started_as, stem
@@ -29,19 +29,21 @@ def check(seed: int) -> Trial:
     random = np.random.default_rng([seed, 2])
     mechanism = draw(seed)
     way = Way(str(random.choice(["reduced", "dae"])), solver="ida-sundae", start="all")
-    for relation in random.permutation([*RELATIONS, "solved otherwise", "reversed"]):
-        words = (str(relation), mechanism.space, way.form)
+    for relation in random.permutation([*RELATIONS, "solved otherwise", "reversed", "floating"]):
+        words = (f"relation: {relation}", f"space: {mechanism.space}", f"form: {way.form}")
         if relation == "solved otherwise":
             return _compare(mechanism, Related(mechanism), way, _other_way(random, mechanism), words)
         with contextlib.suppress(NotAdmitted):
             if relation == "reversed":
                 return _reversed(mechanism, way, words)
+            if relation == "floating":
+                return _floating(mechanism, way, words)
             return _compare(mechanism, RELATIONS[relation](mechanism, random), way, way, words)
     raise AssertionError("a scene can always be solved otherwise")
 
 
 def _compare(mechanism: Mechanism, related: Related, way: Way, other: Way, words: tuple[str, ...]) -> Trial:
-    relation = words[0]
+    relation = words[0].removeprefix("relation: ")
     results: list[Result] = []
     refused: list[str] = []
     for one, how, t_end in ((mechanism, way, T_END), (related.mechanism, other, T_END * related.stretch)):
@@ -162,6 +164,54 @@ def _reversed(mechanism: Mechanism, way: Way, words: tuple[str, ...]) -> Trial:
         detail = f"{way}: {max(gaps):.1e}\n{outline(mechanism)}"
         return Trial(words, (Finding("wrong", "reversed: position", detail),))
     return Trial((*words, f"compared {back.status}"))
+
+
+FROM_OUTSIDE = ("force", "torque", "drag", "sampled", "own_swirl", "own_leak", "own_flywheel")
+"""Parts that may push against the world, or hold momentum that is in no body."""
+
+
+def _floating(mechanism: Mechanism, way: Way, words: tuple[str, ...]) -> Trial:
+    """Let go of the world: momentum, angular momentum and the balance of energy stay."""
+    inner = {
+        tie.name
+        for tie in mechanism.ties
+        if all(mount.body for mount in tie.mounts)
+        and tie.sort not in FROM_OUTSIDE
+        and not (tie.sort == "rod" and tie.values.get("mass"))
+    }
+    ties = [tie for tie in mechanism.ties if tie.name in inner and {joint for joint, _ in tie.grips} <= inner]
+    if not ties or mechanism.space == "line":
+        raise NotAdmitted
+    afloat = settled(replace(mechanism, gravity=0.0, ties=tuple(ties)))
+    try:
+        result = run_scene(afloat, way)
+    except AtwoodError as error:
+        raise Discarded(f"refused: {stem(error)}") from error
+    if result.status != "finished":
+        raise Discarded(result.status)
+    start, end = (_momentum(started_as(afloat, result, at)) for at in (0, -1))
+    gap, drift = _apart(start, end, 1.0), float(result.energy.max_drift)
+    findings = [
+        Finding("wrong", f"floating: {what}", f"{way}: {value:.1e}\n{outline(afloat)}")
+        for what, value, allowed in (("momentum", gap, ALLOWED), ("energy", drift, 100.0 * ALLOWED))
+        if not value <= allowed
+    ]
+    return Trial((*words, "compared finished"), tuple(findings))
+
+
+def _momentum(mechanism: Mechanism) -> Array:
+    """Return momentum and angular momentum about the origin of all bodies, as far as the space has them."""
+    momentum, angular = np.zeros(3), np.zeros(3)
+    for body in mechanism.bodies:
+        arm = body.rotation @ body.center
+        own = body.mass * (body.velocity + np.cross(body.spin, arm))
+        momentum += own
+        angular += np.cross(body.position + arm, own)
+        if body.inertia is not None:
+            angular += body.rotation @ body.inertia @ body.rotation.T @ body.spin
+    if mechanism.space == "plane":  # bodies may be off it, and held in it
+        return np.array([momentum[0], momentum[2], angular[1]])
+    return np.concatenate([momentum, angular])
 
 
 def _backwards(value: object) -> object:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .build import plane_angles
 from .description import Array, Body, Mechanism, Mount, Signal, Tie, rotation
 
 
@@ -64,7 +65,10 @@ def renamed(mechanism: Mechanism, random: np.random.Generator) -> Related:
         tuple(bodies[k] for k in random.permutation(len(bodies))),
         tuple(ties[k] for k in random.permutation(len(ties))),
     )
-    return Related(replace(mechanism, bodies=shuffled[0], ties=shuffled[1]), new.__getitem__)
+    angles = (
+        {new[name]: angle for name, angle in plane_angles(mechanism).items()} if mechanism.space == "plane" else None
+    )
+    return Related(replace(mechanism, bodies=shuffled[0], ties=shuffled[1], angles=angles), new.__getitem__)
 
 
 def moved_and_turned(mechanism: Mechanism, random: np.random.Generator) -> Related:
@@ -105,7 +109,10 @@ def moved_and_turned(mechanism: Mechanism, random: np.random.Generator) -> Relat
 
 def _turned_on_line(tie: Tie, before: Tie, turn: Array) -> Tie:
     """Return a tie whose mounts keep their axes, with its own direction turned: along another line."""
-    mounts = tuple(replace(new, rotation=old.rotation) for new, old in zip(tie.mounts, before.mounts, strict=True))
+    mounts = tuple(
+        replace(new, rotation=old.rotation, position=turn @ old.position if old.body else new.position)
+        for new, old in zip(tie.mounts, before.mounts, strict=True)
+    )
     values = {**tie.values, "axis": turn @ tie.values["axis"]} if "axis" in tie.values else tie.values
     return replace(tie, mounts=mounts, values=values)
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from . import workers
+from .build import build_scene, plane_angles
 from .draw import draw
 from .oracle import Oracle
+from .relations import RELATIONS
 from .summary import as_data, progress_line
 from .trial import Discarded, Finding, Trial
 from .workers import Done
@@ -68,3 +71,31 @@ def test_the_summary_counts_by_groups_and_names_the_slowest() -> None:
         {"kind": "scenes", "seed": 9, "gravity": "wrong", "what": "dae: speeds", "detail": "1e-3"}
     ]
     assert progress_line(done, 30, 4.0).startswith("3 of 30: 1 with findings, 1 discarded, 1.17 s a trial")
+
+
+def test_relations_do_not_change_a_mechanism() -> None:
+    """Turns of angles in a plane, and what a body on a line carries, are those of the first description."""
+    random = np.random.default_rng(0)
+    for seed in (500095, 500060):
+        mechanism = draw(seed)
+        related = RELATIONS["renamed" if mechanism.space == "plane" else "moved and turned"](mechanism, random)
+        first, second = Oracle(mechanism), Oracle(related.mechanism)
+        starts = first.start(), second.start()
+        energies = [one.energy(*start, 0.0) for one, start in zip((first, second), starts, strict=True)]
+        assert energies[0][0] == pytest.approx(energies[1][0])
+        if mechanism.space == "plane":
+            assert plane_angles(related.mechanism) == {
+                related.names(name): angle for name, angle in plane_angles(mechanism).items()
+            }
+        else:
+            powers = [
+                float(one.forces(*start, 0.0) @ start[1]) for one, start in zip((first, second), starts, strict=True)
+            ]
+            assert powers[0] == pytest.approx(powers[1])
+
+
+def test_gears_may_be_named_before_their_joints() -> None:
+    mechanism = draw(500015)
+    assert any(tie.grips for tie in mechanism.ties)
+    backwards = replace(mechanism, ties=mechanism.ties[::-1])
+    assert len(build_scene(backwards).parts) == len(build_scene(mechanism).parts)

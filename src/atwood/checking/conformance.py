@@ -12,6 +12,7 @@ from atwood.checking.report import CheckReport, Finding
 from atwood.checking.runs import wrong_runs
 from atwood.checking.samples import as_part, in_space, samples_of
 from atwood.checking.units import wrong_units
+from atwood.checking.updates import wrong_updates
 from atwood.consistency.check import contradictions
 from atwood.consistency.draws import make_trial
 from atwood.consistency.names import wrong_names
@@ -52,8 +53,8 @@ def check(component: Component | type[Component], *, run: bool = True) -> CheckR
     Its laws are evaluated at random states, with its own values and with others within their bounds, in each space that
     it exists in and in each mode: units of what laws return; joints against the constraints that they solve;
     observables against coordinates and rates; forces against energies; Rayleigh functions, which must not drive; laws
-    on expressions against laws on numbers; outlines. Then it runs on a test bench, with a body on each connector, in
-    both forms, which have to say the same and to balance energy.
+    on expressions against laws on numbers; updates, which must give numbers; outlines. Then it runs on a bench, with
+    a body on each connector, in both forms, which have to say the same and to balance energy.
 
     Parameters
     ----------
@@ -125,6 +126,7 @@ def _look(part: Part, space: Space, book: _Book, measured: bool, with_runs: bool
                 if measured:  # with all that can be left out, which may stand for a number with a unit
                     book.add("units", wrong_units(trial, mode))
                 book.add("forces", wrong_forces(trial, mode))
+                book.add("updates", wrong_updates(trial, mode))
             book.add("derivatives", wrong_on_expressions(trials[0], mode))
     except AtwoodError as error:
         book.add("laws", [_failure("laws", error, space.name)])

@@ -143,11 +143,13 @@ def _of_loads(trial: Trial, law: Law, acting: list[Law]) -> Iterator[Finding | N
                     yield Finding("failure", "forces", law.name, space, message)
                     return
     yield None
-    power, still = float(loads @ _speeds(trial)), _loads_at_rest(trial, law)
-    if still is not None and np.abs(still - loads).max() < TOLERANCE * size and not trial.inputs:
+    still = None if trial.inputs else _loads_at_rest(trial, law)
+    if still is not None and np.abs(still - loads).max() < TOLERANCE * size:
         for other in trial.component.laws("observable"):
             if other.options.unit == "J" and other.holds_in(space):
-                yield _of_observed_energy(trial, law, other, power, loads)
+                yield _of_observed_energy(trial, law, other, loads)
+    elif still is not None and np.abs(still).max() < TOLERANCE * size:
+        yield _of_friction(trial, law)
     yield from _resultant(trial, law, loads)
 
 
@@ -159,19 +161,60 @@ def _loads_at_rest(trial: Trial, law: Law) -> Wrench | None:
         return None
 
 
-def _of_observed_energy(trial: Trial, law: Law, energy: Law, power: float, loads: Wrench) -> Finding | None:
-    """Refuse loads that grow an energy that the part reports by what they put out, and not by what they take."""
+def _of_observed_energy(trial: Trial, law: Law, energy: Law, loads: Wrench) -> Finding | None:
+    """Refuse loads that are another multiple of the forces of an energy that the part reports than one."""
     try:
-        forces = energy_forces(trial, energy)
+        factor = _multiple(loads, energy_forces(trial, energy))
+        if factor is None or abs(factor - 1.0) < 1e-4:
+            return None
+        wider = replace(trial, poses={name: _farther(pose) for name, pose in trial.poses.items()})
+        again = _multiple(load_forces(wider, law), energy_forces(wider, energy))
     except Unknown:
         return None
-    size = float(np.abs(loads).max())
-    if np.abs(forces + loads).max() < TOLERANCE * size:
+    if again is None or abs(again - factor) > 1e-4 * abs(factor):
+        return None  # two things of their own, which are in line here
+    message = f"its loads are {factor:.4g} times the forces of the energy {energy.name!r}, minus its derivatives"
+    if abs(factor + 1.0) < 1e-4:
         message = (
             f"its loads are the derivatives of the energy {energy.name!r} with the wrong sign: they have to be minus"
         )
-        return Finding("failure", "forces", law.name, trial.space.name, message)
-    return None
+    return Finding("failure", "forces", law.name, trial.space.name, message)
+
+
+def _multiple(loads: Wrench, forces: Wrench) -> float | None:
+    """Return by which factor loads are larger than forces, or None if they are no multiple of these."""
+    square = float(forces @ forces)
+    factor = float(loads @ forces) / square if square > 0.0 else 0.0
+    is_one = factor != 0.0 and np.abs(loads - factor * forces).max() < TOLERANCE * np.abs(loads).max()
+    return factor if is_one else None
+
+
+def _farther(pose: Pose) -> Pose:
+    return replace(pose, position=pose.position * 1.3)
+
+
+def _of_friction(trial: Trial, law: Law) -> Finding | None:
+    """Note loads that come with velocities alone and give power to all of them."""
+    names = list(trial.velocities)
+    for number in range(2 ** min(len(names) + 1, 5)):
+        signs = [1.0 if number >> i & 1 else -1.0 for i in range(len(names))]
+        others = signs[1:] + signs[:1]
+        moving = replace(
+            trial,
+            velocities={name: trial.velocities[name] * sign for name, sign in zip(names, signs, strict=True)},
+            angular_velocities={
+                name: trial.angular_velocities[name] * sign for name, sign in zip(names, others, strict=True)
+            },
+        )
+        try:
+            loads = load_forces(moving, law)
+        except Unknown:
+            return None
+        speeds = _speeds(moving)
+        if not float(loads @ speeds) > 1e-3 * float(np.linalg.norm(loads) * np.linalg.norm(speeds)):
+            return None
+    message = "its loads, which come with velocities, give power to every motion that was tried: is a sign wrong?"
+    return Finding("note", "forces", law.name, trial.space.name, message)
 
 
 def _resultant(trial: Trial, law: Law, loads: Wrench) -> Iterator[Finding | None]:
