@@ -344,3 +344,35 @@ def test_stack_is_as_high_as_what_came_in():
     heights = [np.max(path.vertices[:, 1]) for c in stack.collections for path in c.get_paths()]
     np.testing.assert_allclose(max(heights), stack.lines[0].get_ydata()[0], rtol=1e-5)
     assert figure.axes[0].get_title(loc="left") == "Scene"
+
+
+class Thruster(Component):
+    """A part whose Rayleigh function has a sign of its own."""
+
+    strength: float = parameter(-1.0, unit="N*s/m", doc="Force against the velocity, for each metre a second.")
+    point: Point = connector(Point, "Where it acts.")
+
+    @atwood.dissipation
+    def drag(self) -> Scalar:
+        """Return half the power that is taken away."""
+        return 0.5 * self.strength * atwood.dot(self.point.velocity, self.point.velocity)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_dissipation_that_drives_is_said(form: str) -> None:
+    """It was accounted as dissipated energy below zero without a word."""
+    for strength in (-1.0, 1.0):
+        scene = Scene(gravity=0.0)
+        mass, part = scene.add("mass", lib.PointMass()), scene.add("thruster", Thruster(strength=strength))
+        scene.connect(part.point, mass.point)
+        scene.start["mass.velocity.x"] = 1.0
+        result = simulate(scene, form=form, t_end=1.0, rtol=1e-9)
+        if strength > 0.0:
+            assert result.energy.parts["thruster"].dissipated[-1] == pytest.approx(
+                0.5 * (1.0 - math.exp(-2.0)), rel=1e-6
+            )
+        else:
+            with pytest.warns(
+                UserWarning, match=r"thruster: its Rayleigh function drives: from t = 0 on it puts in 3\.19 J"
+            ):
+                _ = result.energy.parts

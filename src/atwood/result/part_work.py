@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeAlias
 
@@ -35,6 +36,9 @@ _CHUNK = 2_000_000
 
 _STILL = 1e-12
 """Relative to the largest speed: smaller jumps of speeds are rounding."""
+
+_DRIVES = 1e-6
+"""Relative to what the scene exchanges: energy that a Rayleigh function put in is no error of the quadrature."""
 
 _FREE = 1e-7
 """Of what multipliers of a size do in general: what those that nothing determines do, if it is more than rounding."""
@@ -77,7 +81,21 @@ def find_part_energies(run: Run, shown: NDArray[np.bool_], exchanged: float) -> 
     parts = {path: total.part(path, every[number], shown, path not in loose) for number, path in enumerate(flat.parts)}
     models = {path: _model(path, parts, connectors[0]) for path in _models(flat.parts)}
     time = np.concatenate([one.time for one in segments])[shown]
+    _warn_of_driving(time, parts, exchanged)
     return PartEnergies(time, parts, models, exchanged, unsure)
+
+
+def _warn_of_driving(time: FloatArray, parts: Mapping[str, PartEnergy], exchanged: float) -> None:
+    """Say which Rayleigh functions put energy in: a sign is wrong, or it is no dissipation."""
+    for path, one in parts.items():
+        given = np.maximum.accumulate(one.dissipated) - one.dissipated
+        if np.max(given, initial=0.0) > _DRIVES * exchanged:
+            since = float(time[max(0, int(np.argmax(given > _DRIVES * exchanged)) - 1)])
+            warnings.warn(
+                f"{path}: its Rayleigh function drives: from t = {since:.6g} on it puts in {np.max(given):.3g} J, where a "
+                "dissipation takes energy away; look at its sign, or write it as a @force",
+                stacklevel=2,
+            )
 
 
 class _Sums:
