@@ -113,3 +113,12 @@ def test_units_may_have_brackets(text, exponents):
 def test_units_that_cannot_be_read(text):
     with pytest.raises(DeclarationError, match="cannot read the unit"):
         parse_unit(text)
+
+
+@pytest.mark.parametrize(
+    ("written", "plain"),
+    [("m²", "m^2"), ("s⁻¹", "1/s"), ("kg·m²", "kg*m^2"), ("H", "Wb/A"), ("F", "C/V"), ("S", "A/V"), ("ohm", "V/A")],
+)
+def test_raised_digits_and_electric_units(written: str, plain: str) -> None:
+    one, other = parse_unit(written), parse_unit(plain)
+    assert (one.factor, one.exponents) == (other.factor, other.exponents)

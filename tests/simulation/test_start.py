@@ -289,3 +289,12 @@ def test_angles_that_agree_but_for_a_turn_contradict_each_other_and_as_guesses_d
     turned = (result["hinge.angle"][0] + 0.25) / (2.0 * np.pi)
     assert turned == pytest.approx(round(turned), abs=1e-9)
     assert result["hinge.potential_energy"][0] == pytest.approx(0.5 * result["hinge.angle"][0] ** 2, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["lambda", "lambda[0]", "lambda:rod1.fixed_distance[0]", "mu:rod1.fixed_distance[0]"])
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_multipliers_are_no_start_values(name: str, form: str) -> None:
+    """The error said that there is no such quantity."""
+    with pytest.raises(StartError, match="a multiplier follows from positions and speeds") as caught:
+        simulate(double({name: 1.0}), form=form, t_end=0.1)
+    assert caught.value.where == name

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -85,6 +86,12 @@ def no_start_quantity(path: str, known: Mapping[str, Observable]) -> StartError:
     known
         The quantities there are; what is offered instead is a position or a speed, of the same part if there is one.
     """
+    if re.match(r"(lambda|mu)\b", path):
+        return StartError(
+            "a multiplier follows from positions and speeds and cannot be prescribed at the start",
+            where=path,
+            advice="Give coordinates, positions and velocities.",
+        )
     message = "there is no such quantity to start with"
     choices = [name for name, one in known.items() if one.unit in _POSITIONS_AND_SPEEDS]
     parts = [name for name in choices if name.rpartition(".")[0] == path]

@@ -92,8 +92,8 @@ def _warn_of_driving(time: FloatArray, parts: Mapping[str, PartEnergy], exchange
         if np.max(given, initial=0.0) > _DRIVES * exchanged:
             since = float(time[max(0, int(np.argmax(given > _DRIVES * exchanged)) - 1)])
             warnings.warn(
-                f"{path}: its Rayleigh function drives: from t = {since:.6g} on it puts in {np.max(given):.3g} J, where "
-                "a dissipation takes energy away; look at its sign, or write it as a @force",
+                f"{path}: its Rayleigh function drives: from t = {since:.6g} on it puts in {np.max(given):.3g} J, "
+                "where a dissipation takes energy away; look at its sign, or write it as a @force",
                 stacklevel=2,
             )
 

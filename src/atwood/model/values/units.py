@@ -47,7 +47,13 @@ _BASE: dict[str, tuple[float, Exponents]] = {
     "V": (1.0, (1, 2, -3, -1)),
     "T": (1.0, (1, 0, -2, -1)),
     "Wb": (1.0, (1, 2, -2, -1)),
+    "H": (1.0, (1, 2, -2, -2)),
+    "F": (1.0, (-1, -2, 4, 2)),
+    "S": (1.0, (-1, -2, 3, 2)),
+    "ohm": (1.0, (1, 2, -3, -2)),
 }
+
+_RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 _TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*(-?\d{1,2})|([*/·()])|([A-Za-z]+|1))")
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
@@ -109,7 +115,7 @@ def _unreadable(text: str) -> DeclarationError:
 def _tokens(text: str) -> list[str]:
     """Return names, operators, brackets and powers (``^2``) in reverse order, so that the next is the last."""
     found: list[str] = []
-    position, stripped = 0, text.strip()
+    position, stripped = 0, re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda raised: f"^{raised[0].translate(_RAISED)}", text.strip())
     while position < len(stripped):
         match = _TOKEN.match(stripped, position)
         if match is None:
