@@ -15,7 +15,8 @@ from atwood import Result, Scene, assemble, compare, simulate
 from atwood.arrays import FloatArray
 from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.initialization.start import find_start, own_state
-from atwood.simulation.problem.closed_loops import Solved, solve_at
+from atwood.simulation.problem import closed_loops
+from atwood.simulation.problem.closed_loops import Solved, closed_form, solve_at
 from atwood.simulation.problem.preparation import make_plan
 from atwood_library import Ground, Link, Pivot
 from atwood_library.scenes import AndrewsSqueezer, Bricard, FourBar, FourBarRow, SliderCrank, Strandbeest
@@ -405,6 +406,13 @@ def test_a_run_that_begins_at_a_dead_centre_keeps_constraints() -> None:
     result = simulate(parallelogram(0.1), t_end=0.35, rtol=1e-9)
     assert [(one.solver, one.keeps_constraints) for one in result.run.choices] == [("explicit", True)]
     assert_allclose(result["rocker.angle"], result["crank.angle"], atol=1e-9)
+
+
+def test_of_many_coordinates_few_choices_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+    monkeypatch.setattr(closed_loops, "closed_form", lambda *given: made.append(1) or closed_form(*given))
+    assert solved(FourBarRow(windows=10)) is not None
+    assert len(made) <= 5  # each of eleven cranks before
 
 
 def test_other_values_and_starts_use_the_same_programs() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from atwood.errors import SolveError
 from atwood.integrators.protocol import Status
-from atwood.simulation.singular import monitor as module
+from atwood.simulation.singular import ways as module
 from atwood.simulation.singular.looks import Look
 from atwood.simulation.singular.monitor import SingularityMonitor
 

@@ -12,16 +12,13 @@ import time
 
 import numpy as np
 
-from atwood.errors import AtwoodError, SolveError
 from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.protocol import FloatArray, Status, StepResult
+from atwood.integrators.protocol import Status, StepResult
 from atwood.simulation.problem.problem import Plan
-from atwood.simulation.problem.projection import project_safely, project_states
-from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow
-from atwood.simulation.singular.crossing import SingularCrossing, stuck_at
-from atwood.simulation.singular.looks import Look, as_lookout, compiled_looks, cubic, going_on, stride_from
-from atwood.simulation.singular.rank_measure import RankMeasure, find_crossing, find_loss, nearly_lost, zero_ahead
-from atwood.simulation.singular.rest import is_slow, rests_at, slowest
+from atwood.simulation.singular.crossing import SingularCrossing
+from atwood.simulation.singular.looks import Look, as_lookout, compiled_looks, going_on, stride_from
+from atwood.simulation.singular.rank_measure import zero_ahead
+from atwood.simulation.singular.ways import WaysOver
 from atwood.tolerances import tolerances
 
 __all__ = ["SingularityMonitor", "singularity_monitor_of"]
@@ -32,28 +29,8 @@ _REVIEW = 8
 _LOW = 0.3
 """Only where the measure is so small, relative to the largest so far, is it looked at more closely."""
 
-_CLOSE = 0.05
-"""The same on the finer look."""
-
-_QUITE_CLOSE = 0.02
-"""The same where a motion is followed past a position that it does not pass through."""
-
-_NEAR = 0.6
-"""The same where a solver cannot start behind a position at a tight tolerance: rounding is larger there."""
-
 _FALLEN = 1e-2
 """The same where the motion may be at a singular position already, and stay there."""
-
-_REACH = 0.2
-"""An arc begins so far before the place, in what moves most, if it can."""
-
-_CENTRED = 0.06
-"""So far from its middle an arc may pass the place, relative to half its length; its points keep twice that away."""
-
-_ACCURATE = 1e-7
-"""Arcs over a place are taken whose estimates are smaller, or within the tolerance; errors are far below these."""
-
-_FINE = 17
 
 _AHEAD = -0.8, 1.6, 13
 """A position is looked for from so far behind to so far ahead of the last look, in strides between looks, at so many
@@ -62,14 +39,8 @@ points: what is just ahead lies between two of them."""
 _AT_START = 0.7
 """Where less than this share is left at a start of what constraints are around it, it is looked ahead from there."""
 
-_BEYOND = 2.5
-"""The motion is guessed so far behind the last look, in strides."""
-
 _AROUND = (-2.0, -1.0, 1.0, 2.0)
 """So many strides from where it begins constraints are looked at to see how independent they are elsewhere."""
-
-_AGREES = 30.0
-"""Times the tolerance: a solver whose states behind the place differ by less from the arc has gone the same way."""
 
 
 def singularity_monitor_of(
@@ -89,7 +60,7 @@ def singularity_monitor_of(
     return SingularityMonitor(plan, tolerance, end, step_result)
 
 
-class SingularityMonitor:
+class SingularityMonitor(WaysOver):
     """Looks out for singular positions while a scene runs.
 
     When it looks depends on the motion alone, so that outputs change nothing. Where a session can do so it looks by
@@ -116,24 +87,14 @@ class SingularityMonitor:
         What a session may look with; None where nothing can be compiled.
     next
         When somebody should look next, s; infinite where a session does.
-    trouble
-        Where the solver failed at a singular position that it could not be helped over: its time, and the number of
-        the constraint that nearly follows from the others there; None elsewhere.
     """
 
-    trouble: tuple[float, int] | None
-
     def __init__(self, plan: Plan, tolerance: float, end: float, step_result: StepResult) -> None:
-        self.plan, self.tolerance = plan, tolerance
-        self._whole = end - step_result.t
+        super().__init__(plan, tolerance, end - step_result.t)
         self.seconds = 0.0
         self.agreed: list[SingularCrossing] = []
-        self._n, self._m = plan.program.coordinates, len(plan.sizes)
-        self._looks: list[Look] = []
         self._away: list[float] = []
         self._judged = -np.inf
-        self._largest = 0.0
-        self._measures = RankMeasure(plan)
         self._compiled = compiled_looks(plan, self._whole, len(step_result.y))
         if self._compiled is not None:
             errors = plan.balance.errors.near(step_result.t, step_result.y[: self._n], plan.sizes)
@@ -283,35 +244,6 @@ class SingularityMonitor:
                 return found
         return None
 
-    def _from_start(self, near: float) -> SingularCrossing | None:
-        """Return the way on from a start that is near a singular position, or has one just ahead, at a time.
-
-        Behind a crossing rounding can be too large for a solver at first; there the motion goes away from the place.
-        """
-        first = self._looks[0]
-        stride = stride_from(self.plan, first, np.inf)  # also beyond the end of a short run, where it is not looked at
-        stride = stride if np.isfinite(stride) else self._whole
-        begin = self._state(first)
-        if begin is None or not near < first.t + 0.1 * stride:
-            return None
-        longest: Path | None = None
-        for share in (1.0, 0.3, 0.1):
-            arc = find_arc(self.plan, *begin, first.t + share * stride)
-            if arc is None or not arc.error < max(self.tolerance, _ACCURATE):
-                continue
-            times = np.linspace(arc.start, arc.end, _FINE)
-            away = self._measures.learn(times, arc.at(times)[0])
-            found = find_crossing(self._measures, arc)
-            if found is not None:
-                return self._crossing(arc, *found)
-            largest = max(
-                self._largest, float(np.max(away))
-            )  # of a run that is too short to have been far from it, too
-            leaves = away[0] < (_NEAR * largest if self._is_behind else _QUITE_CLOSE * away[-1])
-            if longest is None and leaves and np.all(np.diff(away[1:]) > 0.0):
-                longest = Path((arc,))
-        return None if longest is None else SingularCrossing(longest.start, 0, (), (), longest)
-
     def _measure(self) -> None:
         if new := self._looks[len(self._away) :]:
             t = np.array([one.t for one in new])
@@ -366,187 +298,3 @@ class SingularityMonitor:
                 if t <= times[min(i + 1, len(times) - 1)]:
                     return t, away[i]
         return None
-
-    def _went_along(self, crossing: SingularCrossing) -> bool:
-        """Return whether the solver went over a singular position by itself, the same way and as accurately."""
-        path, n, m = crossing.path, self._n, self._m
-        if path is None:
-            return True
-        behind = crossing.time + 0.1 * (path.end - crossing.time)
-        looks = [one for one in self._looks if behind < one.t <= path.end]
-        if not looks:
-            return False
-        q, u, _ = path.at(np.array([one.t for one in looks]))
-        y = np.stack([one.y for one in looks], axis=1)
-        kinematic_map = self.plan.balance.kinematic_map
-        places = (kinematic_map.normalized(y[:n]) - kinematic_map.normalized(q)) / self.plan.coordinate_sizes[:, None]
-        speeds = (y[n : n + m] - u) / self.plan.sizes[:, None] * self.plan.scales.time
-        return max(float(np.max(np.abs(places))), float(np.max(np.abs(speeds)))) < _AGREES * self.tolerance
-
-    def _rest(self, first: int, last: int) -> SingularCrossing | None:
-        """Return that the motion between some looks comes to rest where it is singular; None if it does not."""
-        one, other = self._looks[first], self._looks[last]
-        times = np.linspace(one.t, other.t, 65)
-        known = self._between(times) if first < last else None
-        near = None if known is None else slowest(times, known[1], self.plan.sizes)
-        if near is None:
-            return None
-        assert known is not None
-        away = self._measures.at(np.array([near]), known[0][:, [int(np.argmin(np.abs(times - near)))]])[0]
-        begin = self._state(one) if away < _CLOSE * self._largest else None
-        arc = None if begin is None else find_arc(self.plan, *begin, 2.0 * near - one.t, self._between)
-        if arc is None or not arc.error < max(self.tolerance, _ACCURATE):
-            return None
-        rest = rests_at(self.plan, self._measures, arc, self._largest, self._fastest, self.tolerance)
-        if rest is None:
-            return None
-        lost = nearly_lost(self._measures, rest, arc.at(np.array([rest]))[0][:, 0])
-        return SingularCrossing(rest, 0, *self._said((lost,)), None)
-
-    @property
-    def _fastest(self) -> float:
-        """The largest speed at the looks that are kept, in units of the scene's sizes."""
-        speeds = slice(self._n, self._n + self._m)
-        return max(float(np.max(np.abs(one.y[speeds]) / self.plan.sizes)) for one in self._looks)
-
-    def _closest(self, first: int, last: int) -> tuple[float, float] | None:
-        """Return when the motion between some looks is closest to a singular position, and how close; if it is."""
-        times, places = [], []
-        for one, other in zip(self._looks[first:last], self._looks[first + 1 : last + 1], strict=True):
-            h = other.t - one.t
-            s = np.linspace(0.0, 1.0, _FINE)
-            if first == 0:  # perhaps it starts quite near
-                s = np.unique(np.concatenate([s, np.geomspace(1e-5, 0.05, _FINE)]))
-            a, b, v, w = (part[: self._n, None] for part in (one.y, other.y, h * one.yp, h * other.yp))
-            places.append(cubic(s, (a, b), (v, w)))
-            times.append(one.t + h * s)
-        if not times:
-            return None
-        t, q = np.concatenate(times), np.concatenate(places, axis=1)
-        away = self._measures.at(t, q)
-        if not np.all(np.isfinite(away)):
-            return None
-        least = int(np.argmin(away))
-        if away[least] > _CLOSE * self._largest or least in (0, len(t) - 1):
-            return None
-        return float(t[least]), float(away[least])
-
-    def _pass(self, near: float, away: float = 0.0, failed: bool = False) -> SingularCrossing | None:
-        """Return the singular crossing near a time; None where the motion is as anywhere else."""
-        self.plan.compiles_columns = True  # the arcs take many evaluations of few states each
-        tried: set[float] = set()
-        for reach in (1.0, 2.0, 0.5, 0.25, 0.1):
-            begin = self._begin(near, reach)
-            if begin is None or begin[0] in tried:
-                continue
-            tried.add(begin[0])
-            found = self._over(near, *begin)
-            if found is not None:
-                return found
-        begin = self._begin(near, 1.0)
-        if begin is None or begin[0] == self._looks[0].t:
-            found = self._from_start(near)
-            if found is not None:
-                return found
-        if begin is None or away > _QUITE_CLOSE * self._largest:
-            return None
-        return self._past(near, begin, failed)
-
-    def _past(self, near: float, begin: tuple[float, FloatArray, FloatArray], failed: bool) -> SingularCrossing | None:
-        """Return the way past a singular position that the motion comes close to."""
-        measure = self._measures
-        try:
-            tolerance = max(1e-2 * self.tolerance, 1e-10)
-            path = follow(self.plan, begin, 2.0 * near - begin[0], tolerance, measure.at)
-        except AtwoodError:
-            path = None
-        if path is not None:
-            times = np.concatenate([np.linspace(one.start, one.end, 5) for one in path.arcs])
-            return SingularCrossing(float(times[np.argmin(measure.at(times, path.at(times)[0]))]), 0, (), (), path)
-        lost = nearly_lost(measure, near, min(self._looks, key=lambda one: abs(one.t - near)).y[: self._n])
-        if failed:
-            self.trouble = near, lost
-            return None
-        return SingularCrossing(near, 0, *self._said((lost,)), None)
-
-    def explain(self, message: str) -> SolveError | None:
-        """Return the error of a solver that failed at a singular position; None if it failed elsewhere."""
-        if self.trouble is None:
-            return None
-        t, lost = self.trouble
-        return stuck_at(self.plan.assembly.own_equations.constraints[lost], t, message)
-
-    def _said(self, constraints: tuple[int, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return the labels of constraints, and the parts that they belong to."""
-        every = [self.plan.assembly.own_equations.constraints[i] for i in constraints]
-        return tuple(one.label for one in every), tuple(dict.fromkeys(one.key[0] for one in every))
-
-    def _begin(self, near: float, reach: float) -> tuple[float, FloatArray, FloatArray] | None:
-        """Return a state from which an arc may start."""
-        speeds, sizes = slice(self._n, self._n + self._m), self.plan.sizes
-        moved = ((one, float(np.max(np.abs(one.y[speeds]) / sizes)) * (near - one.t)) for one in reversed(self._looks))
-        one = next((one for one, move in moved if move >= reach * _REACH), None)
-        if one is None and self._looks[0].t < near:
-            one = self._looks[0]
-        return None if one is None else self._state(one)
-
-    def _state(self, one: Look) -> tuple[float, FloatArray, FloatArray] | None:
-        """Return a state that fulfils the constraints; None if there is none."""
-        q, u = one.y[: self._n], one.y[self._n : self._n + self._m]
-        made = project_states(self.plan, np.array([one.t]), q[:, None], u[:, None])
-        if not made.doubtful[0]:
-            return one.t, made.coordinates[:, 0], made.speeds[:, 0]
-        try:
-            return one.t, *project_safely(self.plan, one.t, q, u)
-        except AtwoodError:
-            return None
-
-    def _over(self, near: float, t: float, q: FloatArray, u: FloatArray) -> SingularCrossing | None:
-        """Return the way over a singular position near a time, from a state."""
-        plan, accurate = self.plan, max(self.tolerance, _ACCURATE)
-        for _ in range(8):
-            arc = find_arc(plan, t, q, u, 2.0 * near - t, self._between)
-            if arc is None or not arc.error < accurate:
-                # It is too long: perhaps one half of the way is not.
-                arc = find_arc(plan, t, q, u, 0.5 * (t + near))
-                if arc is None or not arc.error < accurate:
-                    return None
-                q, u, _ = (one[:, 0] for one in arc.at(np.array([arc.end])))
-                t, (q, u) = arc.end, plan.balance.project(arc.end, q, u, plan.sizes)
-                continue
-            found = find_crossing(self._measures, arc)
-            if found is None or found[0] <= t:
-                return None
-            now, away = found
-            if abs(now - near) > _CENTRED * (near - t):
-                near = now
-                continue
-            return self._crossing(arc, now, away)
-        return None
-
-    def _between(self, t: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        """Return coordinates and speeds at times, from what the solver gave around them; None beyond that."""
-        looks = self._looks
-        if len(looks) < 2 or not looks[0].t <= t[0]:
-            return None
-        if t[-1] > looks[-1].t + _BEYOND * (looks[-1].t - looks[-2].t):
-            return None
-        times = np.array([one.t for one in looks])
-        y, yp = (np.stack([getattr(one, name)[: self._n + self._m] for one in looks], axis=1) for name in ("y", "yp"))
-        after = np.clip(np.searchsorted(times, t), 1, len(times) - 1)
-        h = times[after] - times[after - 1]
-        both = cubic(
-            (t - times[after - 1]) / h, (y[:, after - 1], y[:, after]), (h * yp[:, after - 1], h * yp[:, after])
-        )
-        return both[: self._n], both[self._n :]
-
-    def _crossing(self, arc: Arc, t: float, away: float) -> SingularCrossing | None:
-        """Return the singular crossing that an arc makes at a time; None if that is no singular position."""
-        if is_slow(self.plan, arc, t, self._fastest, self.tolerance):
-            return None
-        loss = find_loss(self._measures, arc, t, away)
-        return (
-            None
-            if loss is None
-            else SingularCrossing(t, loss.rank, *self._said(loss.constraints), Path((arc,)), loss.gap)
-        )
