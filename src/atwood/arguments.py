@@ -101,6 +101,9 @@ def takes(error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> Callable[[
         @functools.wraps(function)
         def checked(*args: Any, **given: Any) -> Any:
             if args:
+                if not (positional or rest):
+                    advice = f"Give them by name: {where}({', '.join(f'{name}=...' for name in names)})."
+                    raise error("its arguments have no order", where=where, advice=advice)
                 read = [
                     check(kinds[name], value, name, where, error) if name in kinds else value
                     for name, value in zip(positional, args, strict=False)
@@ -329,12 +332,9 @@ def _array(value: Any) -> Any:
     import numpy as np
 
     found = np.asarray(value)
-    if found.dtype.kind not in "fiu" and found.size:  # text and truth values are no numbers, and None is none
+    if (found.dtype.kind not in "fiu" and found.size) or not np.isfinite(found).all():  # text and None are no numbers
         raise Refused
-    found = found.astype(np.float64)
-    if not np.isfinite(found).all():
-        raise Refused("All must be finite.")
-    return found
+    return found.astype(np.float64)
 
 
 def _text(value: Any) -> str:

@@ -87,7 +87,13 @@ def check(component: Component | type[Component], *, run: bool = True) -> CheckR
         raise UsageError(f"{cls.__name__} is a model", advice="Check the classes of its parts, one by one.")
     book = _Book()
     runs, fully = 0, 0
-    samples = list(samples_of(component))
+    try:
+        samples = list(samples_of(component))
+    except AtwoodError:
+        raise
+    except Exception as error:  # an __init__ of its own
+        advice = "Check an instance of it; parameters need no __init__."
+        raise UsageError(f"{cls.__name__} cannot be made ({error})", where=cls.__name__, advice=advice) from error
     for sample in samples:
         names = [_failure("names", error) for error in wrong_names(sample.component, cls.__name__)]
         book.add("names", names or [None])

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from atwood.errors import DeclarationError
 from atwood.late import dataclass, replace
 from atwood.model.declare.binding import Binding, bind
 from atwood.model.declare.component import Component
@@ -17,6 +18,7 @@ from atwood.model.declare.connectors import Motion
 from atwood.model.declare.contributions import Placement
 from atwood.model.declare.law import Law
 from atwood.model.local.flatten import Part
+from atwood.model.returned import call_law
 from atwood.model.values.rotation import FREE, IDENTITY, Axes, Rotation, as_rotation, transposed
 from atwood.model.values.space import FIXED_AXES, Space, planar_axes
 from atwood.model.values.vector import ZERO, Vector, dot, norm
@@ -195,9 +197,10 @@ class Trial:
         """Return where connectors are with one of them placed by a joint."""
         found = dict(poses)
         a, b = law.options.a, law.options.b
-        placement = self.placement(law, t, found, values)
-        if placement is None:
-            raise TypeError("a joint returns a Placement")
+        placement = call_law(self.part.path, law, lambda: self.placement(law, t, found, values))
+        if not isinstance(placement, Placement):
+            advice = "Return atwood.Placement(displacement=...)."
+            raise DeclarationError("a joint returns a Placement", where=f"{self.part.path}.{law.name}", advice=advice)
         backwards = b == "world"
         fixed, moved = (b, a) if backwards else (a, b)
         base = WORLD_POSE if fixed == "world" else found[fixed]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -12,7 +13,7 @@ from atwood.model.declare.contributions import Load, Placement, PointInertia
 from atwood.model.declare.law import Law
 from atwood.model.values.vector import Vector
 
-__all__ = ["call_law", "law_value", "listed", "not_evaluated", "one_scalar"]
+__all__ = ["call_law", "finite_scalar", "law_value", "listed", "not_evaluated", "one_scalar"]
 
 
 def law_value(bound: Any, name: str) -> Any:
@@ -81,6 +82,14 @@ def one_scalar(graph: Graph, value: Any) -> Expression:
         return graph.convert(value)
     except (TypeError, ValueError):
         raise DeclarationError(f"it returns {_in_words(value)} where a number is wanted") from None
+
+
+def finite_scalar(graph: Graph, value: Any) -> Expression:
+    """Return the one number that a law gives, as an expression; refuse what is never finite, as `one_scalar` does."""
+    found = one_scalar(graph, value)
+    if found.is_constant and not math.isfinite(found.value):
+        raise DeclarationError(f"it returns {found.value:g}", advice="Return a number, or an expression that has one.")
+    return found
 
 
 def listed(value: Any, kinds: tuple[type, ...]) -> list[Any]:

@@ -14,7 +14,7 @@ from atwood.mechanics.outputs.observables import Reaction
 from atwood.mechanics.outputs.reading import Reader
 from atwood.model.declare.binding import bind
 from atwood.model.declare.law import Law
-from atwood.model.returned import call_law, one_scalar
+from atwood.model.returned import call_law, finite_scalar
 
 __all__ = ["UPDATE", "EventFunction", "list_event_functions"]
 
@@ -96,4 +96,4 @@ def list_event_functions(
 
 
 def _evaluated(graph: Graph, bound: Any, law: Law) -> Expression:
-    return one_scalar(graph, getattr(bound, law.name)())
+    return finite_scalar(graph, getattr(bound, law.name)())

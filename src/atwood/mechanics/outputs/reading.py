@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from typing import Any
 
-from atwood.errors import AtwoodError
+from atwood.errors import AtwoodError, MissingNameError
 from atwood.expr import Expression, is_zero
 from atwood.late import replace
 from atwood.mechanics.build import Mechanism, resolve_signals
@@ -139,6 +139,8 @@ def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, 
             continue
         try:
             value = law_value(bound, law.name)
+        except MissingNameError as error:  # a name that is misspelt
+            raise not_evaluated(path, law, error) from error
         except (AtwoodError, ArithmeticError):
             continue  # it asks for an orientation that nothing determines, or that never leaves a pole
         except Exception as error:  # whatever a law of somebody's own can raise

@@ -17,6 +17,7 @@ from atwood.model.declare.quantities import Quantity
 from atwood.model.declare.refusals import (
     given_without_name,
     must_be_given,
+    no_private_name,
     no_such_name,
     no_such_parameter,
     no_such_reaction,
@@ -114,9 +115,8 @@ class Component(metaclass=ComponentType):
         for law in self.laws("joint") if name in ("force", "torque") else ():
             if law.options.rigid and law.options.reaction_doc:
                 return Quantity(self, name, "N" if name == "force" else "N*m", law.options.reaction_doc)
-        if name.startswith("_"):  # what Python asks for, which nobody reads
-            raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
-        raise self._missing(name)
+        # Private names Python asks for, and nobody reads.
+        raise no_private_name(type(self).__name__, name, self) if name.startswith("_") else self._missing(name)
 
     def _missing(self, name: str) -> MissingNameError:
         there = [*self._connectors, *self._children(), *self._parameters, *self._signals]

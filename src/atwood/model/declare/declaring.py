@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from atwood.arguments import NAME, check, each, one_of
 from atwood.errors import DeclarationError
 from atwood.model.declare.connectors import ConnectorSpec
 from atwood.model.declare.fields import MISSING, Field, ParameterSpec, SignalSpec
@@ -11,6 +12,13 @@ from atwood.model.declare.law import Law, ObservableOptions
 from atwood.model.declare.states import StateSpec
 
 __all__ = ["ComponentType", "check_reserved", "collect_declarations"]
+
+
+_WORDS = {
+    "spaces": each(one_of(("line", "plane", "space")), "a tuple of 'line', 'plane' and 'space'", 1, single=False),
+    "modes": each(NAME, "a tuple of names", single=False),
+}
+"""Tuples of words in a class body."""
 
 
 class _Body(dict[str, Any]):
@@ -44,7 +52,13 @@ class ComponentType(type):
 def collect_declarations(cls: Any) -> None:
     """Give a class of components the tables of its fields, connectors and laws: those of its bases and its own."""
     _merge_inherited(cls)
+    for name, kind in _WORDS.items():
+        if name in vars(cls):
+            setattr(cls, name, check(kind, vars(cls)[name], name, cls.__name__, DeclarationError))
     for name, value in list(vars(cls).items()):
+        if hasattr(getattr(value, "fget", None) or getattr(value, "func", None), "_atwood_law"):
+            advice = "A law is a method: leave out the property."
+            raise DeclarationError("a property is no law", where=f"{cls.__name__}.{name}", advice=advice)
         law = getattr(value, "_atwood_law", None)
         if isinstance(value, (Field, ConnectorSpec)) or isinstance(law, Law):
             _check_field_name(cls, name, value)
@@ -68,6 +82,20 @@ def collect_declarations(cls: Any) -> None:
             replaced = _with_checked_default(cls._signals[name].with_default(value), cls)
             cls._signals[name] = replaced
             setattr(cls, name, replaced)
+    _check_reactions(cls)
+
+
+def _check_reactions(cls: Any) -> None:
+    """Refuse reactions with the name of a parameter, an input or a connector."""
+    taken = {**cls._parameters, **cls._signals, **cls._connectors}
+    for law in cls._laws.values():
+        for reaction in law.options.reactions if law.kind == "constraint" else ():
+            if reaction.partition(".")[0] in taken:
+                advice = "Give the reaction another name."
+                where = f"{cls.__name__}.{law.name}"
+                raise DeclarationError(
+                    f"its reaction {reaction!r} has the name of something else", where=where, advice=advice
+                )
 
 
 def _merge_inherited(cls: type) -> None:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+import keyword
+from collections.abc import Callable
+from typing import Any, Literal, TypeVar
 
+from atwood.arguments import NAME, Kind as ArgumentKind, Refused
+from atwood.errors import DeclarationError
 from atwood.late import dataclass
 
 __all__ = [
+    "REACTION",
     "ActingOptions",
     "ConstraintOptions",
     "DerivativeOptions",
@@ -16,7 +21,10 @@ __all__ = [
     "Law",
     "ObservableOptions",
     "UpdateOptions",
+    "mark",
 ]
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 Kind = Literal[
@@ -127,3 +135,22 @@ class UpdateOptions:
     at: str
     when: str
     reads: tuple[str, ...] | None
+
+
+def mark(function: F, law: Law) -> F:
+    """Mark a method as a law, unless it is one already."""
+    before = getattr(function, "_atwood_law", None)
+    if before is not None:
+        advice = "Give each law a method of its own."
+        raise DeclarationError(f"it is marked as {before.kind} and as {law.kind}", where=law.name, advice=advice)
+    function._atwood_law = law  # type: ignore[attr-defined]
+    return function
+
+
+def _reaction(value: Any) -> str:
+    if not all(word.isidentifier() and not keyword.iskeyword(word) for word in NAME.read(value).split(".")):
+        raise Refused
+    return str(value)
+
+
+REACTION = ArgumentKind("a name of letters, digits and _", _reaction)

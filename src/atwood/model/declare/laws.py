@@ -29,6 +29,7 @@ from atwood.arguments import (
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.model.declare.law import (
+    REACTION,
     ActingOptions,
     ConstraintOptions,
     DerivativeOptions,
@@ -38,6 +39,7 @@ from atwood.model.declare.law import (
     Law,
     ObservableOptions,
     UpdateOptions,
+    mark,
 )
 from atwood.model.declare.quantities import ObservableLaw
 from atwood.model.values.units import parse_si_unit
@@ -59,19 +61,14 @@ __all__ = [
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
-def _mark(function: _F, law: Law) -> _F:
-    function._atwood_law = law  # type: ignore[attr-defined]
-    return function
-
-
 def _acting(kind: Kind, function: _F | None, modes: Sequence[str]) -> _F | Callable[[_F], _F]:
     """Mark a method by itself, or return what marks one with options."""
     options = ActingOptions(check(_NAMES, modes, "modes", kind, DeclarationError))
     if function is not None:
         check(CALLBACK, function, "function", kind, DeclarationError)
     if function is None:
-        return lambda method: _mark(method, Law(kind, method.__name__, options))
-    return _mark(function, Law(kind, function.__name__, options))
+        return lambda method: mark(method, Law(kind, method.__name__, options))
+    return mark(function, Law(kind, function.__name__, options))
 
 
 @overload
@@ -136,7 +133,7 @@ def inertia(function: _F) -> _F:
     `force` of its own. What depends on positions or joint coordinates is a `lagrangian`.
     """
     check(CALLBACK, function, "function", "inertia", DeclarationError)
-    return _mark(function, Law("inertia", function.__name__))
+    return mark(function, Law("inertia", function.__name__))
 
 
 def lagrangian(function: _F) -> _F:
@@ -148,7 +145,7 @@ def lagrangian(function: _F) -> _F:
     minus its value without velocities, kinetic energy the rest.
     """
     check(CALLBACK, function, "function", "lagrangian", DeclarationError)
-    return _mark(function, Law("lagrangian", function.__name__, ActingOptions(())))
+    return mark(function, Law("lagrangian", function.__name__, ActingOptions(())))
 
 
 _SPACES = each(one_of(("line", "plane", "space")), "some of 'line', 'plane' and 'space'", 1)
@@ -157,7 +154,7 @@ _NAMES = each(NAME, "names, as texts")
 
 @takes(
     DeclarationError,
-    reaction=each(NAME, "a name, or several", 1),
+    reaction=each(REACTION, "a name of letters, digits and _, or several", 1),
     unit=TEXT,
     doc=DOC,
     sign=number(),
@@ -194,7 +191,7 @@ def constraint(
     parse_si_unit(unit)
     names = (reaction,) if isinstance(reaction, str) else tuple(reaction)
     options = ConstraintOptions(names, unit, sign, doc, tuple(modes), tuple(spaces))
-    return lambda function: _mark(function, Law("constraint", function.__name__, options))
+    return lambda function: mark(function, Law("constraint", function.__name__, options))
 
 
 @takes(
@@ -242,7 +239,7 @@ def joint(
         The modes of the component in which it holds; all when empty.
     """
     options = JointOptions(a, b, tuple(coordinates), tuple(solves), tuple(spaces), rigid, reaction, tuple(modes))
-    return lambda function: _mark(function, Law("joint", function.__name__, options))
+    return lambda function: mark(function, Law("joint", function.__name__, options))
 
 
 @takes(DeclarationError, unit=TEXT, doc=DOC, periodic=FLAG, rate=TEXT, spaces=_SPACES)
@@ -327,7 +324,7 @@ def event(
     """
     parse_si_unit(unit)
     options = EventOptions(tuple(modes), direction, target, message, unit, impact, tuple(spaces))
-    return lambda function: _mark(function, Law("event", function.__name__, options))
+    return lambda function: mark(function, Law("event", function.__name__, options))
 
 
 def derivative(*states: str, modes: Sequence[str] = ()) -> Callable[[_F], _F]:
@@ -344,7 +341,7 @@ def derivative(*states: str, modes: Sequence[str] = ()) -> Callable[[_F], _F]:
     """
     names = check(each(NAME, "the name of a state, or several", 1), states, "states", "derivative", DeclarationError)
     options = DerivativeOptions(tuple(names), tuple(check(_NAMES, modes, "modes", "derivative", DeclarationError)))
-    return lambda function: _mark(function, Law("derivative", function.__name__, options))
+    return lambda function: mark(function, Law("derivative", function.__name__, options))
 
 
 _MOMENT = either(NAME, number())
@@ -392,7 +389,7 @@ def update(
     """
     names = (sets,) if isinstance(sets, str) else tuple(sets)
     options = UpdateOptions(names, every, offset, at, when, None if reads is None else tuple(reads))
-    return lambda function: _mark(function, Law("update", function.__name__, options))
+    return lambda function: mark(function, Law("update", function.__name__, options))
 
 
 def scalars(value: Any) -> list[Scalar]:

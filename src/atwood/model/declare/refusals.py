@@ -9,7 +9,14 @@ from atwood.arguments import show
 from atwood.errors import DeclarationError, MissingNameError, ParameterError, near_matches, suggestion
 from atwood.model.declare.fields import ParameterSpec
 
-__all__ = ["given_without_name", "must_be_given", "no_such_name", "no_such_parameter", "no_such_reaction"]
+__all__ = [
+    "given_without_name",
+    "must_be_given",
+    "no_private_name",
+    "no_such_name",
+    "no_such_parameter",
+    "no_such_reaction",
+]
 
 
 def given_without_name(kind: str, parameters: Iterable[str], value: Any) -> ParameterError:
@@ -53,3 +60,11 @@ def no_such_reaction(path: str, name: str, readable: Collection[str], is_rigid: 
             "@constraint, whose reaction a force may read."
         )
     return DeclarationError(f"this law may not read the reaction {name!r}", where=path, advice=advice)
+
+
+def no_private_name(kind: str, name: str, component: Any) -> AttributeError:
+    """Return the error for a private name that a component does not have."""
+    if name in ("_parent", "_name", "_settings", "_token"):
+        advice = "Call super().__init__(**values) in it first; parameters need no __init__."
+        return MissingNameError("its __init__ does not call that of Component", where=kind, advice=advice)
+    return AttributeError(f"{kind!r} has no attribute {name!r}", name=name, obj=component)

@@ -39,7 +39,7 @@ from atwood.model.local.parts import (
     multiplier_symbol,
 )
 from atwood.model.local.states import discrete_states, local_states
-from atwood.model.returned import call_law, law_value, listed, one_scalar
+from atwood.model.returned import call_law, finite_scalar, law_value, listed, one_scalar
 from atwood.model.values.space import WHERE, Space
 
 __all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "localize"]
@@ -284,7 +284,7 @@ def _multipliers_read(
 
 
 def _scalar(bound: Any, law: Law, graph: Graph) -> Expression:
-    return one_scalar(graph, law_value(bound, law.name))
+    return finite_scalar(graph, law_value(bound, law.name))
 
 
 def _check_reads(
