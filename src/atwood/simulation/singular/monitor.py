@@ -13,7 +13,7 @@ import time
 import numpy as np
 
 from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.protocol import Status, StepResult
+from atwood.integrators.protocol import FloatArray, Status, StepResult
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.singular.crossing import SingularCrossing
 from atwood.simulation.singular.looks import Look, as_lookout, compiled_looks, going_on, stride_from
@@ -144,7 +144,7 @@ class SingularityMonitor(WaysOver):
             return
         times = here.t + stride * np.array(_AROUND)
         self._compiled.restart()
-        for t, y in zip(times.tolist(), going_on(self.plan, here, times).T, strict=True):
+        for t, y in zip(self._in_run(times).tolist(), going_on(self.plan, here, times).T, strict=True):
             self._compiled.note(t, np.concatenate([y, self._start.y[len(y) :]]), self._start.yp)
         t, q = self._compiled.best
         self._measures.learn(np.array([t]), q[:, None])
@@ -214,6 +214,10 @@ class SingularityMonitor(WaysOver):
         self._measure()
         return self._coming(self._start.t)
 
+    def _in_run(self, times: FloatArray) -> FloatArray:
+        """Return times, none of them outside the run: what begins slowly has long strides, and drives other places."""
+        return np.clip(times, self._start.t, self._start.t + self._whole)
+
     def _coming(self, now: float) -> SingularCrossing | None:
         """Return the singular position just ahead of a solver, which need not come near it; None if there is none.
 
@@ -224,7 +228,7 @@ class SingularityMonitor(WaysOver):
         if not (self._away[-1] > 0.0 and stride < np.inf):
             return None
         times = last.t + stride * np.linspace(*_AHEAD)
-        near = zero_ahead(times, self._measures.at(times, going_on(self.plan, last, times)[: self._n]))
+        near = zero_ahead(times, self._measures.at(self._in_run(times), going_on(self.plan, last, times)[: self._n]))
         if near is None or not near > now:
             return None
         self.plan.compiles_columns = True
