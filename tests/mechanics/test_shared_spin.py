@@ -6,7 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atwood import Component, Scene, StartError, report, simulate, sweep
+from atwood import (
+    Component,
+    Frame,
+    Scalar,
+    Scene,
+    StartError,
+    assemble,
+    connector,
+    potential,
+    report,
+    simulate,
+    sqrt,
+    sweep,
+)
 from atwood_library import (
     Bar,
     Cylindrical,
@@ -111,6 +124,23 @@ def test_what_acts_on_such_a_spin_is_refused_as_before() -> None:
     scene.connect(part.connectors()["frame"], torque.connectors()["frame"])
     with pytest.raises(StartError, match="without inertia"):
         simulate(scene, t_end=0.1)
+
+
+class Notch(Component):
+    """A potential that has a value near one angle only."""
+
+    frame: Frame = connector(Frame, "What it turns.")
+
+    @potential
+    def energy(self) -> Scalar:
+        """Return the energy."""
+        return sqrt(self.frame.axes[0].x - 0.95)
+
+
+def test_a_law_without_a_value_at_random_places_is_not_overlooked() -> None:
+    scene = bar_on(Cylindrical(axis=(0.0, 0.0, 1.0)))
+    scene.connect(scene.add("notch", Notch()).frame, scene._children()["bar"].connectors()["frame"])
+    assert not assemble(scene).mechanism.idle_spins
 
 
 def test_a_hinge_across_keeps_a_link_from_spinning() -> None:

@@ -159,6 +159,8 @@ def _changes(
     found = jacobian(list(values), symbols)
     slopes = np.zeros((len(values), len(symbols)))
     slopes[list(found.rows), list(found.columns)] = evaluate(found.entries, place.numbers)
+    if not np.all(np.isfinite(slopes)):
+        raise ArithmeticError  # a law without a value there says nothing
     sizes = np.abs(slopes) @ place.sizes(local)
     for is_rate in (False, True):
         moves = np.array([place.moves(local, body, is_rate) for body in bodies]).T  # (symbols, bodies)
