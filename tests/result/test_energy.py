@@ -269,7 +269,10 @@ def test_a_run_comes_out_the_same_with_more_samples(name: str, form: str, solver
     assert again.statistics.steps == run.statistics.steps
     assert sum(len(one.time) for one in again.segments) > 150
     steps = times_of_steps(run)
-    assert len(steps) >= run.statistics.steps
+    # Steps that a solver has taken beyond where a way over a singular position begins are taken back.
+    passed_over = any(one.path is not None for segment in run.segments for one in segment.singular_crossings)
+    assert passed_over == (name == "four-bar-row")
+    assert len(steps) >= (0.5 if passed_over else 1.0) * run.statistics.steps
     assert steps[0] == 0.0
 
 
