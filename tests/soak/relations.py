@@ -295,7 +295,9 @@ def split(mechanism: Mechanism, random: np.random.Generator) -> Related:
         takes = random.random() < 0.5
         mounts = [replace(m, body=other.name) if m.body == body.name and takes else m for m in tie.mounts]
         ties.append(replace(tie, mounts=tuple(mounts)))
-    return Related(replace(mechanism, bodies=tuple(bodies), ties=(*ties, weld)))
+    known = plane_angles(mechanism) if mechanism.space == "plane" else None
+    angles = None if known is None else {**known, other.name: known[body.name]}
+    return Related(replace(mechanism, bodies=tuple(bodies), ties=(*ties, weld), angles=angles))
 
 
 RELATIONS = {

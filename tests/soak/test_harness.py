@@ -94,6 +94,14 @@ def test_relations_do_not_change_a_mechanism() -> None:
             assert powers[0] == pytest.approx(powers[1])
 
 
+def test_a_body_that_is_split_keeps_its_turns() -> None:
+    mechanism = draw(500284)
+    angles = plane_angles(mechanism)
+    for seed in range(4):
+        found = plane_angles(RELATIONS["split"](mechanism, np.random.default_rng(seed)).mechanism)
+        assert found.items() >= angles.items()
+
+
 def test_gears_may_be_named_before_their_joints() -> None:
     mechanism = draw(500015)
     assert any(tie.grips for tie in mechanism.ties)
