@@ -44,6 +44,10 @@ multipliers of all that follow inaccurate.
 _POOR, _SETTLED = 3.0, 1.5
 """A choice of rows is poor where another takes one of it more often; exchanges go on until none does by so much."""
 
+_ALIKE = 0.99
+"""Exchanges that are as good as the best up to this are alike, as they are in symmetric scenes: the last is made, so
+that rounding has no say in it."""
+
 _LOOK = 1e-4
 """While more than this share of the largest row is left, errors of the chosen rows cannot matter."""
 
@@ -195,7 +199,8 @@ def review_rows(
         weights = np.abs(made_of)
         if first is not None:
             weights[np.outer(~first[others], first[chosen])] = 0.0
-        this, that = np.unravel_index(int(np.argmax(weights)), weights.shape)
+        alike = np.argwhere(weights >= _ALIKE * weights.max(initial=0.0))
+        this, that = alike[-1]
         if weights[this, that] <= bound:
             break
         others[int(this)], chosen[int(that)], bound = chosen[int(that)], others[int(this)], _SETTLED
