@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import atwood_library as lib
-from atwood import Result, Scene, report, simulate, sweep
+from atwood import Component, Result, Scalar, Scene, discrete_state, report, simulate, sweep, update
 from atwood.pipeline import assemble
 from atwood.topology.orientation_coordinates import ORIENTATIONS
 from atwood_library.scenes import SCENES, FreeBody, LagrangeTop
@@ -62,6 +62,24 @@ def test_the_free_body_passes_every_singular_place(kind: str) -> None:
             assert np.max(angle_between(axes(result), exact.orientation(result.time))) < 10.0 * rtol
             assert np.allclose(result.time, np.linspace(0.0, 6.0, 25), atol=1e-12)
             assert result.assembly.orientation.kind == kind
+
+
+class Counter(Component):
+    """What counts the tenths of a second."""
+
+    count: Scalar = discrete_state(doc="How many.")
+
+    @update(every=0.1, sets="count")
+    def step(self) -> float:
+        return self.count + 1.0
+
+
+def test_samples_of_a_control_are_outputs_after_a_switch_too() -> None:
+    scene = FreeBody(moments=MOMENTS, spin=(2.0, 0.3, 0.2))
+    scene.add("counter", Counter())
+    result = simulate(scene, orientation="euler-yxz", t_end=6.0, outputs=3)
+    assert result.coordinate_switches
+    np.testing.assert_allclose(np.unique(result.time), np.linspace(0.0, 6.0, 61), atol=1e-12)
 
 
 @pytest.mark.sample(10)

@@ -342,10 +342,10 @@ class _Walk:
         self.assembly = before.with_held(self.held) if self.held else before
         length = self.start.length
         self.q, self.u, impacts = pass_time_event(before, self.assembly, self.t, self.q, self.u, length)
-        self.show = self.show or self.samples.shows(self.t)
+        self.show = True  # as after any event: values that are held jump
         if impacts:
             self.events += impacts
-            self.impact = self.show = True
+            self.impact = True
         if self.plan is not None:
             self.probe, self._plans = None, {}
             self.plan = self.plan.in_piece(self.assembly)
