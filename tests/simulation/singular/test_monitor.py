@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 import atwood
+from atwood import simulate
 from atwood.integrators.protocol import Status
-from atwood.simulation.singular import monitor as module
+from atwood.simulation.singular import monitor as module, ways
 from atwood.simulation.singular.crossing import SingularCrossing
 from atwood.simulation.singular.looks import Look
 from atwood.simulation.singular.monitor import SingularityMonitor, singularity_monitor_of
-from atwood_library.scenes import DoublePendulum, FourBar
+from atwood_library.scenes import DoublePendulum, FourBar, FourBarRow
 
 INF = float("inf")
 
@@ -303,3 +304,12 @@ def test_a_failure_is_explained_only_where_it_was_at_a_singular_position() -> No
     assert error is not None
     assert error.where == "loop"
     assert "near t = 1.5" in str(error)
+
+
+@pytest.mark.parametrize("solver", ["auto", "ida"])
+def test_no_output_is_lost_where_a_way_begins_with_half_of_it(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where arcs are to be more accurate, the first covers half of the way: a way began behind outputs to come."""
+    monkeypatch.setattr(ways, "_ACCURATE", 1e-11)
+    result = simulate(FourBarRow(), form="dae", rtol=1e-11, outputs=2001, t_end=0.9, solver=solver)
+    assert [len(one.path.arcs) > 1 for one in result.singular_crossings if one.path] == [True]
+    assert len(result.time) == 2001

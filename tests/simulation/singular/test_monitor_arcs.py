@@ -108,7 +108,7 @@ def with_arcs(monkeypatch: pytest.MonkeyPatch, one: SingularityMonitor, arcs: Ar
     monkeypatch.setattr(module, "find_crossing", lambda measures, arc: answers.pop(0) if answers else None)
     monkeypatch.setattr(module, "stride_from", lambda plan, look, whole: 10.0)
     one.plan.balance.project = lambda t, q, u, sizes: (q, u)
-    one._crossing = lambda arc, t, away: (arc.start, arc.end, t, away)  # type: ignore[method-assign,assignment]
+    one._crossing = lambda arc, t, away, before=(): (*(one.start for one in (*before, arc)), arc.end, t, away)  # type: ignore[method-assign,assignment,return-value]
     one._state = lambda look: (look.t, np.zeros(1), np.zeros(1))  # type: ignore[method-assign,assignment]
     return one
 
@@ -138,7 +138,7 @@ def test_an_arc_is_placed_anew_where_the_place_is_not_in_its_middle(monkeypatch:
 def test_an_arc_that_is_too_long_begins_nearer(monkeypatch: pytest.MonkeyPatch, error: float | None) -> None:
     arcs = Arcs(error, 0.0, 0.0)
     one = with_arcs(monkeypatch, moving([0.0, 1.0]), arcs, (2.0, 0.1))
-    assert one._over(2.0, 1.0, *STATE) == (1.5, 2.5, 2.0, 0.1)
+    assert one._over(2.0, 1.0, *STATE) == (1.0, 1.5, 2.5, 2.0, 0.1)  # the first half is of the way, too
     assert arcs.asked == [(1.0, 3.0), (1.0, 1.5), (1.5, 2.5)]
     for worse in (None, 2e-6):
         assert (

@@ -241,6 +241,7 @@ class WaysOver:
     def _over(self, near: float, t: float, q: FloatArray, u: FloatArray) -> SingularCrossing | None:
         """Return the way over a singular position near a time, from a state."""
         plan, accurate = self.plan, max(self.tolerance, _ACCURATE)
+        before: tuple[Arc, ...] = ()
         for _ in range(8):
             arc = find_arc(plan, t, q, u, 2.0 * near - t, self._between)
             if arc is None or not arc.error < accurate:
@@ -250,6 +251,7 @@ class WaysOver:
                     return None
                 q, u, _ = (one[:, 0] for one in arc.at(np.array([arc.end])))
                 t, (q, u) = arc.end, plan.balance.project(arc.end, q, u, plan.sizes)
+                before = (*before, arc)  # outputs on it are of the way, too
                 continue
             found = find_crossing(self._measures, arc)
             if found is None or found[0] <= t:
@@ -258,7 +260,7 @@ class WaysOver:
             if abs(now - near) > _CENTRED * (near - t):
                 near = now
                 continue
-            return self._crossing(arc, now, away)
+            return self._crossing(arc, now, away, before)
         return None
 
     def _between(self, t: FloatArray) -> tuple[FloatArray, FloatArray] | None:
@@ -277,13 +279,13 @@ class WaysOver:
         )
         return both[: self._n], both[self._n :]
 
-    def _crossing(self, arc: Arc, t: float, away: float) -> SingularCrossing | None:
-        """Return the singular crossing that an arc makes at a time; None if that is no singular position."""
+    def _crossing(self, arc: Arc, t: float, away: float, before: tuple[Arc, ...] = ()) -> SingularCrossing | None:
+        """Return the singular crossing that an arc makes at a time, perhaps behind others; None if it makes none."""
         if is_slow(self.plan, arc, t, self._fastest, self.tolerance):
             return None
         loss = find_loss(self._measures, arc, t, away)
         return (
             None
             if loss is None
-            else SingularCrossing(t, loss.rank, *self._said(loss.constraints), Path((arc,)), loss.gap)
+            else SingularCrossing(t, loss.rank, *self._said(loss.constraints), Path((*before, arc)), loss.gap)
         )
