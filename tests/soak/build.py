@@ -15,6 +15,7 @@ from .description import Array, Body, Mechanism, Mount, Signal, Tie, axis_and_an
 from .oracle_own import GAPS
 from .oracle_parts import GEARS
 from .own_parts import OWN
+from .trial import Discarded
 
 POINTS = {
     "spring": ("a", "b"),
@@ -76,30 +77,52 @@ def build_scene(mechanism: Mechanism, start: str = "all") -> Scene:
     return scene
 
 
+LOCKS = ("slider", "weld", "drive", "rotary_drive")
+"""What says for certain by how much the angles of two bodies in a plane differ."""
+
+
 def plane_angles(mechanism: Mechanism) -> dict[str, float]:
     """Return the angle of each body in a plane, counter-clockwise, with turns that fit those of the joints it hangs on.
 
     In a plane angles are absolute and count turns: along a joint, the angle of a body is that of the other one, plus
-    what welds and the joint turn, which are within half a turn each.
+    what welds and the joint turn, which are within half a turn each. Around a loop hinges alone may be a turn off.
     """
     if mechanism.angles is not None:
         return mechanism.angles
+    between = [tie for tie in mechanism.ties if len(tie.mounts) == 2]
     found = {"": 0.0}
+    _spread(mechanism, [tie for tie in between if tie.sort in LOCKS], found)
     for body in mechanism.bodies:
-        angle = _counter_clockwise(body.rotation)
-        hung = [tie for tie in mechanism.ties if tie.mounts and tie.mounts[-1].body == body.name][:1]
-        locks = [tie for tie in mechanism.ties if tie.sort in ("slider", "weld")]
-        for tie in (*locks, *hung):  # a lock says for certain
-            if tie.sort not in ("pivot", "slider", "weld", "drive", "rotary_drive"):
-                continue
-            a, b = tie.mounts if tie.mounts[-1].body == body.name else tie.mounts[::-1]
-            if b.body == body.name and a.body in found:
-                joint = _counter_clockwise((mechanism.turned(a)).T @ mechanism.turned(b))
-                hangs = found[a.body] + _counter_clockwise(a.rotation) + joint - _counter_clockwise(b.rotation)
-                angle += 2.0 * np.pi * round((hangs - angle) / (2.0 * np.pi))
-                break
-        found[body.name] = angle
+        if body.name in found:
+            continue
+        hung = [tie for tie in between if tie.sort == "pivot" and tie.mounts[1].body == body.name][:1]
+        known = [found[tie.mounts[0].body] + _apart(mechanism, tie) for tie in hung if tie.mounts[0].body in found]
+        found[body.name] = known[0] if known else _counter_clockwise(body.rotation)
+        _spread(mechanism, [tie for tie in between if tie.sort in LOCKS], found)
+    for tie in between:
+        a, b = (found[mount.body] for mount in tie.mounts)
+        if tie.sort == "pivot" and tie.values.get("stiffness") and abs(b - a - _apart(mechanism, tie)) > 1.0:
+            raise Discarded("a spring on a hinge that is a turn off")
     return found
+
+
+def _spread(mechanism: Mechanism, locks: list[Tie], found: dict[str, float]) -> None:
+    """Add the angles of all bodies that locks join to those that are found."""
+    going = True
+    while going:
+        going = False
+        for tie in locks:
+            a, b = (mount.body for mount in tie.mounts)
+            if (a in found) != (b in found):
+                going, apart = True, _apart(mechanism, tie)
+                found.update({b: found[a] + apart} if a in found else {a: found[b] - apart})
+
+
+def _apart(mechanism: Mechanism, tie: Tie) -> float:
+    """Return by how much the angle of the second body of a joint is larger, with welds and joint within half a turn."""
+    a, b = tie.mounts
+    joint = _counter_clockwise(mechanism.turned(a).T @ mechanism.turned(b))
+    return _counter_clockwise(a.rotation) + joint - _counter_clockwise(b.rotation)
 
 
 def _counter_clockwise(matrix: Array) -> float:

@@ -60,6 +60,8 @@ def _pushed(draft: Draft, sort: str) -> None:
     names = ["", *(body.name for body in draft.bodies)]
     own = draft.random_mount(str(random.choice(names[1:])))
     if sort == "own_leak":
+        if any(tie.sort == "central_gravity" for tie in draft.ties):
+            return  # it would attract what leaks, too
         mass = chance.size(0.5)
         part = Signal(
             mass, 0.0, 0.4 * mass * float(random.uniform(-1, 1)), chance.size(4.0), float(random.uniform(0, 6))
