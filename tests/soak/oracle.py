@@ -429,6 +429,19 @@ class Oracle:
         values, rows, rates = self.constraints(place, 0.0)
         return float(np.max(np.abs([values, rows @ speeds + rates]), initial=0.0))
 
+    def contradiction(self, later: tuple[float, ...]) -> float:
+        """Return by how much constraints that follow from others ask for other velocities or accelerations than these.
+
+        Where the mechanism is at its start, and at later times as if it were still there: prescribed motions may bend.
+        """
+        place, speeds = self.start()
+        _, rows, rates = self.constraints(self._moving(place, speeds), 1j * STEP)
+        directions, sizes, _ = np.linalg.svd(rows.real)
+        follow = directions[:, int(np.sum(sizes > CLEAR * np.max(sizes, initial=0.0))) :].T
+        asked = [follow @ (np.imag(rows) @ speeds + np.imag(rates)) / STEP]
+        asked += [follow @ np.real(self.constraints(place, t)[2]) for t in later]
+        return max(float(np.max(np.abs(one), initial=0.0)) for one in asked)
+
     # -- motion -----------------------------------------------------------------------------------------------------
 
     def project_speeds(self, place: Place, speeds: Array, t: float = 0.0) -> Array:

@@ -160,8 +160,12 @@ def _start_alike(one: Oracle, other: Oracle) -> bool:
 
 
 def oracle_of(mechanism: Mechanism, result: Result) -> Oracle:
-    """Return the oracle that starts as a run did; in a plane, angles of joints have their turns from there."""
+    """Return the oracle that starts as a run did; angles of joints have their turns from there, if they count turns."""
     oracle = Oracle(started_as(mechanism, result))
+    if mechanism.space == "space":
+        for tie in mechanism.ties:
+            if tie.sort in ("pivot", "cylindrical", "screw") and f"{tie.name}.angle" in result:
+                oracle.count_from(tie.name, "angle", float(result.array(f"{tie.name}.angle")[0]))
     if mechanism.space == "plane":
         for tie in mechanism.ties:
             if f"{tie.name}.angle" in result:
