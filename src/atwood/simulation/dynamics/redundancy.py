@@ -91,7 +91,8 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
         return RankFinding((), (), 0, 0)
     if _hangs_together(balance, t, q, scales):
         return RankFinding(tuple(range(count)), (), count, count)
-    here = _look(balance, t, q, scales)
+    # A state that has drifted off the constraints has slopes that are known no better than it.
+    here = _look(balance, t, q, scales, balance.misses(t, q, np.zeros_like(scales), scales)[0])
     # A row may be small because it vanishes at a singular position: it is measured by the terms that cancel in it.
     units = np.maximum(row_sizes(here.jacobian, np.ones(len(scales))), here.errors / ROUGHNESS)
     everything = list(range(count))
