@@ -8,6 +8,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, depends_on, evaluate
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.linalg.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of
 from atwood.simulation.dynamics.reactions import maximal_state
@@ -61,6 +62,7 @@ def check_read_reactions(assembly: Assembly, t: float, q: FloatArray, u: FloatAr
         raise _not_determined(assembly, open_ways.in_units)
 
 
+@dataclass(frozen=True, eq=False)
 class _OpenWays:
     """How multipliers can change and still balance each other.
 
@@ -74,8 +76,9 @@ class _OpenWays:
         Speeds that the constraints allow, each of the size of its scale, shape (speeds, motions).
     """
 
-    def __init__(self, in_units: FloatArray, units: FloatArray, motions: FloatArray) -> None:
-        self.in_units, self.units, self.motions = in_units, units, motions
+    in_units: FloatArray
+    units: FloatArray
+    motions: FloatArray
 
 
 def _balancing(balance: Balance, t: float, q: FloatArray, scales: FloatArray, rank: int) -> _OpenWays:

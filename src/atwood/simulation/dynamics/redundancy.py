@@ -63,11 +63,15 @@ class RankFinding:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """The constraints' slopes at a place, columns scaled, with their errors, and the rows that are independent."""
+    """The constraints' slopes at a place, columns scaled, with their errors, and the rows that are independent.
+
+    Also by how much the place misses the constraints on position, relative to the scales.
+    """
 
     jacobian: FloatArray
     errors: FloatArray
     kept: list[int]
+    miss: float
 
     def smallest(self, kept: list[int], units: FloatArray) -> FloatArray:
         """Return the singular values of some rows in given units."""
@@ -91,8 +95,7 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
         return RankFinding((), (), 0, 0)
     if _hangs_together(balance, t, q, scales):
         return RankFinding(tuple(range(count)), (), count, count)
-    # A state that has drifted off the constraints has slopes that are known no better than it.
-    here = _look(balance, t, q, scales, balance.misses(t, q, np.zeros_like(scales), scales)[0])
+    here = _look(balance, t, q, scales)
     # A row may be small because it vanishes at a singular position: it is measured by the terms that cancel in it.
     units = np.maximum(row_sizes(here.jacobian, np.ones(len(scales))), here.errors / ROUGHNESS)
     everything = list(range(count))
@@ -181,12 +184,14 @@ def kept_along(
     return [(slice(a, b), np.asarray(one, dtype=np.intp)) for a, b, one in found if b > a]
 
 
-def _look(balance: Balance, t: float, q: FloatArray, scales: FloatArray, miss: float = 0.0) -> _Place:
-    jacobian = scaled(balance.constraints_at(t, q, np.zeros_like(scales)).jacobian, scales)
-    errors = balance.errors.of_jacobian(t, q, scales, miss)
+def _look(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> _Place:
+    now = balance.constraints_at(t, q, np.zeros_like(scales))
+    miss = float(np.max(np.abs(now.value / balance.row_scales(now, t, q, scales))))
+    jacobian = scaled(now.jacobian, scales)
+    errors = balance.errors.of_jacobian(t, q, scales, miss)  # slopes are known no better than a place that has drifted
     # What holds positions comes first: then a constraint on velocities alone is never kept in place of one.
     kept = independent_rows(jacobian, errors, first=_holding(balance))
-    return _Place(to_array(jacobian), errors, kept)
+    return _Place(to_array(jacobian), errors, kept, miss)
 
 
 def _holding(balance: Balance) -> NDArray[np.bool_]:
@@ -211,9 +216,9 @@ def _nearby(balance: Balance, t: float, q: FloatArray, scales: FloatArray, here:
         for free, iterations in ((scales, 12), (held, 30)):
             try:
                 nearby, _ = balance.project(t, balance.kinematic_map.moved(t, q, way), still, free, iterations)
-                miss = balance.misses(t, nearby, still, scales)[0]
-                if miss <= tolerances.CLOSED:
-                    found.append(_look(balance, t, nearby, scales, miss))
+                place = _look(balance, t, nearby, scales)
+                if place.miss <= tolerances.CLOSED:
+                    found.append(place)
                     break
             except (KernelEvaluationError, np.linalg.LinAlgError):
                 continue  # a law has no value there: that says nothing about the start
