@@ -181,9 +181,9 @@ def test_every_object_within_reach_fits_ten_lines(roots):
 
 SAID = {
     "scene": ("Chain(links=30)", "61 parts", "rod[0..29]", "connections"),
-    "result": ("Result of Chain", "reduced form", "finished", "0 to 0.2 s, 400 output times"),
-    "saved": ("SavedResult of Chain", "reduced form", "finished", "400 output times"),
-    "loop": ("Result of FourBar", "dae form (ggl)"),
+    "result": ("Result of Chain, reduced, explicit", "finished", "0 to 0.2 s, 400 output times"),
+    "saved": ("SavedResult of Chain, reduced, explicit", "finished", "400 output times"),
+    "loop": ("Result of FourBar, dae, explicit",),
     "report": ("MechanismReport of Chain", "30 degrees of freedom", "30 bodies"),
     "comparison": ("Comparison of FourBar", "12 runs"),
     "long comparison": ("LongComparison of SimplePendulum", "10 periods"),

@@ -91,7 +91,7 @@ def test_a_run_is_shown_as_text() -> None:
     done = run("run", f"{FILE}:Swing", "--form", "dae")
     assert done.exit_code == 0
     for word in (
-        "Swing, dae form (ggl)",
+        "Swing, dae, explicit",
         "1 degree of freedom",
         "Dormand-Prince 8(5,3)",
         "rod.tension",

@@ -3,19 +3,21 @@
 import csv
 import json
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.io import netcdf_file
 
-from atwood import ResultError, Scene, UsageError
+from atwood import ExternalFunction, ResultError, Scene, UsageError, external
 from atwood.pipeline import simulate
 from atwood.result import files
 from atwood.result.files import load_result, save_result
-from atwood.result.formats import matlab, netcdf
+from atwood.result.formats import companion, matlab, netcdf
 from atwood.result.result import Result
-from atwood_library import Ground, PointMass, Rod
+from atwood_library import Force, Ground, PointMass, Rod
+from atwood_library.scenes import DoublePendulum
 
 
 @pytest.fixture(scope="module")
@@ -43,10 +45,11 @@ def test_round_trip_is_exact(result: Result, tmp_path: Path, suffix: str) -> Non
         assert saved.unit(path) == result.unit(path)
     assert saved.at(-1) == result.at(-1)
     assert saved.group("rod[1]").keys() == result.group("rod[1]").keys()
-    assert [one.name for one in tmp_path.iterdir()] == [file.name]
+    beside = ["run.csv.json"] * (suffix == ".csv")
+    assert sorted(one.name for one in tmp_path.iterdir()) == [file.name, *beside]
 
 
-@pytest.mark.parametrize("suffix", [".nc", ".npz", ".mat"])
+@pytest.mark.parametrize("suffix", [".nc", ".npz", ".mat", ".csv"])
 def test_what_is_known_about_a_run_is_kept(result: Result, tmp_path: Path, suffix: str) -> None:
     saved = load_result(result.save(tmp_path / f"run{suffix}"))
     assert saved.status == "finished"
@@ -79,10 +82,97 @@ def test_csv_is_plain(result: Result, tmp_path: Path) -> None:
     with file.open(encoding="utf-8", newline="") as stream:
         rows = list(csv.reader(stream))
     assert rows[0] == ["time [s]", "rod[0].angle [rad]", "rod[0].tension [N]"]
-    assert len(rows) == 23
-    assert rows[-1][0].startswith("# rows: 21")
+    assert len(rows) == 22
     assert np.array_equal(np.loadtxt(file, delimiter=",", skiprows=1)[:, 1], result["rod[0].angle"])
-    assert float(rows[-2][1]) == result["rod[0].angle"][-1]
+    assert float(rows[-1][1]) == result["rod[0].angle"][-1]
+
+
+def test_pandas_reads_a_csv_as_numbers(result: Result, tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    table = pandas.read_csv(result.save(tmp_path / "run.csv"))
+    assert all(kind == np.float64 for kind in table.dtypes)
+    assert table["time [s]"].to_list() == result.time.tolist()
+    assert table["rod[0].tension [N]"].to_list() == result["rod[0].tension"].tolist()
+
+
+def test_a_csv_is_checked_by_the_file_beside_it(result: Result, tmp_path: Path) -> None:
+    file, beside = result.save(tmp_path / "run.csv", ["rod[0].angle"]), tmp_path / "run.csv.json"
+    content, about = file.read_bytes(), beside.read_bytes()
+    for damaged in (content[:-30], content.replace(b"1.0", b"1.5", 1), content.rpartition(b"\n0.5")[0] + b"\n"):
+        file.write_bytes(damaged)
+        with pytest.raises(UsageError, match=r"run\.csv\.json"):
+            load_result(file)
+    file.write_bytes(content.replace(b"\n", b"\r\n"))  # as some mail programs make it
+    assert load_result(file)["rod[0].angle"].tolist() == result["rod[0].angle"].tolist()
+    beside.write_bytes(about.replace(b"finished", b"stopped!"))
+    with pytest.raises(UsageError, match="other contents"):
+        load_result(file)
+    beside.unlink()
+    alone = load_result(file)
+    assert alone.metadata == {}
+    assert alone["rod[0].angle"].tolist() == result["rod[0].angle"].tolist()
+
+
+def test_who_is_stopped_between_two_files_leaves_a_pair(
+    result: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = result.save(tmp_path / "run.csv", ["rod[0].angle"])
+    written, write = [], companion.write_atomically
+
+    def stopped(target: Path, how: object) -> None:
+        if len(written) == 1:
+            raise KeyboardInterrupt
+        written.append(target)
+        write(target, how)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(companion, "write_atomically", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        result.save(file, ["rod[1].angle"])
+    assert load_result(file).paths == ("rod[0].angle",)
+    monkeypatch.undo()
+    result.save(file, ["rod[1].angle"])
+    assert load_result(file).paths == ("rod[1].angle",)
+    assert len(json.loads((tmp_path / "run.csv.json").read_text(encoding="utf-8"))["contents"]) == 1
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".npz", ".mat", ".csv"])
+def test_a_saved_run_can_be_run_again(tmp_path: Path, suffix: str) -> None:
+    scene = DoublePendulum(length1="80 cm")
+    scene.rod2.length = 0.7
+    scene.start["rod1.angle"] = "30 deg"
+    times = np.linspace(0.0, 0.6, 7)
+    run = simulate(
+        scene, form="dae", t_end=2.0, rtol=1e-9, outputs=times, solver="ida", until="rod1.angle falls below 20 deg"
+    )
+    saved = load_result(run.save(tmp_path / f"run{suffix}", ["rod1.angle"]))
+    assert saved.metadata["parameters"]["length1"] == saved.metadata["parameters"]["rod1.length"] == 0.8
+    assert saved.metadata["parameters"]["rod2.length"] == 0.7
+    assert saved.metadata["parameters"]["gravity"] == 9.81
+    again = simulate(saved.scene(), **saved.settings())
+    assert (again.form, again.level, again.status) == ("dae", "ggl", "stopped")
+    assert again.time.tolist() == saved.time.tolist()
+    assert again["rod1.angle"].tolist() == saved["rod1.angle"].tolist()
+    on = simulate(saved.scene(), **saved.settings(until=None, form="reduced", level=None, t_end="0.7 s"))
+    assert (on.form, on.time[-1]) == ("reduced", 0.6)
+
+
+def test_what_no_file_holds_is_said(tmp_path: Path) -> None:
+    stop = simulate(DoublePendulum(), t_end=0.2, outputs=3, until=lambda q: q["bob1.position.z"] < -5.0, accuracy=1e-5)
+    saved = load_result(stop.save(tmp_path / "run.npz"))
+    with pytest.raises(UsageError, match=r"function.*settings\(until="):
+        saved.settings()
+    assert saved.settings(until=None)["accuracy"] == 1e-5
+    with pytest.raises(UsageError, match="older version"):
+        load_result(Path(__file__).parent / "saved_before" / "run.nc").scene()
+    scene = Scene(space="line", line_axis=(1.0, 0.0, 0.0))
+    mass, push = scene.add("mass", PointMass()), scene.add("push", Force())
+    scene.connect(mass.point, push.point)
+    scene.set("push.value", lambda t: external(ExternalFunction("wind", abs), t))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        blown = simulate(scene, t_end=0.1, outputs=2)
+    with pytest.raises(UsageError, match="External functions"):
+        load_result(blown.save(tmp_path / "blown.npz")).scene()
 
 
 @pytest.mark.parametrize("name", ["run", "run.txt", "run.xls"])

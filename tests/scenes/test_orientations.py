@@ -119,7 +119,7 @@ def test_orientations_are_compared_by_their_axes() -> None:
     for row in found.rows:
         assert row.error is not None
         assert row.error < 1e4 * row.rtol
-    assert {row.label for row in found.rows} >= {"reduced", "reduced, explicit", "dae (ggl)"}
+    assert {row.label for row in found.rows} >= {"reduced, IDA", "reduced, explicit", "dae (ggl), IDA"}
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -42,6 +42,8 @@ def read_damaged(suffix: str, content: bytes) -> tuple[str, Finding | None]:
         warnings.simplefilter("ignore")
         file = Path(directory, f"damaged{suffix}")
         file.write_bytes(content)
+        if suffix == ".csv":
+            Path(directory, "damaged.csv.json").write_bytes(original(suffix).with_name("saved.csv.json").read_bytes())
         try:
             read = meaning(suffix, file)
         except AtwoodError as error:

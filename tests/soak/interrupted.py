@@ -20,6 +20,7 @@ import atwood_library as lib
 from atwood_library.scenes import SCENES
 
 FILES = ("run.csv", "run.nc", "run.npz", "scene.json")
+BESIDE = "run.csv.json"
 _WIND = atwood.ExternalFunction("wind", math.cos)
 PATHS = ("rod1.angle", "rod1.tension", "bob2.position.x")
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import atwood
 
-from .interrupted import FILES
+from .interrupted import BESIDE, FILES
 from .trial import Finding, Trial
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -59,7 +59,7 @@ def check(seed: int) -> Trial:
         findings = _stop(command, options, sent, after)
         present = [name for name in FILES if (place / name).exists()]
         findings += [finding for name in present for finding in _look_at(place / name)]
-        left = sorted(path.name for path in place.iterdir() if path.name not in FILES)
+        left = sorted(path.name for path in place.iterdir() if path.name not in (*FILES, BESIDE))
         if left and sent == signal.SIGINT:
             findings.append(Finding("message", "Ctrl-C leaves files with other names", " ".join(left)))
         said, errors = _finish(place, cache)
@@ -79,6 +79,8 @@ def _stop_command(arguments: tuple[str, ...], sent: signal.Signals, after: float
         words = [word.format(place=place) for word in arguments]
         findings = _stop([sys.executable, "-c", program, *words], options, sent, after)
         for file in sorted(place.iterdir()):
+            if file.name == BESIDE:
+                continue
             if file.suffix not in (".nc", ".npz", ".csv", ".gif"):
                 if sent == signal.SIGINT:
                     findings.append(Finding("message", "Ctrl-C leaves files with other names", file.name))

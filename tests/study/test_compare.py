@@ -11,6 +11,7 @@ import pytest
 from atwood import Scene, SolveError, UsageError, connect
 from atwood.pipeline import simulate
 from atwood.result.result import Result
+from atwood.simulation.problem.options import how_solved
 from atwood.study import Comparison, compare
 from atwood.study.comparison.verdict import judge
 from atwood_library import Ground, Mass1D, PointMass, Rod, Rope, Spring
@@ -164,3 +165,18 @@ def test_motions_of_one_coordinate_are_compared_with_quadratures(name: str) -> N
     assert "quadrature of its effective potential" in str(found)
     tightest = min(row.error for row in found.rows if row.error is not None)
     assert 1e-13 < tightest < 1e-6
+
+
+def test_every_row_names_form_and_solver(pendulum: Comparison) -> None:
+    ida = {f"dae ({level}), IDA" for level in ("ggl", "index1-projected", "index1")}
+    assert {row.label for row in pendulum.rows} == ida | {
+        "reduced, IDA", "reduced, explicit", "reduced, gauss", "dae, explicit",
+    }  # fmt: skip
+    assert all(label in str(pendulum) for label in ida)
+
+
+def test_a_level_is_named_only_where_the_solver_has_one() -> None:
+    said = {solver: simulate(Pendulum(), form="dae", solver=solver, t_end=0.1).method for solver in ("ida", "explicit")}
+    assert said == {"ida": "dae (ggl), IDA", "explicit": "dae, explicit"}
+    assert how_solved("dae", "ggl", ["explicit", "ida", "explicit"]) == "dae, explicit, then dae (ggl), IDA"
+    assert how_solved("reduced", "", []) == "reduced"

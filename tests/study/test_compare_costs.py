@@ -67,10 +67,9 @@ def test_figures_come_with_what_they_were_measured_on(found, tmp_path):
     assert set(found.environment) == {"processor", "system", "python", "versions", "blas", "threads", "load", "date"}
     assert "sundials" in found.environment["versions"]
     assert json.loads(json.dumps(found.to_dict()))["environment"] == dict(found.environment)
-    lines = found.save(tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines()
-    told = [line for line in lines if line.startswith("# ")]
-    assert told[0].startswith("# processor: ")
-    rows = list(csv.DictReader(lines[len(told) :]))
+    rows = list(csv.DictReader(found.save(tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines()))
+    beside = json.loads((tmp_path / "rows.csv.json").read_text(encoding="utf-8"))
+    assert beside["contents"][0]["about"]["environment"] == dict(found.environment)
     assert len(rows) == len(found.rows)
     assert [float(row["error"]) for row in rows] == [row.error for row in found.rows]
     with pytest.raises(UsageError, match="csv"):
@@ -78,8 +77,8 @@ def test_figures_come_with_what_they_were_measured_on(found, tmp_path):
 
 
 def test_forms_keep_their_colours_whatever_else_is_shown():
-    labels = ["dae (ggl)", "reduced", "reduced, explicit", "something else"]
-    assert style_of("reduced", labels) == style_of("reduced", ["reduced"])
+    labels = ["dae (ggl), IDA", "reduced, IDA", "reduced, explicit", "something else"]
+    assert style_of("reduced, IDA", labels) == style_of("reduced, IDA", ["reduced, IDA"])
     assert len({style_of(label, labels) for label in labels}) == 4
     reference = Reference("closed form", "one", [0.0], {}, {}, 0.0)
     rows = [ComparisonRow("dae", "ggl", "SUNDIALS IDA", 1e-4, error=1e-4, wall_s=1e-3, steps=10)]

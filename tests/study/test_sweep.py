@@ -424,7 +424,7 @@ def made_for_files() -> Any:
 def test_csv(tmp_path: Any) -> None:
     found = made_for_files()
     with found.save(tmp_path / "a.csv").open(newline="") as file:
-        *rows, _ = csv.DictReader(file)  # the last line holds the checksum
+        rows = list(csv.DictReader(file))
     assert len(rows) == 6
     assert [row["status"] for row in rows] == ["finished"] * 3 + ["failed"] * 3
     assert float(rows[2]["bob.position.z [m]"]) == found["bob.position.z"][0, 2]

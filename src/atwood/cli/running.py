@@ -147,14 +147,14 @@ def _keep(result: Result, request: RunRequest) -> None:
 
 def _save_with_energies(result: Result, file: Path) -> None:
     """Save all trajectories, and the energies of components with them."""
-    from atwood.result.about import describe_run
+    from atwood.result.about import describe_all
     from atwood.result.files import SavedResult, write_trajectories
 
     more = result.energy.parts.trajectories()
     units = {path: result.unit(path) for path in result.paths} | dict(more.units)
     meanings = {path: result.describe(path) for path in result.paths} | dict(more.meanings)
     found = {**result.table(), **more.quantities}
-    write_trajectories(SavedResult(result.time, found, units, meanings, describe_run(result)), file)
+    write_trajectories(SavedResult(result.time, found, units, meanings, describe_all(result)), file)
 
 
 def _keep_what_came_before(error: AtwoodError, request: RunRequest) -> None:

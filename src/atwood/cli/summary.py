@@ -36,8 +36,7 @@ def print_summary(result: Result, request: RunRequest) -> None:
         What was asked for.
     """
     out = writer()
-    form = f"{result.form} form" + (f" ({result.level})" if result.form == "dae" else "")
-    out.line((result.assembly.flat.name, "bold"), (f", {form}", ""))
+    out.line((result.assembly.flat.name, "bold"), (f", {result.method}", ""))
     out.pairs(list(_facts(result)))
     out.line()
     paths = main_quantities(result)

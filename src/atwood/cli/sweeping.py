@@ -182,8 +182,7 @@ def _print(found: Sweep, request: SweepRequest) -> None:
     from rich.text import Text
 
     out = console()
-    form = f"{found.form} form" + (f" ({found.level})" if found.form == "dae" else "")
-    out.print(Text.assemble((found.scene, "bold"), f", {form}, to t = {found.time[-1]:g} s"))
+    out.print(Text.assemble((found.scene, "bold"), f", {found.form} form, to t = {found.time[-1]:g} s"))
     facts = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     facts.add_column(style="cyan", no_wrap=True)
     facts.add_column()

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from atwood.errors import AtwoodError
+from atwood.model.compose.serialization import to_data
 from atwood.result.result import Result
 
-__all__ = ["describe_run", "solver_name", "versions"]
+__all__ = ["describe_all", "describe_run", "solver_name", "versions"]
 
 
 def versions() -> dict[str, str]:
@@ -53,6 +56,7 @@ def describe_run(result: Result) -> dict[str, Any]:
         "scene": flat.name,
         "form": result.form,
         "level": result.level,
+        "method": result.method,
         "status": result.status,
         "message": result.message,
         "t_start": float(result.start.time),
@@ -103,3 +107,72 @@ def describe_run(result: Result) -> dict[str, Any]:
         },
         "versions": versions(),
     }
+
+
+def describe_all(result: Result) -> dict[str, Any]:
+    """Return the same with all that a run is made again from: every parameter, the scene, and what was asked for.
+
+    Parameters
+    ----------
+    result
+        The run.
+
+    Returns
+    -------
+    dict
+        As `describe_run`, with ``"parameters"`` by path in SI units, ``"source"``, the scene as `to_data` writes it, and
+        the arguments of `simulate` under ``"asked"``, ``"again"``; ``"no_source"`` says why there is no scene.
+    """
+    found, source = describe_run(result), result.assembly.source
+    scene = None if source is None else source.scene
+    parts = [one.component for one in result.assembly.flat.parts.values()]
+    found["parameters"] = dict(_values(parts if scene is None else [scene]))
+    try:
+        found |= {"no_source": "it was assembled from leaves"} if scene is None else {"source": to_data(scene)}
+    except AtwoodError as error:
+        found["no_source"] = str(error)
+    found["asked"]["again"] = _arguments(result)
+    return found
+
+
+def _values(waiting: list[Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the parameters and inputs of components, and of all in them, with their paths; functions as text."""
+    while waiting:
+        one = waiting.pop(0)
+        waiting.extend(one._children().values())
+        for name in (*one.parameter_specs(), *one.signal_specs()):
+            value = one._value(name)
+            text = getattr(value, "text", "a function of time") if callable(value) else value
+            yield f"{one.path}.{name}".lstrip("."), text
+
+
+def _arguments(result: Result) -> dict[str, Any]:
+    """Return the arguments of `simulate` for the same run; None for a condition that is a function."""
+    options, assembly = result.run.options, result.assembly
+    outputs = options.outputs
+    asked = {
+        "form": assembly.form,
+        "level": assembly.level or None,
+        "orientation": assembly.orientation.kind,
+        "t_end": options.t_end,
+        "outputs": int(outputs) if isinstance(outputs, (int, np.integer)) else np.asarray(outputs).tolist(),
+        "max_steps": options.max_steps,
+        "max_seconds": options.max_seconds,
+        "max_step": options.max_step,
+        "solver": options.solver,
+        "order": options.order,
+        "step": options.step,
+        "samples": options.samples,
+        "structure": options.structure,
+        "nominal": dict(options.nominal) or None,
+    }
+    if options.accuracy is None:
+        asked |= {"rtol": options.relative_tolerance, "atol": options.absolute_tolerance}
+    else:
+        asked["accuracy"] = options.accuracy
+    found = {name: value for name, value in asked.items() if value is not None}
+    for name, is_end in (("until", True), ("record", False)):
+        given = [one.given for one in options.conditions if (one.target == "stop") is is_end]
+        if given:
+            found[name] = given if all(isinstance(one, str) for one in given) else None
+    return found

@@ -1,12 +1,12 @@
 """Results in files: NetCDF-3, NPZ, MATLAB and CSV.
 
-A file appears under its name only once it is complete. NetCDF, NPZ and MATLAB keep numbers exactly, with units,
-meanings and everything that is known about the run; CSV keeps numbers, paths and units, so that any program can read
-it.
+A file appears under its name only once it is complete, and keeps numbers exactly, with units, meanings and everything
+that is known about the run: its parameters, its scene, what was asked for, and versions. So it can be run again.
 
 Each holds a checksum of its contents, so that a file that was cut off or damaged is refused and never gives other
-values. In a CSV it stands in a last line that begins with ``#``, and the headings are in quotes, which says that there
-is such a line. Files of older versions have none.
+values. Of a CSV the checksum and all that is no number stand in a file beside it, ``run.csv.json``, so that any program
+can read it; alone it is read unchecked. In older versions the checksum stood in a last line that begins with ``#``, and
+the headings were in quotes, which says that there is such a line; still older ones have none.
 """
 
 from __future__ import annotations
@@ -29,8 +29,10 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.files import check_directory, read_checked, write_atomically
 from atwood.late import dataclass
+from atwood.model.compose.composite import Model
 from atwood.model.declare.quantities import PATHS, Quantity
-from atwood.result.about import describe_run
+from atwood.result.about import describe_all
+from atwood.result.formats.companion import read_with_companion, write_with_companion
 from atwood.result.formats.dataset import Dataset, json_text
 from atwood.result.formats.matlab import read_matlab, write_matlab
 from atwood.result.formats.netcdf import read_netcdf, write_netcdf
@@ -52,9 +54,9 @@ class SavedResult(Trajectories):
     quantities
         Trajectories by path.
     units, meanings
-        SI unit and one line of meaning by path; CSV files hold no meanings.
+        SI unit and one line of meaning by path; a CSV file alone holds no meanings.
     metadata
-        What was known about the run; empty for CSV files.
+        What was known about the run; empty for a CSV file without the one beside it.
     """
 
     time: FloatArray
@@ -74,6 +76,44 @@ class SavedResult(Trajectories):
     def status(self) -> str:
         """How the run ended; empty if the file does not say."""
         return str(self.metadata.get("status", ""))
+
+    def scene(self) -> Model:
+        """Return the scene that was run, as `load_scene` reads it: ``simulate(saved.scene(), **saved.settings())``.
+
+        Raises
+        ------
+        UsageError
+            If the file does not hold it, or a class in it cannot be found.
+        """
+        from atwood.model.compose.serialization import from_data
+
+        return from_data(self._held("source"))
+
+    def settings(self, **others: Any) -> dict[str, Any]:
+        """Return what `simulate` was asked for, to run the scene again.
+
+        Parameters
+        ----------
+        **others
+            Arguments that take the place of those of then.
+
+        Raises
+        ------
+        UsageError
+            If the file does not say, or a condition was a function of Python, which no file holds, and is not given.
+        """
+        asked = {**self._held("asked").get("again", {}), **others}
+        for name in ("until", "record"):
+            if name not in others and asked.get(name, ()) is None:
+                advice = f"Give settings({name}=...) the function, or None to run without."
+                raise UsageError(f"{name!r} was a function, which files do not hold", where=name, advice=advice)
+        return asked
+
+    def _held(self, name: str) -> Any:
+        if not isinstance(self.metadata.get(name), Mapping):
+            why = self.metadata.get("no_source", "it is of an older version, or a CSV file alone")
+            raise UsageError(f"the file does not say how to run it again: {why}", advice="Run the scene itself.")
+        return self.metadata[name]
 
     def unit(self, path: str) -> str:
         """Return the SI unit of a quantity."""
@@ -99,9 +139,8 @@ class SavedResult(Trajectories):
         return self.metadata
 
     def _facts(self) -> Iterator[tuple[str, str]]:
-        form, level = str(self.metadata.get("form", "")), str(self.metadata.get("level", ""))
-        kind = f", {form} form" + (f" ({level})" if level else "") if form else ""
-        yield "SavedResult", f"{self.metadata.get('scene', 'a run')}{kind}"
+        kind = self.metadata.get("method", self.metadata.get("form", ""))
+        yield "SavedResult", f"{self.metadata.get('scene', 'a run')}{kind and ', '}{kind}"
         if self.status:
             yield "status", self.status.replace("_", " ")
         if len(self.time):
@@ -140,7 +179,7 @@ def save_result(result: Result, file: str | os.PathLike[str], paths: Iterable[st
         result.table(wanted),
         {path: result.unit(path) for path in wanted},
         {path: result.describe(path) for path in wanted},
-        describe_run(result),
+        describe_all(result),
     )
     return write_trajectories(saved, file)
 
@@ -148,7 +187,10 @@ def save_result(result: Result, file: str | os.PathLike[str], paths: Iterable[st
 def write_trajectories(saved: SavedResult, file: str | os.PathLike[str]) -> Path:
     """Write trajectories to a file, and return it; see `save_result`."""
     target, (write, _) = Path(file), _format_of(Path(file))
-    write_atomically(target, lambda part: write(saved, part))
+    if write is _write_csv:
+        write(saved, target)
+    else:
+        write_atomically(target, lambda part: write(saved, part))
     return target
 
 
@@ -274,29 +316,29 @@ _HEADING = re.compile(r"(.+) \[(.*)\]$")
 
 
 _LAST_LINE = "# rows: {rows}, sha256: {checksum}\n"
+"""Of older versions."""
 
 
 def _write_csv(saved: SavedResult, file: Path) -> None:
     columns = [saved.time.tolist(), *(values.tolist() for values in saved.quantities.values())]
     text = io.StringIO()
-    headings = ["time [s]", *(f"{path} [{saved.units[path]}]" for path in saved.quantities)]
-    csv.writer(text, lineterminator="\n", quoting=csv.QUOTE_ALL).writerow(headings)
     writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["time [s]", *(f"{path} [{saved.units[path]}]" for path in saved.quantities)])
     writer.writerows([repr(value) for value in row] for row in zip(*columns, strict=True))
-    content = text.getvalue().encode()
-    checksum = hashlib.sha256(content).hexdigest()
-    file.write_bytes(content + _LAST_LINE.format(rows=len(saved.time), checksum=checksum).encode())
+    about = {"meanings": saved.meanings, "metadata": saved.metadata}
+    write_with_companion(file, text.getvalue().encode(), about)
 
 
 def _read_csv(file: Path) -> SavedResult:
-    content = file.read_bytes().replace(b"\r\n", b"\n")
-    if content.startswith(b'"'):
-        cut = content.rstrip(b"\n").rfind(b"\n") + 1
-        content, last = content[:cut], content[cut:].decode()
-        expected = _LAST_LINE.format(rows=content.count(b"\n") - 1, checksum=hashlib.sha256(content).hexdigest())
+    content, about = read_with_companion(file)
+    if content.startswith('"'):
+        cut = content.rstrip("\n").rfind("\n") + 1
+        content, last = content[:cut], content[cut:]
+        checksum = hashlib.sha256(content.encode()).hexdigest()
+        expected = _LAST_LINE.format(rows=content.count("\n") - 1, checksum=checksum)
         if last.strip() != expected.strip():
             raise ValueError("it is cut off, or its checksum is that of other contents")
-    reader = csv.reader(io.StringIO(content.decode(), newline=""))
+    reader = csv.reader(io.StringIO(content, newline=""))
     headings = next(reader)
     rows = [[float(value) for value in row] for row in reader]
     units: dict[str, str] = {}
@@ -308,7 +350,7 @@ def _read_csv(file: Path) -> SavedResult:
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(headings)).T
     quantities = dict(zip(units, values, strict=True))
     time = quantities.pop("time")
-    return SavedResult(time, quantities, {path: units[path] for path in quantities})
+    return SavedResult(time, quantities, {path: units[path] for path in quantities}, **(about or {}))
 
 
 # -- which -------------------------------------------------------------------------------------------------------------

@@ -30,6 +30,7 @@ from atwood.simulation.events.modes import EventRecord
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
 from atwood.simulation.initialization.start import Start, own_state
+from atwood.simulation.problem.options import how_solved
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
 from atwood.simulation.run.made import Run
@@ -90,6 +91,11 @@ class Result(Trajectories):
     def level(self) -> str:
         """Level of the dae form; empty for the reduced form."""
         return self.assembly.level
+
+    @property
+    def method(self) -> str:
+        """Form and solver in words, such as ``"dae (ggl), IDA"``; a level is that of IDA's equations."""
+        return how_solved(self.form, self.level, (one.solver for one in self.run.choices))
 
     @property
     def status(self) -> str:
@@ -378,8 +384,7 @@ class Result(Trajectories):
         return {"scene": self.assembly.flat.name, "form": self.form, "level": self.level, "status": self.status}
 
     def _facts(self) -> Iterator[tuple[str, str]]:
-        form = f"{self.form} form" + (f" ({self.level})" if self.level else "")
-        yield "Result", f"{self.assembly.flat.name}, {form}"
+        yield "Result", f"{self.assembly.flat.name}, {self.method}"
         yield "status", self.status.replace("_", " ") + (f": {self.message}" if self.message else "")
         if not self.run.segments:
             return

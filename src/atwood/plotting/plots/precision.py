@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 __all__ = ["plot_comparison", "style_of"]
 
 _STYLES = {
-    "reduced": (COLOURS[0], "o"),
+    "reduced, IDA": (COLOURS[0], "o"),
     "reduced, explicit": (COLOURS[2], "s"),
     "reduced, gauss": (COLOURS[4], "P"),
-    "dae (ggl)": (COLOURS[1], "D"),
-    "dae (index1-projected)": (COLOURS[3], "^"),
-    "dae (index1)": (COLOURS[6], "v"),
+    "dae (ggl), IDA": (COLOURS[1], "D"),
+    "dae (index1-projected), IDA": (COLOURS[3], "^"),
+    "dae (index1), IDA": (COLOURS[6], "v"),
 }
 """Colour and marker of each form and method, the same in all pictures; others have what is left."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 
 import numpy as np
@@ -14,7 +14,7 @@ from atwood.late import dataclass
 from atwood.simulation.problem.conditions import Condition
 from atwood.tolerances import tolerances
 
-__all__ = ["FIXED_STEPS", "SOLVERS", "RunOptions", "Samples", "sample_times"]
+__all__ = ["FIXED_STEPS", "SOLVERS", "RunOptions", "Samples", "how_solved", "sample_times"]
 
 
 SOLVERS = {
@@ -26,6 +26,28 @@ SOLVERS = {
     "composition": "composition, symplectic",
 }
 """What can solve a scene, and what it is called."""
+
+_WORDS = {"ida": "IDA", "ida-sundae": "IDA", "taylor": "Taylor series"}
+
+
+def how_solved(form: str, level: str, solvers: Iterable[str]) -> str:
+    """Return form and solver in words, ``"dae (ggl), IDA"``, with each solver where it was changed on the way.
+
+    Levels say how constraints enter the residual of IDA; other methods have none.
+
+    Parameters
+    ----------
+    form, level
+        Of the assembly.
+    solvers
+        Keys of `SOLVERS`, or their values, in the order in which they took turns.
+    """
+    keys = {name: key for key, name in SOLVERS.items()}
+    found = []
+    for one in dict.fromkeys(_WORDS.get(keys.get(each, each), keys.get(each, each)) for each in solvers):
+        found.append(f"{form} ({level}), {one}" if level and one == "IDA" else f"{form}, {one}")
+    return ", then ".join(found) or form
+
 
 FIXED_STEPS = ("gauss", "composition")
 """Those whose steps are equal, which take an order and a step."""

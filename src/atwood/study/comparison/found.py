@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import field
@@ -11,10 +12,11 @@ from typing import Any
 
 from atwood.arguments import FILE, takes
 from atwood.errors import UsageError
-from atwood.files import check_directory, write_atomically
+from atwood.files import check_directory
 from atwood.late import dataclass, names_of
+from atwood.result.formats.companion import write_with_companion
 from atwood.showing import count_of, fitted, html_table
-from atwood.simulation.problem.options import SOLVERS
+from atwood.simulation.problem.options import how_solved
 from atwood.study.comparison.reference import Reference
 from atwood.study.comparison.verdict import judge
 
@@ -90,10 +92,8 @@ class ComparisonRow:
 
     @property
     def label(self) -> str:
-        """Form and level in words, and the method where it is not the one that both forms share."""
-        form = f"{self.form} ({self.level})" if self.level else self.form
-        other = next((key for key in ("explicit", "gauss") if self.solver == SOLVERS[key]), "")
-        return f"{form}, {other}" if other else form
+        """Form, level and solver in words, such as ``"dae (ggl), IDA"``."""
+        return how_solved(self.form, self.level, [self.solver])
 
     def cells(self) -> tuple[str, ...]:
         """Return error, estimate, ms, steps, residuals, Jacobians, and drifts of energy and constraints as texts."""
@@ -177,7 +177,7 @@ class Comparison:
 
     @takes(file=FILE)
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save the rows as CSV, below the environment in lines that begin with ``#``.
+        """Save the rows as CSV, and the environment in a file beside it, ``rows.csv.json``.
 
         Parameters
         ----------
@@ -217,18 +217,15 @@ def write_rows(comparisons: Sequence[Comparison], file: str | os.PathLike[str]) 
     target = check_rows_file(file)
     names = ["scene", "t_end", *names_of(ComparisonRow)]
 
-    def write(part: Path) -> None:
-        with part.open("w", newline="", encoding="utf-8") as stream:
-            for key, value in (comparisons[0].environment if comparisons else {}).items():
-                stream.write(f"# {key}: {value}\n")
-            table = csv.writer(stream)
-            table.writerow(names)
-            for one in comparisons:
-                for row in one.rows:
-                    cells = (getattr(row, name) for name in names[2:])
-                    table.writerow([one.scene, one.t_end, *("" if cell is None else cell for cell in cells)])
-
-    write_atomically(target, write)
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(names)
+    for one in comparisons:
+        for row in one.rows:
+            cells = (getattr(row, name) for name in names[2:])
+            table.writerow([one.scene, one.t_end, *("" if cell is None else cell for cell in cells)])
+    environment = comparisons[0].environment if comparisons else {}
+    write_with_companion(target, text.getvalue().encode(), {"environment": environment})
     return target
 
 

@@ -22,6 +22,7 @@ from atwood.progress import told
 from atwood.result.result import Result
 from atwood.showing import fitted
 from atwood.simulation.problem.arguments import LIMITS, NAME, PROGRESS
+from atwood.simulation.problem.options import how_solved
 from atwood.study.comparison.environment import environment
 from atwood.theory.symmetries import conserved
 
@@ -80,7 +81,7 @@ class LongRow:
     @property
     def label(self) -> str:
         """Form, method and tolerance."""
-        return f"{self.form}, {self.solver}, rtol {self.rtol:.0e}"
+        return f"{how_solved(self.form, 'ggl' * (self.form == 'dae'), [self.solver])}, rtol {self.rtol:.0e}"
 
     @property
     def grows(self) -> bool:

@@ -1,8 +1,8 @@
 """Sweeps in files: NetCDF-3, NPZ, MATLAB, CSV and JSON.
 
 A file appears under its name only once it is complete, and holds a checksum, so that one that was cut off or damaged is
-refused. In a CSV the checksum stands in a last line that begins with ``#``, with what is no number. Files of older
-versions, NetCDF and JSON, have none and are read as before.
+refused. Of a CSV the checksum stands in a file beside it, ``runs.csv.json``, with what is no number; in older versions,
+in a last line that begins with ``#``. NetCDF and JSON files of older versions have none and are read as before.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from atwood.arguments import FILE, instance, takes
 from atwood.errors import UsageError
 from atwood.files import check_directory, read_checked, write_atomically
+from atwood.result.formats.companion import read_with_companion, write_with_companion
 from atwood.result.formats.dataset import Dataset, Variable
 from atwood.result.formats.matlab import read_matlab, write_matlab
 from atwood.result.formats.netcdf import read_netcdf, write_netcdf
@@ -56,7 +57,10 @@ def save_sweep(sweep: Sweep, file: str | os.PathLike[str]) -> Path:
     """
     target = Path(file)
     write, _ = _format_of(target)
-    write_atomically(target, lambda part: write(sweep, part))
+    if write is _write_csv:
+        write(sweep, target)
+    else:
+        write_atomically(target, lambda part: write(sweep, part))
     return target
 
 
@@ -165,6 +169,7 @@ def _from_dict(data: Mapping[str, Any], meanings: Mapping[str, str]) -> Sweep:
 # -- CSV ---------------------------------------------------------------------------------------------------------------
 
 _LAST_LINE = "# rows: {rows}, sha256: {checksum}, about: {about}\n"
+"""Of older versions."""
 
 
 def _write_csv(sweep: Sweep, file: Path) -> None:
@@ -174,8 +179,8 @@ def _write_csv(sweep: Sweep, file: Path) -> None:
     heads += [_head(path, sweep.units[path]) for path in sweep.paths]
     varied = [values.tolist() for values in sweep.varied.values()]
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n", quoting=csv.QUOTE_ALL).writerow(heads)
     writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(heads)
     for run, status in enumerate(sweep.status):
         first = [run, status, *(_cell(values[run]) for values in varied)]
         for k, t in enumerate(sweep.time.tolist()):
@@ -183,11 +188,7 @@ def _write_csv(sweep: Sweep, file: Path) -> None:
             writer.writerow([*first, _cell(t), *row])
     whole = sweep.to_dict()
     known = {"end_time": whole["end_time"], "steps": whole["steps"]}
-    about = json.dumps({**about_sweep(sweep), **known, "meanings": dict(sweep.meanings)}, allow_nan=False)
-    content = text.getvalue()
-    checksum = hashlib.sha256((content + about).encode()).hexdigest()
-    rows = len(sweep) * len(sweep.time)
-    file.write_bytes((content + _LAST_LINE.format(rows=rows, checksum=checksum, about=about)).encode())
+    write_with_companion(file, text.getvalue().encode(), {**about_sweep(sweep), **known, "meanings": sweep.meanings})
 
 
 def _head(name: str, unit: str) -> str:
@@ -199,15 +200,9 @@ def _cell(value: Any) -> Any:
 
 
 def _read_csv(file: Path) -> Sweep:
-    content = file.read_bytes().replace(b"\r\n", b"\n").decode()
-    cut = content.rstrip("\n").rfind("\n") + 1
-    content, last = content[:cut], content[cut:]
-    about_text = last.partition(", about: ")[2].rstrip("\n")
-    checksum = hashlib.sha256((content + about_text).encode()).hexdigest()
-    rows = content.count("\n") - 1
-    if last.strip() != _LAST_LINE.format(rows=rows, checksum=checksum, about=about_text).strip():
-        raise ValueError("it is cut off, or its checksum is that of other contents")
-    about = json.loads(about_text)
+    content, about = read_with_companion(file)
+    if about is None:
+        content, about = _of_older_versions(content)
     heads, *lines = csv.reader(io.StringIO(content, newline=""))
     columns = list(zip(*lines, strict=True))
     runs = int(np.prod(about["shape"]))
@@ -231,6 +226,19 @@ def _read_csv(file: Path) -> Sweep:
         end_time=np.array(about["end_time"], dtype=float),
         steps=np.array(about["steps"]),
     )
+
+
+def _of_older_versions(content: str) -> tuple[str, Mapping[str, Any]]:
+    """Return the table of a CSV, and what its last line says."""
+    cut = content.rstrip("\n").rfind("\n") + 1
+    content, last = content[:cut], content[cut:]
+    about_text = last.partition(", about: ")[2].rstrip("\n")
+    checksum = hashlib.sha256((content + about_text).encode()).hexdigest()
+    rows = content.count("\n") - 1
+    if last.strip() != _LAST_LINE.format(rows=rows, checksum=checksum, about=about_text).strip():
+        raise ValueError("it is cut off, or the file beside it (.csv.json) is missing")
+    about: Mapping[str, Any] = json.loads(about_text)
+    return content, about
 
 
 def _unit(head: str, name: str) -> str:

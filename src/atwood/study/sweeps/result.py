@@ -117,9 +117,8 @@ class Sweep:
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         """Yield what there is to say of it in a few lines; the first is its title."""
-        form = f"{self.form} form" + (f" ({self.level})" if self.level else "")
         grid = f", a grid of {' x '.join(map(str, self.shape))}" if len(self.shape) > 1 else ""
-        yield "scene", f"{self.scene}, {form}: {count_of(len(self), 'run')}{grid}"
+        yield "scene", f"{self.scene}, {self.form} form: {count_of(len(self), 'run')}{grid}"
         ranges = (f"{path} {_range(values)} {self.units.get(path, '')}" for path, values in self.varied.items())
         yield "varied", listed((text.strip() for text in ranges), 4)
         many = count_of(len(self.time), "time")
