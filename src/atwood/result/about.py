@@ -120,8 +120,8 @@ def describe_all(result: Result) -> dict[str, Any]:
     Returns
     -------
     dict
-        As `describe_run`, with ``"parameters"`` by path in SI units, ``"source"``, the scene as `to_data` writes it, and
-        the arguments of `simulate` under ``"asked"``, ``"again"``; ``"no_source"`` says why there is no scene.
+        As `describe_run`, with ``"parameters"`` by path in SI units, ``"source"``, the scene as `to_data` writes it,
+        and the arguments of `simulate` under ``"asked"``, ``"again"``; ``"no_source"`` says why there is no scene.
     """
     found, source = describe_run(result), result.assembly.source
     scene = None if source is None else source.scene
