@@ -15,7 +15,7 @@ class SampleAndHold(Component):
     u: float = signal(0.0, unit="any", doc="What is taken.")
     y: Scalar = discrete_state(start, unit="any", doc="What is held.")
 
-    @update(every="period", sets="y")
+    @update(every="period", sets="y", pure=True)
     def take(self) -> float:
         """Return the input."""
         return self.u

@@ -19,13 +19,13 @@ class SampleDelay(Component):
     stored: Any = discrete_state(start, unit="any", count="samples", doc="What has been taken, the last first.")
     y: Scalar = discrete_state(start, unit="any", doc="What is put out.")
 
-    @update(every="period", sets="y", reads=())
+    @update(every="period", sets="y", reads=(), pure=True)
     def put_out(self) -> float:
         """Return what was taken so many samples before."""
         value: float = self.stored[-1]
         return value
 
-    @update(every="period", sets="stored")
+    @update(every="period", sets="stored", pure=True)
     def take(self) -> list[float]:
         """Return what is stored from now on."""
         return [self.u, *self.stored[:-1]]

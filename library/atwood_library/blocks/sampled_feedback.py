@@ -33,7 +33,7 @@ class SampledFeedback(Component):
             if len(given) > most or isinstance(given[0], tuple):
                 raise ParameterError(f"it is not a row of {most} numbers at most", where=f"{self.path}.{name}")
 
-    @update(every="period", sets="y")
+    @update(every="period", sets="y", pure=True)
     def work_out(self) -> float:
         """Return the command."""
         measured = (self.u_1, self.u_2, self.u_3, self.u_4, self.u_5, self.u_6)

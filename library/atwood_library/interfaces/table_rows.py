@@ -35,22 +35,36 @@ def read_table(value: Any, where: str) -> Any:
 
 
 def _read_csv(file: Path, where: str) -> list[list[float]]:
+    """Return the first two columns of a file; beside semicolons, tabs or spaces a comma is before decimals."""
     import csv
 
     try:
-        with file.open(newline="") as stream:
-            lines = list(csv.reader(stream, delimiter=","))
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
     except OSError as error:
         raise ParameterError(f"the file {str(file)!r} cannot be read ({error.strerror})", where=where) from None
+    except UnicodeDecodeError:
+        raise ParameterError(f"the file {str(file)!r} is no text", where=where) from None
+    kept = [(number, line) for number, line in enumerate(lines, start=1) if line.strip() and line.lstrip()[0] != "#"]
+    mark = next((one for one in ";\t," if any(one in line for _, line in kept)), " ")
     rows: list[list[float]] = []
-    for number, line in enumerate(lines, start=1):
-        if not line or line[0].lstrip().startswith("#"):
-            continue
+    width = 0
+    for number, line in kept:
+        (cells,) = csv.reader([line.strip(" ")], delimiter=mark, skipinitialspace=True)
         try:
-            rows.append([float(text) for text in line[:2]])
+            row = [float(text if mark == "," else text.replace(",", ".")) for text in cells[:2]]
         except ValueError:
-            if rows:
+            if rows or any(cell[:1].isdigit() for cell in cells[:2]):
                 raise ParameterError(f"line {number} of {str(file)!r} is no row of numbers", where=where) from None
+            width = 2 * len(cells)  # of a row in which each number has a comma
+            continue
+        if len(cells) == width if not rows else len(cells) != width:
+            raise ParameterError(
+                f"line {number} of {str(file)!r} has {len(cells)} cells, unlike those before it",
+                where=where,
+                advice="Where a comma is before decimals, separate cells by semicolons.",
+            )
+        rows.append(row)
+        width = len(cells)
     if not rows:
         raise ParameterError(f"{str(file)!r} has no rows of numbers", where=where)
     return rows

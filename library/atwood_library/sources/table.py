@@ -71,7 +71,7 @@ class Table(Component):
         """Return where its pieces begin."""
         return [row[0] for row in pieces_of(self.table, self.interpolation)]
 
-    @update(sets=("origin", "coefficients"), when="breakpoints", reads=())
+    @update(sets=("origin", "coefficients"), when="breakpoints", reads=(), pure=True)
     def enter(self) -> Sequence[float]:
         """Return the piece that begins now."""
         return piece_at({"table": self.table, "interpolation": self.interpolation}, float(self.time))

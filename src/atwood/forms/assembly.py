@@ -202,6 +202,11 @@ class Assembly:
         """The values of the relations by symbol."""
         return dict(zip((one.symbol for one in self.relations), self.relation_values, strict=True))
 
+    @property
+    def known_values(self) -> dict[Expression, float]:
+        """The values of parameters, discrete states and relations by symbol."""
+        return dict(zip(self.parameters, self.parameter_values.tolist(), strict=True))
+
     def with_relations(self, values: Iterable[float]) -> Assembly:
         """Return the same in another piece of a run, with the same programs."""
         return replace(self, given_relations=tuple(map(float, values)))

@@ -19,7 +19,7 @@ from atwood.arguments import (
 )
 from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion
 from atwood.model.declare.array_values import check_array
-from atwood.model.declare.function_values import make_function
+from atwood.model.declare.function_values import is_sympy, make_function
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.time_functions import check_function
 from atwood.model.values.units import Unit, parse_quantity, parse_si_unit
@@ -260,15 +260,21 @@ class SignalSpec(Field):
         super().__init__("signal", default, unit, doc)
 
     def check(self, value: Any, where: str) -> Any:
-        """Return a value that can drive this input, a number or a function of time, or refuse it.
+        """Return a value that can drive this input, a number, a formula of t or a function of time, or refuse it.
 
         Raises
         ------
         ParameterError
-            If it is no finite number in the right unit, or a function that cannot be evaluated on an expression.
+            If it is no finite number in the right unit, no formula of t, or a function that cannot be evaluated on an
+            expression.
         """
         if isinstance(value, ParameterExpression):
             return self._check_expression(value, where)
+        if isinstance(value, str) or is_sympy(value):
+            formula = make_function(value, ("t",), 1, self.unit, where)
+            if formula.depends_on("t"):
+                return formula
+            value = formula(0.0)
         if callable(value):
             check_function(value, where)
             return value

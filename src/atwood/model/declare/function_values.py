@@ -6,26 +6,25 @@ traced once, on a graph of its own, so that it can be differentiated, compared, 
 
 from __future__ import annotations
 
-import ast
 import inspect
 import math
-import operator
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from atwood.arguments import show
-from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion
-from atwood.expr.core import algebra, functions
+from atwood.errors import AtwoodError, ParameterError
+from atwood.expr.core import algebra
 from atwood.expr.core.analysis import evaluate, live
 from atwood.expr.core.derivatives import jvp
 from atwood.expr.core.functions import Scalar, graph_of
 from atwood.expr.core.graph import Expression, Graph
+from atwood.model.declare.formula_text import read_text, unknown_name
 from atwood.model.declare.time_functions import StoredFunction, steps_of
-from atwood.model.values.units import Unit, parse_quantity, split_quantity
+from atwood.model.values.units import Unit
 from atwood.model.values.vector import Vector
 
-__all__ = ["Function", "make_function", "read_function"]
+__all__ = ["Function", "is_sympy", "make_function", "read_function"]
 
 
 class Function:
@@ -231,8 +230,8 @@ def _traced(value: Any, symbols: Mapping[str, Expression], unit: Unit, where: st
     """Return what a function gives for symbols."""
     try:
         if isinstance(value, str):
-            return _of_text(value, symbols, unit, where)
-        if _is_sympy(value):
+            return read_text(value, symbols, unit, where)
+        if is_sympy(value):
             return _from_sympy(value, symbols, where)
         if callable(value):
             return _called(value, symbols, where)
@@ -272,7 +271,8 @@ def _called(value: Callable[..., Any], symbols: Mapping[str, Expression], where:
     return value(*symbols.values())
 
 
-def _is_sympy(value: Any) -> bool:
+def is_sympy(value: Any) -> bool:
+    """Return whether a value is a term of sympy."""
     sympy = sys.modules.get("sympy")
     return sympy is not None and isinstance(value, sympy.Basic)
 
@@ -282,88 +282,6 @@ def _from_sympy(value: Any, symbols: Mapping[str, Expression], where: str) -> Ex
 
     for one in value.free_symbols:
         if one.name not in symbols:
-            raise _unknown_name(one.name, symbols, where)
+            raise unknown_name(one.name, symbols, where)
     graph = next(iter(symbols.values())).graph
     return graph.convert(from_sympy(value, graph, {one: symbols[one.name] for one in value.free_symbols}))
-
-
-# -- formulas in text --------------------------------------------------------------------------------------------
-
-_NAMES: Mapping[str, Any] = {
-    "pi": math.pi,
-    "abs": functions.absolute,
-    "min": functions.minimum,
-    "max": functions.maximum,
-    **{
-        name: getattr(functions, name)
-        for name in (
-            *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sqrt"),
-            *("hypot", "absolute", "minimum", "maximum", "sign", "floor", "select"),
-        )
-    },
-}
-_OPERATORS: Mapping[type, Callable[..., Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-    ast.USub: operator.neg,
-    ast.UAdd: operator.pos,
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-}
-
-
-def _of_text(text: str, symbols: Mapping[str, Any], unit: Unit, where: str) -> Any:
-    """Return the value of a quantity, or of a formula."""
-    quantity_error: ParameterError | None = None
-    if split_quantity(text):
-        try:
-            return parse_quantity(text, unit, where)
-        except ParameterError as error:
-            quantity_error = error
-    try:
-        tree = ast.parse(text.strip().replace("^", "**"), mode="eval").body
-    except (SyntaxError, ValueError, MemoryError):
-        advice = f"Write it as '0.5*{next(iter(symbols))}**2', with {', '.join(symbols)}, pi and functions such as sin."
-        raise quantity_error or ParameterError(f"{show(text)} is no formula", where=where, advice=advice) from None
-    return _value_of(tree, symbols, where)
-
-
-def _unknown_name(name: str, symbols: Mapping[str, Any], where: str) -> ParameterError:
-    known = [*symbols, *_NAMES]
-    advice = suggestion(name, known) if near_matches(name, known) else f"It is a function of {', '.join(symbols)}."
-    return ParameterError(f"the formula reads {name!r}, which is no argument of it", where=where, advice=advice)
-
-
-def _value_of(node: ast.expr, symbols: Mapping[str, Any], where: str) -> Any:
-    """Return the value of a formula; nothing in it is run that is not arithmetic."""
-
-    def value(one: ast.expr) -> Any:
-        return _value_of(one, symbols, where)
-
-    if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)) and not isinstance(node.value, bool):
-        return float(node.value)
-    if isinstance(node, ast.Name):
-        if node.id in symbols:
-            return symbols[node.id]
-        if node.id != "pi":
-            raise _unknown_name(node.id, symbols, where)
-        return math.pi
-    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
-        return _OPERATORS[type(node.op)](value(node.left), value(node.right))
-    if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
-        return _OPERATORS[type(node.op)](value(node.operand))
-    if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in _OPERATORS:
-        return _OPERATORS[type(node.ops[0])](value(node.left), value(node.comparators[0]))
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
-        if node.func.id not in _NAMES or node.func.id == "pi":
-            raise _unknown_name(node.func.id, symbols, where)
-        return _NAMES[node.func.id](*map(value, node.args))
-    raise ParameterError(f"{ast.unparse(node)!r} has no place in a formula", where=where, advice=_ARITHMETIC)
-
-
-_ARITHMETIC = "A formula has numbers, its arguments, + - * / **, brackets and functions such as sin."

@@ -135,6 +135,7 @@ class UpdateOptions:
     at: str
     when: str
     reads: tuple[str, ...] | None
+    pure: bool
 
 
 def mark(function: F, law: Law) -> F:

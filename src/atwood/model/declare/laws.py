@@ -355,6 +355,7 @@ _MOMENT = either(NAME, number())
     at=TEXT,
     when=TEXT,
     reads=optional(_NAMES),
+    pure=FLAG,
 )
 def update(
     *,
@@ -364,6 +365,7 @@ def update(
     at: str = "",
     when: str = "",
     reads: Sequence[str] | None = None,
+    pure: bool = False,
 ) -> Callable[[_F], _F]:
     """Mark a method that is called at moments, on numbers, and returns new values of states.
 
@@ -386,9 +388,12 @@ def update(
     reads
         The inputs that it reads; all when None. A method that passes on only what was stored before reads none, ``()``,
         and comes first.
+    pure
+        Whether it returns the same whenever time, parameters, inputs and states are the same, and remembers nothing
+        else. Only then can a scene be solved twice, as its estimated error needs.
     """
     names = (sets,) if isinstance(sets, str) else tuple(sets)
-    options = UpdateOptions(names, every, offset, at, when, None if reads is None else tuple(reads))
+    options = UpdateOptions(names, every, offset, at, when, None if reads is None else tuple(reads), pure)
     return lambda function: mark(function, Law("update", function.__name__, options))
 
 

@@ -55,7 +55,7 @@ _BASE: dict[str, tuple[float, Exponents]] = {
 
 _RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
-_TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*(-?\d{1,2})|([*/·()])|([A-Za-z]+|1))")
+_TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*(-?\d{1,2})|([*/·.()])|(?:([A-Za-z]+)(-?[2-9]|-1)?|(1)))")
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
 
@@ -91,8 +91,9 @@ def parse_unit(text: str) -> Unit:
     Parameters
     ----------
     text
-        Unit names, and brackets of them, joined by ``*``, ``/`` or a space, each with an optional integer power. A
-        ``/`` divides by what comes next alone: ``kg/m s^2`` is ``kg*s^2/m``, ``kg/(m s^2)`` a pressure.
+        Unit names, and brackets of them, joined by ``*``, ``.``, ``/`` or a space, each with an optional integer
+        power (``m^2``, ``m2``). A ``/`` divides by what comes next alone: ``kg/m s^2`` is ``kg*s^2/m``, ``kg/(m s^2)``
+        a pressure.
 
     Raises
     ------
@@ -109,6 +110,8 @@ def parse_unit(text: str) -> Unit:
 
 
 def _unreadable(text: str) -> DeclarationError:
+    if re.match(r"\s*,\s*\d", text):
+        return DeclarationError("a number has a comma before its decimals", advice="Write a point, as in '1.5 m'.")
     return DeclarationError(f"cannot read the unit {text!r}", advice="Write it like 'kg*m^2', 'N/m' or 'kg/(m s^2)'.")
 
 
@@ -120,10 +123,11 @@ def _tokens(text: str) -> list[str]:
         match = _TOKEN.match(stripped, position)
         if match is None:
             raise _unreadable(text)
-        _, power, sign, name = match.groups()
-        if name and found and found[-1] not in "*/·(" and not stripped[position].isspace():
+        _, power, sign, name, raised, one = match.groups()
+        name = name or one
+        if name and found and found[-1] not in "*/·.(" and not stripped[position].isspace():
             raise _unreadable(text)
-        found.append(f"^{power}" if power else sign or name)
+        found += [f"^{power}" if power else sign or name, *([f"^{raised}"] if raised else [])]
         position = match.end()
     return found[::-1]
 
@@ -134,7 +138,7 @@ def _product(tokens: list[str], text: str) -> tuple[float, Exponents]:
     divides = needed = False
     while tokens and (needed or tokens[-1] != ")"):
         token = tokens.pop()
-        if token in "*/·" and not needed:
+        if token in "*/·." and not needed:
             divides, needed = token == "/", True
             continue
         size, powers = _factor(token, tokens, text)

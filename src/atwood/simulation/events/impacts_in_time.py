@@ -14,12 +14,13 @@ from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
+from atwood.late import replace
 from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
-from atwood.simulation.events.mode_change import generalized_speeds, plastic_impact
+from atwood.simulation.events.mode_change import LetsGo, generalized_speeds, plastic_impact
 from atwood.simulation.events.modes import EventRecord
 from atwood.tolerances import tolerances
 
@@ -51,6 +52,8 @@ def pass_time_event(
 
     Raises
     ------
+    LetsGo
+        If a one-sided constraint cannot bear the impulse of a jump of velocity, and lets go.
     SolveError
         If a prescribed position jumps, or prescribed velocities are infinite or contradict each other after the event.
     """
@@ -77,7 +80,11 @@ def pass_time_event(
     laws = {part: law for part, law, _ in reversed(faster)}
     message = "the speed of the prescribed motion jumps: an impact"
     impacts = tuple(EventRecord(t, part, law, message, "", True) for part, law in reversed(laws.items()))
-    big_u = plastic_impact(after, balance, impacts[0], (t, big_q, big_u), sizes)
+    try:
+        big_u = plastic_impact(after, balance, impacts[0], (t, big_q, big_u), sizes)
+    except LetsGo as error:  # other velocities may jump nevertheless
+        error.event = replace(error.event, impact=bool(laws.keys() - {error.event.part}))
+        raise
     left = np.abs(now.jacobian @ big_u + now.explicit_rate) / rows
     if np.max(left) > _HOLDS * fastest:
         raise SolveError(

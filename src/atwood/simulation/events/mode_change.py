@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from atwood.forms.places import to_maximal
 from atwood.forms.quantities import observer
 from atwood.linalg.matrices import is_full, scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
-from atwood.mechanics.outputs.event_functions import EventFunction, list_event_functions
+from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.line_signs import actual_line_signs
@@ -28,11 +28,9 @@ from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.tolerances import tolerances
 
-if TYPE_CHECKING:
-    pass
 from atwood.simulation.events.modes import EventRecord
 
-__all__ = ["enter_mode", "generalized_speeds", "generalized_state", "plastic_impact"]
+__all__ = ["LetsGo", "enter_mode", "generalized_speeds", "generalized_state", "plastic_impact"]
 
 
 _REACTION_EVENTS: Key[tuple[EventFunction, ...]] = Key("event functions that read reactions")
@@ -41,12 +39,25 @@ _REACTION_EVENTS: Key[tuple[EventFunction, ...]] = Key("event functions that rea
 _MAXIMAL: Key[tuple[Program, tuple[int, ...], tuple[int, ...]]] = Key("maximal coordinates and their Jacobian")
 
 
+class LetsGo(SolveError):
+    """An impact would need an impulse that a one-sided constraint cannot bear.
+
+    Attributes
+    ----------
+    event
+        The event in which its part lets go, with the mode that this leads to.
+    """
+
+    event: EventRecord
+
+
 def enter_mode(
     state: tuple[float, FloatArray, FloatArray],
     assembly: Assembly,
     event: EventRecord,
     reassemble: Reassemble,
     length: float,
+    also: Mapping[str, str] | None = None,
 ) -> tuple[Assembly, FloatArray, FloatArray]:
     """Return the scene in the mode that an event leads to, with its state.
 
@@ -62,11 +73,13 @@ def enter_mode(
         Gives the scene in other modes and orientation coordinates.
     length
         Extent of the scene, m.
+    also
+        Modes that other parts enter at the same time.
     """
     t, q, u = state
     big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
     line_signs = actual_line_signs(assembly, t, q, u, assembly.form)
-    after = reassemble({**assembly.modes, event.part: event.target}, line_signs, assembly.orientation)
+    after = reassemble({**assembly.modes, event.part: event.target, **(also or {})}, line_signs, assembly.orientation)
     sizes = motion_scales(after.maximal, length)
     balance = balance_of(after, "dae")
     if event.impact:
@@ -122,13 +135,18 @@ def plastic_impact(
     velocities, impulses = _solve_impact(now, u, sizes, balance.row_scales(now, t, q, sizes))
     size = float(np.max(np.abs(impulses), initial=0.0))
     for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
-        if abs(impulse) > 1e-9 * size and _is_refused(after, one, state, one.sign * impulse):
-            raise SolveError(
+        refusing = _refusing(after, one, state, one.sign * impulse) if abs(impulse) > 1e-9 * size else None
+        if refusing is not None:
+            error = LetsGo(
                 f"at t = {t:.6g} the impact ({event.message}, {event.part}) needs an impulse of the sign that "
                 "this one-sided constraint cannot transmit: a rope would have to push",
                 where=one.key[0],
                 advice="Simultaneous impacts of several one-sided constraints, some of which open, are not supported.",
             )
+            if refusing.target in ("", UPDATE):
+                raise SolveError(error.message, where=error.where, advice=error.advice)
+            error.event = EventRecord(t, refusing.part, refusing.law, refusing.message, refusing.target, False)
+            raise error
     return velocities
 
 
@@ -136,10 +154,10 @@ _SIZES = (1e-9, 1e9)
 """Between these, beside the impulses, lies any force that an event could compare a reaction with."""
 
 
-def _is_refused(
+def _refusing(
     after: Assembly, constraint: Constraint, state: tuple[float, FloatArray, FloatArray], impulse: float
-) -> bool:
-    """Return whether events of its part let go of a constraint for a reaction of this sign, however small or large.
+) -> EventFunction | None:
+    """Return the event of its part that lets go of a constraint for a reaction of this sign, however small or large.
 
     A limit in both directions, or one that is not zero, makes no constraint one-sided.
     """
@@ -148,7 +166,7 @@ def _is_refused(
         one for one in _reaction_event_functions(after) if one.part == part and depends_on(one.value, own)
     ]
     if not event_functions:
-        return False
+        return None
     t, q, u = state
     equations = after.maximal
     known: dict[Expression, float] = dict(zip(after.parameters, after.parameter_values, strict=True))
@@ -156,12 +174,12 @@ def _is_refused(
     known |= dict(zip((*equations.speeds, *equations.accelerations), (*u, *np.zeros_like(u)), strict=True))
     known |= dict.fromkeys((one.symbol for one in after.reactions), 0.0)
 
-    def lets_go(reaction: float) -> bool:
+    def letting_go(reaction: float) -> list[EventFunction]:
         values = evaluate([one.value for one in event_functions], {**known, **dict.fromkeys(own, reaction)})
-        return any(one.direction * value > 0.0 for one, value in zip(event_functions, values, strict=True))
+        return [one for one, value in zip(event_functions, values, strict=True) if one.direction * value > 0.0]
 
-    refused, other = (all(lets_go(sign * size * impulse) for size in _SIZES) for sign in (1.0, -1.0))
-    return refused and not other
+    refused, other = ([letting_go(sign * size * impulse) for size in _SIZES] for sign in (1.0, -1.0))
+    return refused[0][0] if all(refused) and not all(other) else None
 
 
 def _reaction_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:

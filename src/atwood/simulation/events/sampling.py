@@ -227,6 +227,12 @@ def _flat(value: Any) -> list[float]:
     return [float(value)]
 
 
+def remembering(assembly: Assembly) -> list[str]:
+    """Return the parts whose updates may give something else when a scene is solved once more."""
+    parts = assembly.flat.parts.items()
+    return [path for path, part in parts if any(not law.options.pure for law in part.component.laws("update"))]
+
+
 def refuse_updates(assembly: Assembly) -> None:
     """Refuse to solve a scene twice whose parts call functions at sample times.
 
@@ -240,14 +246,13 @@ def refuse_updates(assembly: Assembly) -> None:
     UsageError
         If it has such parts: what they call may remember what it was called with.
     """
-    for path, part in assembly.flat.parts.items():
-        if part.component.laws("update"):
-            raise UsageError(
-                "it calls functions at sample times, which may remember what they were called with: the scene is not "
-                "solved twice, and so has no estimated error",
-                where=path,
-                advice="Run it again with a smaller rtol, and compare.",
-            )
+    for path in remembering(assembly):
+        raise UsageError(
+            "it calls functions at sample times, which may remember what they were called with: the scene is not "
+            "solved twice, and so has no estimated error",
+            where=path,
+            advice="Mark them with @update(..., pure=True) if they do not; or run it again with a smaller rtol.",
+        )
 
 
 def find_sampler(assembly: Assembly, start: float, end: float, moments: FloatArray) -> Sampler:

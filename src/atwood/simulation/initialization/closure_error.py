@@ -68,7 +68,7 @@ def find_closure_errors(
     length
         Extent of the scene, m.
     """
-    table = {**assembly.mechanism.table.values, **assembly.known_relations}
+    table = assembly.known_values
     place = {**table, equations.time: t, **dict(zip(equations.coordinates, np.asarray(q).tolist(), strict=True))}
     signals = resolve_signals(assembly.mechanism, equations.site, equations.kinematics, equations.read)
     rows: dict[str, list[LocalConstraint]] = {}

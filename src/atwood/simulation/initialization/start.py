@@ -198,7 +198,7 @@ def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
     before, after = starting.regular, assembly.regular
     q = dict(zip(before.coordinates, start.coordinates.tolist(), strict=True))
     u = dict(zip(before.speeds, start.speeds.tolist(), strict=True))
-    place = {**assembly.mechanism.table.values, **assembly.known_relations, before.time: start.time, **q}
+    place = {**assembly.known_values, before.time: start.time, **q}
     sizes = np.maximum(coordinate_scales(before, start.length), np.abs(start.coordinates))
     integral_gradients = assembly.shared.get(
         _INTEGRAL_GRADIENTS, lambda: [jacobian([one.value], before.coordinates) for one in after.integrals]
@@ -225,8 +225,10 @@ def find_places(assembly: Assembly) -> dict[str, dict[Expression, float]]:
     start = find_start(assembly)
     reduced, maximal = assembly.regular, assembly.maximal
     q, _ = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
-    time = {assembly.mechanism.time: start.time, **assembly.known_relations}
+    held = (one.symbol for one in assembly.discrete_states)
+    known = {assembly.mechanism.time: start.time, **assembly.known_relations}
+    known |= dict(zip(held, assembly.held_at_start, strict=True))
     return {
-        "reduced": {**time, **dict(zip(reduced.coordinates, start.coordinates.tolist(), strict=True))},
-        "dae": {**time, **dict(zip(maximal.coordinates, (float(x) for x in q), strict=True))},
+        "reduced": {**known, **dict(zip(reduced.coordinates, start.coordinates.tolist(), strict=True))},
+        "dae": {**known, **dict(zip(maximal.coordinates, (float(x) for x in q), strict=True))},
     }

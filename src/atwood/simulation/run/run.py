@@ -13,6 +13,7 @@ from atwood.errors import AtwoodError, SolveError, StartError, UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
+from atwood.late import replace
 from atwood.mechanics.outputs.event_functions import UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
@@ -160,6 +161,7 @@ class _Walk:
         self.coordinate_switches: list[CoordinateSwitch] = []
         self.impact, self.show = False, bool(samples.shown[0])
         self.plan: Plan | None = None
+        self.ended: EventRecord | None = None
         self.probe: EventProbe | None = None
         self.choice: Choice
 
@@ -221,6 +223,9 @@ class _Walk:
             after_time_event = True
             self._sampled = self.t
             self._update(due)
+        if self.ended is not None:
+            assert self.plan is not None
+            return Recorder(self.plan), Outcome(self.t, "event", "", self.statistics, (self.choice,), self.ended)
         t, q, u = self.t, self.q, self.u
         self.prepare()
         assert self.plan is not None
@@ -310,17 +315,10 @@ class _Walk:
 
     def _pass_time_event(self) -> None:
         """Go on with the relations of functions of time that hold after a time event."""
-        from atwood.simulation.events.impacts_in_time import pass_time_event
-
         self._piece_start, before = self.t, self.assembly
         self.assembly = self._in_piece(before)
-        length = self.start.length
-        self.q, self.u, impacts = pass_time_event(before, self.assembly, self.t, self.q, self.u, length)
         self.show = self.samples.shows(self.t)
-        if impacts:  # both states are shown, as at any event
-            self.events += impacts
-            self.impact = self.show = True
-            self.segments[-1].shown[-1] = True
+        self._jump(before)
         if self.plan is not None:
             self.probe = None
             known = self._plans.get(self._piece)
@@ -330,8 +328,6 @@ class _Walk:
 
     def _update(self, due: Sequence[int]) -> None:
         """Go on with what updates make of the state."""
-        from atwood.simulation.events.impacts_in_time import pass_time_event
-
         before = self.assembly
         if self._known is not None and len(self.log) < len(self._known):
             made = self._known[len(self.log)]
@@ -340,15 +336,41 @@ class _Walk:
         self.log.append(made)
         self.q, self.held = made.coordinates, made.held
         self.assembly = before.with_held(self.held) if self.held else before
-        length = self.start.length
-        self.q, self.u, impacts = pass_time_event(before, self.assembly, self.t, self.q, self.u, length)
         self.show = True  # as after any event: values that are held jump
-        if impacts:
-            self.events += impacts
-            self.impact = True
+        self._jump(before)
         if self.plan is not None:
             self.probe, self._plans = None, {}
             self.plan = self.plan.in_piece(self.assembly)
+
+    def _jump(self, before: Assembly) -> None:
+        """Go on where prescribed motions switch: velocities may jump, and one-sided constraints let go."""
+        from atwood.simulation.events.impacts_in_time import pass_time_event
+        from atwood.simulation.events.mode_change import LetsGo, enter_mode
+
+        state, length, events, also = (self.t, self.q, self.u), self.start.length, [], {}
+        try:
+            self.q, self.u, impacts = pass_time_event(before, self.assembly, *state, length)
+            events += impacts
+        except LetsGo as error:
+            events.append(error.event)
+        while events and events[-1].target:
+            also[events[-1].part] = events[-1].target
+            if events[-1].target == "stop":
+                self.ended = events[-1]
+                break
+            try:
+                first = replace(events[0], impact=any(one.impact for one in events))
+                self.plan = None
+                self.assembly, self.q, self.u = enter_mode(state, before, first, self._reassemble, length, also)
+                break
+            except LetsGo as error:
+                events.append(error.event)
+        if events:  # both states are shown, as at any event
+            self.events += [] if self.ended else events
+            self.impact = any(one.impact for one in events)
+            self.show = True
+            if self.segments:
+                self.segments[-1].shown[-1] = True
 
     def _switch_coordinates(self, event: EventRecord, recorder: Recorder) -> None:
         """Go on in other coordinates of an orientation."""

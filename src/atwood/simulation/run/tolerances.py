@@ -9,6 +9,7 @@ from atwood.errors import AtwoodError, SolveError
 from atwood.forms.assembly import Assembly
 from atwood.integrators.protocol import Budget, Status, StepResult
 from atwood.late import replace
+from atwood.simulation.events.sampling import remembering
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.session import SolverRequest, open_implicit_session
@@ -112,7 +113,7 @@ def raised_where_too_tight(solve: Callable[[RunOptions], Run], assembly: Assembl
             return solve(options)
         except SolveError as error:
             tolerance: float | None = getattr(error, "tolerance", None)
-            if tolerance is None or assembly.discrete_states:
+            if tolerance is None or remembering(assembly):
                 raise
         warnings.warn(
             f"rtol = {options.relative_tolerance:g} is below what rounding allows here: {tolerance:g} is taken instead",
