@@ -100,7 +100,14 @@ def where_shaken(interpolation: str, times: np.ndarray, mass: float = 1.0) -> np
 @pytest.mark.parametrize("interpolation", ["linear", "akima", "cubic"])
 @pytest.mark.parametrize(
     ("form", "solver"),
-    [("reduced", "auto"), ("reduced", "ida"), ("reduced", "taylor"), ("reduced", "gauss"), ("dae", "ida"), ("dae", "auto")],
+    [
+        ("reduced", "auto"),
+        ("reduced", "ida"),
+        ("reduced", "taylor"),
+        ("reduced", "gauss"),
+        ("dae", "ida"),
+        ("dae", "auto"),
+    ],
 )
 def test_the_error_of_a_run_with_a_table_is_estimated(interpolation: str, form: str, solver: str) -> None:
     result = simulate(shaken(interpolation), form=form, solver=solver, rtol=1e-6, outputs=21,
@@ -247,8 +254,8 @@ def test_two_winches_that_stop_at_once_leave_two_ropes_slack(form: str) -> None:
 def test_a_drive_that_stops_at_the_same_moment_jerks_what_else_is_held(form: str) -> None:
     """A hook that goes to one side at 0.3 m/s and winds in at 0.5 m/s stops in both at once."""
     scene = Scene(gravity=G)
-    ground, drive, rope = scene.add("ground", Ground()), scene.add("drive", Drive()), Rope(length=2.0, when_slack="slack")
-    scene.add("rope", rope)
+    ground, drive = scene.add("ground", Ground()), scene.add("drive", Drive())
+    rope = scene.add("rope", Rope(length=2.0, when_slack="slack"))
     mass, carried = scene.add("mass", PointMass(mass=2.0)), scene.add("carried", PointMass(mass=5.0))
     scene.connect(ground.frame, drive.a)
     scene.connect(drive.b, carried.point)

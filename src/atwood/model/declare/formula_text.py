@@ -158,6 +158,4 @@ def _value_of(node: ast.expr, symbols: Mapping[str, Any], where: str) -> Any:
     raise ParameterError(f"{ast.unparse(node)!r} has no place in a formula", where=where, advice=_ARITHMETIC)
 
 
-_ARITHMETIC = (
-    "It has numbers (1.5, with a point), its arguments, + - * / **, brackets and functions such as sin."
-)
+_ARITHMETIC = "It has numbers (1.5, with a point), its arguments, + - * / **, brackets and functions such as sin."

@@ -375,22 +375,20 @@ def update(
     Parameters
     ----------
     sets
-        Names of the states, continuous or discrete, that it gives new values; it returns one number for each of
-        theirs, in this order.
+        Names of the states, continuous or discrete, that it gives new values: one number for each of theirs, in order.
     every
         Its sample time, s: a number, or the name of a parameter.
     offset
         When it is called first, after the start of the run, s: a number, or the name of a parameter.
     at
-        In place of a sample time, the name of an event of the component: it is called just after that.
+        In place of a sample time, the name of an event of the component, just after which it is called.
     when
         In place of both, the name of a method that returns the times, s, from parameters that are numbers.
     reads
         The inputs that it reads; all when None. A method that passes on only what was stored before reads none, ``()``,
         and comes first.
     pure
-        Whether it returns the same whenever time, parameters, inputs and states are the same, and remembers nothing
-        else. Only then can a scene be solved twice, as its estimated error needs.
+        Whether it remembers nothing but states, so that a scene can be solved twice, as an estimated error needs.
     """
     names = (sets,) if isinstance(sets, str) else tuple(sets)
     options = UpdateOptions(names, every, offset, at, when, None if reads is None else tuple(reads), pure)

@@ -18,13 +18,14 @@ from atwood.late import replace
 from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
+from atwood.simulation.dynamics.orientation_coordinates import Reassemble
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
-from atwood.simulation.events.mode_change import LetsGo, generalized_speeds, plastic_impact
+from atwood.simulation.events.mode_change import LetsGo, enter_mode, generalized_speeds, plastic_impact
 from atwood.simulation.events.modes import EventRecord
 from atwood.tolerances import tolerances
 
-__all__ = ["pass_time_event"]
+__all__ = ["jumped", "pass_time_event"]
 
 _MOTION_SWITCHES: Key[bool] = Key("whether prescribed motion switches")
 
@@ -34,6 +35,44 @@ _SAME_SPEED = 1e-9
 
 _HOLDS = 1e-6
 """Relative to the largest speed: by how much velocities after an impact may miss a constraint."""
+
+
+def jumped(
+    before: Assembly,
+    after: Assembly,
+    state: tuple[float, FloatArray, FloatArray],
+    length: float,
+    reassemble: Reassemble,
+) -> tuple[Assembly, FloatArray, FloatArray, tuple[EventRecord, ...]]:
+    """Return the scene and its state where prescribed motions switch, and what has happened.
+
+    A one-sided constraint that could not bear the impulse of a jump lets go: the mode is entered in which it does not
+    act, with the velocities before the jump, and what else jumps is an impact there. Where a part is to stop the run
+    then, the state stays as it is.
+
+    Parameters
+    ----------
+    before, after
+        The scene on both sides of the switch.
+    state
+        Time, coordinates and speeds just before it, in the coordinates of the form.
+    length
+        Extent of the scene, m.
+    reassemble
+        Gives the scene after it in other modes.
+    """
+    events: list[EventRecord] = []
+    while True:
+        try:
+            if not events:
+                return after, *pass_time_event(before, after, *state, length)
+            first = replace(events[0], impact=any(one.impact for one in events))
+            modes = {one.part: one.target for one in events}
+            return *enter_mode(state, before, first, reassemble, length, modes), (first, *events[1:])
+        except LetsGo as error:
+            events.append(error.event)
+        if events[-1].target == "stop":
+            return after, *state[1:], tuple(events)
 
 
 def pass_time_event(

@@ -26,9 +26,8 @@ from atwood.simulation.dynamics.orientation_coordinates import (
 from atwood.simulation.dynamics.rank import least_norm
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
-from atwood.tolerances import tolerances
-
 from atwood.simulation.events.modes import EventRecord
+from atwood.tolerances import tolerances
 
 __all__ = ["LetsGo", "enter_mode", "generalized_speeds", "generalized_state", "plastic_impact"]
 

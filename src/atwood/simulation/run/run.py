@@ -13,7 +13,6 @@ from atwood.errors import AtwoodError, SolveError, StartError, UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
-from atwood.late import replace
 from atwood.mechanics.outputs.event_functions import UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
@@ -318,7 +317,7 @@ class _Walk:
         self._piece_start, before = self.t, self.assembly
         self.assembly = self._in_piece(before)
         self.show = self.samples.shows(self.t)
-        self._jump(before)
+        self._jump(before, show_both=True)
         if self.plan is not None:
             self.probe = None
             known = self._plans.get(self._piece)
@@ -342,35 +341,21 @@ class _Walk:
             self.probe, self._plans = None, {}
             self.plan = self.plan.in_piece(self.assembly)
 
-    def _jump(self, before: Assembly) -> None:
+    def _jump(self, before: Assembly, show_both: bool = False) -> None:
         """Go on where prescribed motions switch: velocities may jump, and one-sided constraints let go."""
-        from atwood.simulation.events.impacts_in_time import pass_time_event
-        from atwood.simulation.events.mode_change import LetsGo, enter_mode
+        from atwood.simulation.events.impacts_in_time import jumped
 
-        state, length, events, also = (self.t, self.q, self.u), self.start.length, [], {}
-        try:
-            self.q, self.u, impacts = pass_time_event(before, self.assembly, *state, length)
-            events += impacts
-        except LetsGo as error:
-            events.append(error.event)
-        while events and events[-1].target:
-            also[events[-1].part] = events[-1].target
-            if events[-1].target == "stop":
-                self.ended = events[-1]
-                break
-            try:
-                first = replace(events[0], impact=any(one.impact for one in events))
-                self.plan = None
-                self.assembly, self.q, self.u = enter_mode(state, before, first, self._reassemble, length, also)
-                break
-            except LetsGo as error:
-                events.append(error.event)
-        if events:  # both states are shown, as at any event
-            self.events += [] if self.ended else events
-            self.impact = any(one.impact for one in events)
-            self.show = True
-            if self.segments:
-                self.segments[-1].shown[-1] = True
+        state, now = (self.t, self.q, self.u), self.assembly
+        self.assembly, self.q, self.u, events = jumped(before, now, state, self.start.length, self._reassemble)
+        if any(one.target for one in events):
+            show_both = True
+            self.ended = next((one for one in events if one.target == "stop"), None)
+            self.plan = self.plan if self.ended else None
+        self.events += [] if self.ended else events
+        self.impact |= any(one.impact for one in events)
+        self.show |= bool(events)
+        if self.segments and events and show_both:  # as at any event
+            self.segments[-1].shown[-1] = True
 
     def _switch_coordinates(self, event: EventRecord, recorder: Recorder) -> None:
         """Go on in other coordinates of an orientation."""
