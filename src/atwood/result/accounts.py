@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from random import Random
 
 import numpy as np
@@ -18,7 +19,7 @@ from atwood.result.energy import Motion, Piece
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.simulation.run.record import SegmentRecord
 
-__all__ = ["POWER", "account", "power_into"]
+__all__ = ["POWER", "account", "energy_near", "power_into"]
 
 POWER: Key[Program] = Key("power")
 _SWITCHED: Key[Program] = Key("switched energy")
@@ -52,7 +53,7 @@ def account(reading: SegmentQuantities) -> Piece:
         kinetic=kinetic,
         potential=potential,
         motions=_motions(segment),
-        rounding=_rounding(segment, kinetic + potential),
+        rounding=_rounding(segment),
         power=power_into(reading),
         switched=None if is_fixed else _values(assembly, switching, segment.time, *state)[0],
         is_impact=segment.impact,
@@ -103,26 +104,45 @@ def _values(assembly: Assembly, program: Program, t: FloatArray, q: FloatArray, 
     return np.array([np.broadcast_to(row, t.shape) for row in found])
 
 
-def _rounding(segment: SegmentRecord, energy: FloatArray) -> float:
+def _rounding(segment: SegmentRecord) -> float:
     """Return by how much the energy changes at most, J, where all that it is computed from changes in its last digits.
 
     States are known to some units of rounding of themselves, or of the size that such coordinates have in the scene.
     """
-    assembly, plan, samples = segment.assembly, segment.plan, len(segment.time)
-    sizes = (plan.coordinate_sizes, plan.sizes / plan.scales.time)
-    values, random = assembly.parameter_values, Random(0)
+    plan = segment.plan
+    sizes = (plan.coordinate_sizes[:, None], plan.sizes[:, None] / plan.scales.time)
+    whole = [np.abs(x) + size for x, size in zip((segment.coordinates, segment.speeds), sizes, strict=True)]
+    return _changed(segment, whole, _DIGIT, _DIGIT)
 
-    def near(numbers: FloatArray, size: FloatArray | float) -> FloatArray:
+
+def energy_near(segment: SegmentRecord, share: float) -> float:
+    """Return by how much the energy changes at most, J, where each coordinate and speed changes by a share of its size.
+
+    The size of a speed is that of its coordinate in the scene's time, or the largest that it has in the segment.
+    """
+    plan = segment.plan
+    fastest = np.max(np.abs(segment.speeds), axis=1, initial=0.0)
+    sizes = (plan.coordinate_sizes[:, None], np.maximum(plan.sizes / plan.scales.time, fastest)[:, None])
+    return _changed(segment, sizes, share, 0.0)
+
+
+def _changed(segment: SegmentRecord, sizes: Sequence[FloatArray], share: float, digit: float) -> float:
+    """Return by how much the energy changes where states change by a share of their sizes, all else by a digit."""
+    assembly, random = segment.assembly, Random(0)
+
+    def near(numbers: FloatArray, by: FloatArray) -> FloatArray:
         # NumPy's generators take longer to load than all of this.
-        bits = np.frombuffer(random.randbytes(len(numbers) * samples), dtype=np.uint8) & 1
-        signs = (2.0 * bits - 1.0).reshape(len(numbers), samples)
-        return numbers + _DIGIT * signs * (np.abs(numbers) + size)
+        bits = np.frombuffer(random.randbytes(numbers.size), dtype=np.uint8) & 1
+        found: FloatArray = numbers + (2.0 * bits - 1.0).reshape(numbers.shape) * by
+        return found
 
-    largest = 0.0
+    here, program = (segment.coordinates, segment.speeds), energy_program(assembly)
+    energy = np.sum(_values(assembly, program, segment.time, *here), axis=0)
+    rows, largest = np.repeat(assembly.parameter_values[:, None], len(segment.time), axis=1), 0.0
     for _ in range(_DRAWS):
-        turned = assembly.with_rows(near(np.repeat(values[:, None], samples, axis=1), 0.0))
-        states = (near(x, size[:, None]) for x, size in zip((segment.coordinates, segment.speeds), sizes, strict=True))
-        time = near(segment.time[None, :], 0.0)[0]
-        apart = np.abs(np.sum(_values(turned, energy_program(assembly), time, *states), axis=0) - energy)
+        turned = assembly.with_rows(near(rows, digit * np.abs(rows)))
+        states = [near(x, share * size) for x, size in zip(here, sizes, strict=True)]
+        time = near(segment.time, digit * np.abs(segment.time))
+        apart = np.abs(np.sum(_values(turned, program, time, *states), axis=0) - energy)
         largest = max(largest, float(np.max(apart, initial=0.0, where=np.isfinite(apart))))
     return largest

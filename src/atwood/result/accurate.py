@@ -7,6 +7,7 @@ from collections.abc import Callable
 from atwood.errors import SolveError
 from atwood.late import replace
 from atwood.result.result import Result
+from atwood.result.second_run import longest_step
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 
@@ -68,6 +69,8 @@ def accurate_run(
             return run, result.second.run, ""
         if rtol <= _LEAST:
             break
+        # What was missed was stepped over, perhaps: from here on steps are no longer than those that saw it.
+        options = replace(options, max_step=longest_step(run))
         rtol *= min(0.1, max(_MOST, _SHARE * accuracy / result.accuracy.reached))
     assert best is not None
     said = f" (with smaller tolerances: {failure})" if failure else ""

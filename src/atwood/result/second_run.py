@@ -7,6 +7,8 @@ solved by other methods, and mostly at a fraction of the cost.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 
 from atwood.arrays import FloatArray
@@ -20,7 +22,7 @@ from atwood.simulation.run.made import Run
 from atwood.simulation.run.run import run
 from atwood.simulation.run.tolerances import LEAST
 
-__all__ = ["TIGHTER", "second_run"]
+__all__ = ["TIGHTER", "longest_step", "second_run"]
 
 TIGHTER = 30.0
 """The tolerance of the second solution is so many times less: two steps of ten cost too much, one tells too little."""
@@ -28,12 +30,18 @@ TIGHTER = 30.0
 _LEAST = {"ida": 1e-13, "ida-sundae": 1e-13}
 """Tolerances below this a method cannot be asked for; else the least that there is."""
 
+_STEPS = 97.0
+"""The least number of steps of a second solution; it divides no usual number of outputs."""
+
+_SHORTER = (1.0, 8.0, 64.0)
+"""So many times shorter are the longest steps of one second solution after the other, until one is to be believed."""
+
 _PATIENCE, _SECONDS = 20.0, 30.0
 """The second run may take so many times as long as the first, and so many seconds at least."""
 
 
-def second_run(first: Run, times: FloatArray) -> Run:
-    """Solve a scene once more, more accurately.
+def second_run(first: Run, times: FloatArray, is_known: Callable[[Run], bool]) -> Run:
+    """Solve a scene once more, more accurately, and with other steps.
 
     Parameters
     ----------
@@ -41,6 +49,8 @@ def second_run(first: Run, times: FloatArray) -> Run:
         The run.
     times
         Output times, s.
+    is_known
+        Whether the error of the first run is known by a second one. Where it is not, steps are shortened.
 
     Raises
     ------
@@ -51,21 +61,27 @@ def second_run(first: Run, times: FloatArray) -> Run:
     if first.start is None or not first.segments:
         raise UsageError("there is nothing in the run, and so no error", where=where)
     refuse_updates(first.assembly)
-    found, failure = None, ""
-    for assembly, options in _attempts(first, times):
-        try:
-            found = run(assembly, first.start, options, assembly.other_mode)
-        except AtwoodError as error:
-            failure = error.message
-            continue
-        if found.status in (first.status, "stopped", "finished"):
-            return found
-        failure = found.message
+    last, failure = None, ""
+    for assembly, ways in _attempts(first, times):
+        for options in ways:
+            try:
+                found = run(assembly, first.start, options, assembly.other_mode)
+            except AtwoodError as error:
+                failure = error.message
+                break
+            if found.status not in (first.status, "stopped", "finished"):
+                failure = found.message
+                break
+            last = found
+            if is_known(found):
+                return found
+    if last is not None:
+        return last
     raise UsageError(f"no second solution could be found: {failure}", where=where, advice="Try another rtol.")
 
 
-def _attempts(first: Run, times: FloatArray) -> list[tuple[Assembly, RunOptions]]:
-    """Return in which coordinates and how to solve a scene once more, the best way first."""
+def _attempts(first: Run, times: FloatArray) -> Iterator[tuple[Assembly, list[RunOptions]]]:
+    """Yield in which coordinates to solve a scene once more, and with which steps, the best way first."""
     options, solver = first.options, first.solver
     seconds = max(_SECONDS, _PATIENCE * first.statistics.seconds)
     base = replace(
@@ -74,7 +90,6 @@ def _attempts(first: Run, times: FloatArray) -> list[tuple[Assembly, RunOptions]
         progress=None,
         on_step=None,
         max_steps=None,
-        max_step=None,
         order=None,
         step=None,
         solver="auto",
@@ -83,13 +98,28 @@ def _attempts(first: Run, times: FloatArray) -> list[tuple[Assembly, RunOptions]
     )
     rtol = 1e-11 if solver == "gauss" else options.relative_tolerance
     tighter = replace(base, relative_tolerance=max(rtol / TIGHTER, _LEAST.get(solver, LEAST)))
-    found = []
+    ways = [replace(tighter, max_step=longest_step(first, shorter)) for shorter in _SHORTER]
     if first.assembly.form == "dae":
-        found.append((_reduced(first.assembly), tighter))
-    found.append((first.assembly, tighter))
+        yield _reduced(first.assembly), ways
+    yield first.assembly, ways
     # Where nothing tighter can be solved, a looser solution says no more than how large the error is at most.
-    found.append((first.assembly, replace(base, relative_tolerance=min(TIGHTER * rtol, 1e-2))))
-    return found
+    looser = replace(base, relative_tolerance=min(TIGHTER * rtol, 1e-2), max_step=longest_step(first, 1.0))
+    yield first.assembly, [looser]
+
+
+def longest_step(first: Run, shorter: float = 1.0) -> float:
+    """Return the longest step of a second solution, s.
+
+    Parameters
+    ----------
+    first
+        The run that is judged.
+    shorter
+        So many times shorter, where steps were too long before.
+    """
+    assert first.start is not None
+    step = (first.options.t_end - first.start.time) / (_STEPS * shorter)
+    return min(step, first.options.max_step or step)
 
 
 def _reduced(assembly: Assembly) -> Assembly:

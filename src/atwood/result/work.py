@@ -27,6 +27,7 @@ __all__ = [
     "integral_in_steps",
     "integral_of_samples",
     "joined_times",
+    "ledger_of_samples",
     "nodes_between",
     "nodes_in_steps",
     "samples_in_steps",
@@ -146,15 +147,20 @@ def _by_part(run: Run, shown: NDArray[np.bool_], exchanged: float) -> PartEnergi
     return find_part_energies(run, shown, exchanged)
 
 
-def _balanced(run: Run, pieces: Sequence[Piece], shown: NDArray[np.bool_]) -> EnergyLedger:
+def ledger_of_samples(pieces: Sequence[Piece], shown: NDArray[np.bool_]) -> EnergyLedger:
+    """Return the ledger of a run as far as its samples tell; arguments as of `find_ledger`."""
     known = [
         (np.zeros(len(one.time)), 0.0) if one.power is None else integral_of_samples(one.time, one.power)
         for one in pieces
     ]
-    work, unsure = [one for one, _ in known], sum(error for _, error in known)
-    ledger = make_ledger(pieces, work, unsure, shown)
+    return make_ledger(pieces, [one for one, _ in known], sum(error for _, error in known), shown)
+
+
+def _balanced(run: Run, pieces: Sequence[Piece], shown: NDArray[np.bool_]) -> EnergyLedger:
+    ledger = ledger_of_samples(pieces, shown)
     if all(one.power is None for one in pieces):
         return ledger
+    unsure = ledger.uncertainty - 2.0 * max(one.rounding for one in pieces)
     rtol, solvers = run.options.relative_tolerance, [one.solver for one in run.choices]
     hidden = unsure > max(_CLEAR * rtol, _PART * ledger.max_drift) * ledger.exchanged
     few = run.statistics.steps > min(_SEEN[one] for one in solvers) * sum(len(one.time) for one in pieces)
