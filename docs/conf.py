@@ -23,6 +23,7 @@ suppress_warnings = [
 napoleon_numpy_docstring = True
 napoleon_google_docstring = False
 napoleon_use_ivar = True
+napoleon_custom_sections = [("Connectors", "params_style"), ("Quantities", "params_style")]  # of components
 napoleon_preprocess_types = False
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"

@@ -1,15 +1,15 @@
 """Signals: what a sensor measures drives a force, here as a spring and a damper that hold a cart."""
 
-from atwood import Component, Point, Scalar, Scene, connector, observable, parameter, simulate
+from atwood import Component, Number, Point, Scalar, Scene, connector, observable, parameter, simulate
 from atwood_library import Force, Ground, PointMass, Slider
 
 
 class Controller(Component):
     """Measures a point along x and says which force would bring it to its target."""
 
-    gain: float = parameter(20.0, unit="N/m", doc="Force for a deviation by one metre.")
-    damping: float = parameter(4.0, unit="N*s/m", doc="Force against a speed of one metre a second.")
-    target: float = parameter(1.0, unit="m", doc="Where the point should be.")
+    gain: Number = parameter(20.0, unit="N/m", doc="Force for a deviation by one metre.")
+    damping: Number = parameter(4.0, unit="N*s/m", doc="Force against a speed of one metre a second.")
+    target: Number = parameter(1.0, unit="m", doc="Where the point should be.")
     point: Point = connector(Point, "The point that is measured.")
 
     @observable(unit="N", doc="Force that is asked for.")

@@ -1,13 +1,13 @@
 """Models: a class body with parameters, nested in a scene, with one part replaced by another."""
 
-from atwood import Model, Point, Scene, connect, connector, parameter, simulate
+from atwood import Model, Number, Point, Scene, connect, connector, parameter, simulate
 from atwood_library import Ground, PointMass, Rod, Spring
 
 
 class Pendulum(Model):
     """A bob on a rod."""
 
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
     top: Point = connector(Point, "Where it hangs.")
     end: Point = connector(Point, "The bob.")
     rod: Rod = Rod(length=length)

@@ -1,14 +1,14 @@
 """A component of one's own: a spring whose force grows with the cube of its extension."""
 
-from atwood import Component, Point, Scalar, Scene, connector, observable, parameter, potential, simulate
+from atwood import Component, Number, Point, Scalar, Scene, connector, observable, parameter, potential, simulate
 from atwood_library import Ground, PointMass
 
 
 class CubicSpring(Component):
     """A spring whose force grows with the cube of its extension."""
 
-    stiffness: float = parameter(1.0, unit="N/m^3", minimum=0.0, doc="Force for an extension by one metre.")
-    natural_length: float = parameter(1.0, unit="m", minimum=0.0, doc="Length without force.")
+    stiffness: Number = parameter(1.0, unit="N/m^3", minimum=0.0, doc="Force for an extension by one metre.")
+    natural_length: Number = parameter(1.0, unit="m", minimum=0.0, doc="Length without force.")
     a: Point = connector(Point, "One end.")
     b: Point = connector(Point, "The other end.")
 

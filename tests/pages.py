@@ -44,7 +44,7 @@ def make(name: str) -> Scene:
 def head(name: str) -> str:
     """Return what a page begins with: title, meaning, what is known, picture, and parts."""
     kind = SCENES[name]
-    lines = [f"# {name}", inspect.cleandoc(kind.__doc__ or "")]
+    lines = [f"# {name}", inspect.cleandoc(vars(kind)["__doc__"] or "")]
     says = known()[name]
     lines.append(f"What is known of it, and tested: {says}.")
     given = SETTINGS.get(name, {})
@@ -91,7 +91,7 @@ def leaves(model: Any, before: str = "") -> list[tuple[str, Any]]:
 
 def summary(kind: type) -> str:
     """Return the first sentence of what a class says of itself."""
-    return " ".join(inspect.cleandoc(kind.__doc__ or "").split("\n\n")[0].split()).replace("|", "\\|")
+    return " ".join(inspect.cleandoc(vars(kind)["__doc__"] or "").split("\n\n")[0].split()).replace("|", "\\|")
 
 
 def compared(name: str) -> tuple[str, Any]:

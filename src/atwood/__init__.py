@@ -57,7 +57,7 @@ from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
-from atwood.model.declare.field_functions import parameter, signal
+from atwood.model.declare.field_functions import Number, Triple, parameter, signal
 from atwood.model.declare.laws import (
     constraint,
     derivative,
@@ -280,9 +280,9 @@ __all__ += [
 # Components of one's own
 __all__ += [
     "FREE", "BodyInertia", "CheckReport", "Component", "Connector", "CoordinateLoad", "Expression",
-    "ExternalFunction", "Formula", "Frame", "Groove", "Load", "Outline", "Placement", "Point", "PointInertia",
-    "Rotation", "Scalar", "Shaft", "Slide", "Vector", "as_vector", "check", "connector", "constraint", "cross",
-    "derivative", "discrete_state", "dissipation", "dot", "event", "external", "force", "formula", "inertia",
+    "ExternalFunction", "Formula", "Frame", "Groove", "Load", "Number", "Outline", "Placement", "Point", "PointInertia",
+    "Rotation", "Scalar", "Shaft", "Slide", "Triple", "Vector", "as_vector", "check", "connector", "constraint",
+    "cross", "derivative", "discrete_state", "dissipation", "dot", "event", "external", "force", "formula", "inertia",
     "is_zero", "joint", "lagrangian", "norm", "normals", "observable", "parameter", "potential", "select", "signal",
     "solve_linear", "state", "turn", "update",
 ]  # fmt: skip

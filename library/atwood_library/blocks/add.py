@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, observable, parameter, signal
+from atwood import Component, Number, Scalar, observable, parameter, signal
 
 
 class Add(Component):
@@ -10,10 +10,10 @@ class Add(Component):
 
     synonyms = ("Math.Add", "Math.Feedback", "Sum", "Summing point", "Math.Add3", "Math.MultiSum")
 
-    weight_1: float = parameter(1.0, unit="any", doc="Weight of the first.")
-    weight_2: float = parameter(1.0, unit="any", doc="Weight of the second.")
-    u_1: float = signal(0.0, unit="any", doc="The first.")
-    u_2: float = signal(0.0, unit="any", doc="The second.")
+    weight_1: Number = parameter(1.0, unit="any", doc="Weight of the first.")
+    weight_2: Number = parameter(1.0, unit="any", doc="Weight of the second.")
+    u_1: Number = signal(0.0, unit="any", doc="The first.")
+    u_2: Number = signal(0.0, unit="any", doc="The second.")
 
     @observable(unit="any", doc="The sum.")
     def y(self) -> Scalar:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, ParameterError, Scalar, maximum, minimum, observable, parameter, signal
+from atwood import Component, Number, ParameterError, Scalar, maximum, minimum, observable, parameter, signal
 
 
 class DeadZone(Component):
@@ -10,9 +10,9 @@ class DeadZone(Component):
 
     synonyms = ("Nonlinear.DeadZone", "Dead band")
 
-    lower: float = parameter(-1.0, unit="any", doc="Lower bound.")
-    upper: float = parameter(1.0, unit="any", doc="Upper bound.")
-    u: float = signal(0.0, unit="any", doc="What is compared with them.")
+    lower: Number = parameter(-1.0, unit="any", doc="Lower bound.")
+    upper: Number = parameter(1.0, unit="any", doc="Upper bound.")
+    u: Number = signal(0.0, unit="any", doc="What is compared with them.")
 
     def check_values(self) -> None:
         """Refuse bounds the wrong way round."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, derivative, parameter, signal, state
+from atwood import Component, Number, Scalar, derivative, parameter, signal, state
 
 
 class FirstOrder(Component):
@@ -10,10 +10,10 @@ class FirstOrder(Component):
 
     synonyms = ("Continuous.FirstOrder", "Lag", "PT1", "Low-pass filter")
 
-    gain: float = parameter(1.0, unit="any", doc="What is left of a constant input.")
-    time_constant: float = parameter(1.0, unit="s", above=0.0, doc="In which a step comes to 63 %.")
-    start: float = parameter(0.0, unit="any", doc="Value at the start.")
-    u: float = signal(0.0, unit="any", doc="What it follows.")
+    gain: Number = parameter(1.0, unit="any", doc="What is left of a constant input.")
+    time_constant: Number = parameter(1.0, unit="s", above=0.0, doc="In which a step comes to 63 %.")
+    start: Number = parameter(0.0, unit="any", doc="Value at the start.")
+    u: Number = signal(0.0, unit="any", doc="What it follows.")
     y: Scalar = state(start, unit="any", doc="What follows.")
 
     @derivative("y")

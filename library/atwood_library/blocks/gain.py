@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, observable, parameter, signal
+from atwood import Component, Number, Scalar, observable, parameter, signal
 
 
 class Gain(Component):
@@ -10,9 +10,9 @@ class Gain(Component):
 
     synonyms = ("Math.Gain", "P controller", "Proportional controller")
 
-    gain: float = parameter(1.0, unit="any", doc="What it is multiplied by.")
-    offset: float = parameter(0.0, unit="any", doc="What is added.")
-    u: float = signal(0.0, unit="any", doc="What is multiplied.")
+    gain: Number = parameter(1.0, unit="any", doc="What it is multiplied by.")
+    offset: Number = parameter(0.0, unit="any", doc="What is added.")
+    u: Number = signal(0.0, unit="any", doc="What is multiplied.")
 
     @observable(unit="any", doc="The multiple.")
     def y(self) -> Scalar:

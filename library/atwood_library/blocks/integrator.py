@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, derivative, parameter, signal, state
+from atwood import Component, Number, Scalar, derivative, parameter, signal, state
 
 
 class Integrator(Component):
@@ -10,9 +10,9 @@ class Integrator(Component):
 
     synonyms = ("Continuous.Integrator", "I controller", "LimIntegrator")
 
-    gain: float = parameter(1.0, unit="any", doc="What the rate is of the input.")
-    start: float = parameter(0.0, unit="any", doc="Value at the start.")
-    u: float = signal(0.0, unit="any", doc="What is integrated.")
+    gain: Number = parameter(1.0, unit="any", doc="What the rate is of the input.")
+    start: Number = parameter(0.0, unit="any", doc="Value at the start.")
+    u: Number = signal(0.0, unit="any", doc="What is integrated.")
     y: Scalar = state(start, unit="any", doc="The integral.")
 
     @derivative("y")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, ParameterError, Scalar, maximum, minimum, observable, parameter, signal
+from atwood import Component, Number, ParameterError, Scalar, maximum, minimum, observable, parameter, signal
 
 
 class Limiter(Component):
@@ -10,9 +10,9 @@ class Limiter(Component):
 
     synonyms = ("Nonlinear.Limiter", "Saturation", "Clamp", "VariableLimiter")
 
-    lower: float = parameter(-1.0, unit="any", doc="Least value.")
-    upper: float = parameter(1.0, unit="any", doc="Greatest value.")
-    u: float = signal(0.0, unit="any", doc="What is cut off.")
+    lower: Number = parameter(-1.0, unit="any", doc="Least value.")
+    upper: Number = parameter(1.0, unit="any", doc="Greatest value.")
+    u: Number = signal(0.0, unit="any", doc="What is cut off.")
 
     def check_values(self) -> None:
         """Refuse bounds the wrong way round."""

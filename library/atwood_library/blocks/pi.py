@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, derivative, observable, parameter, signal, state
+from atwood import Component, Number, Scalar, derivative, observable, parameter, signal, state
 
 
 class PI(Component):
@@ -10,9 +10,9 @@ class PI(Component):
 
     synonyms = ("Continuous.PI", "PI controller", "Proportional-integral controller")
 
-    gain: float = parameter(1.0, unit="any", doc="Gain.")
-    integral_time: float = parameter(1.0, unit="s", above=0.0, doc="Time in which a step is integrated to its height.")
-    u: float = signal(0.0, unit="any", doc="What is to become zero, as set point less measurement.")
+    gain: Number = parameter(1.0, unit="any", doc="Gain.")
+    integral_time: Number = parameter(1.0, unit="s", above=0.0, doc="Time in which a step is integrated to its height.")
+    u: Number = signal(0.0, unit="any", doc="What is to become zero, as set point less measurement.")
     integral: Scalar = state(0.0, unit="any", doc="Integral of the input over the integral time.")
 
     @derivative("integral")

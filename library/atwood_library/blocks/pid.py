@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from atwood import (
     Component,
+    Number,
     ParameterError,
     Scalar,
     derivative,
@@ -27,18 +28,18 @@ class PID(Component):
 
     synonyms = ("LimPID", "Continuous.PID", "PID controller", "Anti-windup")
 
-    gain: float = parameter(1.0, unit="any", above=0.0, doc="Gain.")
-    integral_time: float = parameter(0.5, unit="s", above=0.0, doc="Time of the integral part.")
-    derivative_time: float = parameter(0.1, unit="s", minimum=0.0, doc="Time of the derivative part.")
-    filter_ratio: float = parameter(10.0, above=0.0, doc="Derivative time over the time of its filter.")
-    set_point_weight: float = parameter(1.0, doc="Share b of the set point in the proportional part.")
-    derivative_weight: float = parameter(0.0, doc="Share c of the set point in the derivative part.")
-    output_minimum: float | None = parameter(None, unit="any", doc="Least command; none for no limit.")
-    output_maximum: float | None = parameter(None, unit="any", doc="Greatest command; none for no limit.")
-    anti_windup: float = parameter(0.9, above=0.0, doc="What is cut off changes the integral by this part of itself.")
-    set_point: float = signal(0.0, unit="any", doc="What the measurement is to become.")
-    measurement: float = signal(0.0, unit="any", doc="The measurement.")
-    feed_forward: float = signal(0.0, unit="any", doc="What is added to the command.")
+    gain: Number = parameter(1.0, unit="any", above=0.0, doc="Gain.")
+    integral_time: Number = parameter(0.5, unit="s", above=0.0, doc="Time of the integral part.")
+    derivative_time: Number = parameter(0.1, unit="s", minimum=0.0, doc="Time of the derivative part.")
+    filter_ratio: Number = parameter(10.0, above=0.0, doc="Derivative time over the time of its filter.")
+    set_point_weight: Number = parameter(1.0, doc="Share b of the set point in the proportional part.")
+    derivative_weight: Number = parameter(0.0, doc="Share c of the set point in the derivative part.")
+    output_minimum: Number | None = parameter(None, unit="any", doc="Least command; none for no limit.")
+    output_maximum: Number | None = parameter(None, unit="any", doc="Greatest command; none for no limit.")
+    anti_windup: Number = parameter(0.9, above=0.0, doc="What is cut off changes the integral by this part of itself.")
+    set_point: Number = signal(0.0, unit="any", doc="What the measurement is to become.")
+    measurement: Number = signal(0.0, unit="any", doc="The measurement.")
+    feed_forward: Number = signal(0.0, unit="any", doc="What is added to the command.")
     integral: Scalar = state(0.0, unit="any", doc="Integral part, over the gain.")
     filtered: Scalar = state(0.0, unit="any", doc="What the derivative part is the derivative of, filtered.")
 

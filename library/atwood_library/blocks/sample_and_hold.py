@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, discrete_state, parameter, signal, update
+from atwood import Component, Number, Scalar, discrete_state, parameter, signal, update
 
 
 class SampleAndHold(Component):
@@ -10,9 +10,9 @@ class SampleAndHold(Component):
 
     synonyms = ("ZeroOrderHold", "Sampler", "Discrete.Sampler", "TriggeredSampler")
 
-    period: float = parameter(0.1, unit="s", doc="Sample time.")
-    start: float = parameter(0.0, unit="any", doc="Value before the first sample.")
-    u: float = signal(0.0, unit="any", doc="What is taken.")
+    period: Number = parameter(0.1, unit="s", doc="Sample time.")
+    start: Number = parameter(0.0, unit="any", doc="Value before the first sample.")
+    u: Number = signal(0.0, unit="any", doc="What is taken.")
     y: Scalar = discrete_state(start, unit="any", doc="What is held.")
 
     @update(every="period", sets="y", pure=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Component, Scalar, discrete_state, parameter, signal, update
+from atwood import Component, Number, Scalar, discrete_state, parameter, signal, update
 
 
 class SampleDelay(Component):
@@ -12,10 +12,10 @@ class SampleDelay(Component):
 
     synonyms = ("UnitDelay", "Discrete.UnitDelay", "Delay", "Dead time")
 
-    period: float = parameter(0.1, unit="s", doc="Sample time.")
+    period: Number = parameter(0.1, unit="s", doc="Sample time.")
     samples: int = parameter(1, integer=True, minimum=1, doc="By how many samples it is late.")
-    start: float = parameter(0.0, unit="any", doc="Value before there is any.")
-    u: float = signal(0.0, unit="any", doc="What is taken.")
+    start: Number = parameter(0.0, unit="any", doc="Value before there is any.")
+    u: Number = signal(0.0, unit="any", doc="What is taken.")
     stored: Any = discrete_state(start, unit="any", count="samples", doc="What has been taken, the last first.")
     y: Scalar = discrete_state(start, unit="any", doc="What is put out.")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Component, ParameterError, Scalar, discrete_state, parameter, signal, update
+from atwood import Component, Number, ParameterError, Scalar, discrete_state, parameter, signal, update
 
 
 class SampledFeedback(Component):
@@ -17,13 +17,13 @@ class SampledFeedback(Component):
 
     gains: Any = parameter((1.0,), array=True, doc="One for each measurement, in their order.")
     targets: Any = parameter((0.0,), array=True, doc="What each measurement is to be; zero for those not given.")
-    period: float = parameter(0.02, unit="s", doc="Sample time.")
-    u_1: float = signal(0.0, unit="any", doc="First measurement.")
-    u_2: float = signal(0.0, unit="any", doc="Second measurement.")
-    u_3: float = signal(0.0, unit="any", doc="Third measurement.")
-    u_4: float = signal(0.0, unit="any", doc="Fourth measurement.")
-    u_5: float = signal(0.0, unit="any", doc="Fifth measurement.")
-    u_6: float = signal(0.0, unit="any", doc="Sixth measurement.")
+    period: Number = parameter(0.02, unit="s", doc="Sample time.")
+    u_1: Number = signal(0.0, unit="any", doc="First measurement.")
+    u_2: Number = signal(0.0, unit="any", doc="Second measurement.")
+    u_3: Number = signal(0.0, unit="any", doc="Third measurement.")
+    u_4: Number = signal(0.0, unit="any", doc="Fourth measurement.")
+    u_5: Number = signal(0.0, unit="any", doc="Fifth measurement.")
+    u_6: Number = signal(0.0, unit="any", doc="Sixth measurement.")
     y: Scalar = discrete_state(0.0, unit="any", doc="The command.")
 
     def check_values(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, derivative, parameter, signal, state
+from atwood import Component, Number, Scalar, derivative, parameter, signal, state
 
 
 class SecondOrder(Component):
@@ -13,11 +13,11 @@ class SecondOrder(Component):
 
     synonyms = ("Continuous.SecondOrder", "PT2", "Low-pass filter", "Butterworth filter")
 
-    gain: float = parameter(1.0, unit="any", doc="What is left of a constant input.")
-    angular_frequency: float = parameter(1.0, unit="rad/s", above=0.0, doc="Angular frequency w.")
-    damping: float = parameter(0.7071067811865476, minimum=0.0, doc="Damping ratio.")
-    start: float = parameter(0.0, unit="any", doc="Value at the start.")
-    u: float = signal(0.0, unit="any", doc="What it follows.")
+    gain: Number = parameter(1.0, unit="any", doc="What is left of a constant input.")
+    angular_frequency: Number = parameter(1.0, unit="rad/s", above=0.0, doc="Angular frequency w.")
+    damping: Number = parameter(0.7071067811865476, minimum=0.0, doc="Damping ratio.")
+    start: Number = parameter(0.0, unit="any", doc="Value at the start.")
+    u: Number = signal(0.0, unit="any", doc="What it follows.")
     y: Scalar = state(start, unit="any", doc="What follows.")
     rate: Scalar = state(0.0, unit="any", doc="Rate of what follows, in its unit a second.")
 

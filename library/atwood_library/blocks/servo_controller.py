@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, derivative, observable, parameter, signal, state
+from atwood import Component, Number, Scalar, derivative, observable, parameter, signal, state
 
 
 class ServoController(Component):
@@ -16,16 +16,16 @@ class ServoController(Component):
 
     synonyms = ("Cascade controller", "Position controller", "Axis controller", "AxisControlBus", "PD controller")
 
-    position_gain: float = parameter(10.0, unit="1/s", minimum=0.0, doc="Wanted speed for a unit of position error.")
-    gain: float = parameter(1.0, unit="any", minimum=0.0, doc="Command for a unit of speed error.")
-    integral_time: float | None = parameter(
+    position_gain: Number = parameter(10.0, unit="1/s", minimum=0.0, doc="Wanted speed for a unit of position error.")
+    gain: Number = parameter(1.0, unit="any", minimum=0.0, doc="Command for a unit of speed error.")
+    integral_time: Number | None = parameter(
         None, unit="s", above=0.0, doc="Time of the speed's integral part; none for no such part."
     )
-    set_point: float = signal(0.0, unit="any", doc="What the measurement is to become.")
-    set_rate: float = signal(0.0, unit="any", doc="Rate of the set point.")
-    measurement: float = signal(0.0, unit="any", doc="The measurement.")
-    measured_rate: float = signal(0.0, unit="any", doc="Its rate.")
-    feed_forward: float = signal(0.0, unit="any", doc="What is added to the command.")
+    set_point: Number = signal(0.0, unit="any", doc="What the measurement is to become.")
+    set_rate: Number = signal(0.0, unit="any", doc="Rate of the set point.")
+    measurement: Number = signal(0.0, unit="any", doc="The measurement.")
+    measured_rate: Number = signal(0.0, unit="any", doc="Its rate.")
+    feed_forward: Number = signal(0.0, unit="any", doc="What is added to the command.")
     integral: Scalar = state(0.0, unit="any", doc="Integral of the speed error over the integral time.")
 
     @derivative("integral")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Component, Scalar, observable, parameter, signal
+from atwood import Component, Number, Scalar, observable, parameter, signal
 
 
 class SignalFunction(Component):
@@ -26,9 +26,9 @@ class SignalFunction(Component):
         function_of={"u_1": "any", "u_2": "any", "u_3": "any", "t": "s"},
         doc="The function.",
     )
-    u_1: float = signal(0.0, unit="any", doc="First signal.")
-    u_2: float = signal(0.0, unit="any", doc="Second signal.")
-    u_3: float = signal(0.0, unit="any", doc="Third signal.")
+    u_1: Number = signal(0.0, unit="any", doc="First signal.")
+    u_2: Number = signal(0.0, unit="any", doc="Second signal.")
+    u_3: Number = signal(0.0, unit="any", doc="Third signal.")
 
     @observable(unit="any", doc="The value.")
     def y(self) -> Scalar:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Component, ParameterError, Scalar, derivative, observable, parameter, signal, state
+from atwood import Component, Number, ParameterError, Scalar, derivative, observable, parameter, signal, state
 
 
 class StateSpace(Component):
@@ -15,8 +15,8 @@ class StateSpace(Component):
     a: Any = parameter(((-1.0,),), array=True, doc="Matrix A, row by row.")
     b: Any = parameter((1.0,), array=True, doc="Column B.")
     c: Any = parameter((1.0,), array=True, doc="Row C.")
-    d: float = parameter(0.0, unit="any", doc="Share D of the input that passes through.")
-    u: float = signal(0.0, unit="any", doc="Input.")
+    d: Number = parameter(0.0, unit="any", doc="Share D of the input that passes through.")
+    u: Number = signal(0.0, unit="any", doc="Input.")
     x: Any = state(0.0, unit="any", count=lambda known: len(known["a"]), doc="States.")
 
     def check_values(self) -> None:

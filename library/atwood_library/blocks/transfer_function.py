@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Component, ParameterError, Scalar, derivative, observable, parameter, signal, state
+from atwood import Component, Number, ParameterError, Scalar, derivative, observable, parameter, signal, state
 
 
 class TransferFunction(Component):
@@ -21,7 +21,7 @@ class TransferFunction(Component):
 
     numerator: Any = parameter((1.0,), array=True, doc="Coefficients of the numerator, of falling powers of s.")
     denominator: Any = parameter((1.0, 1.0), array=True, doc="Coefficients of the denominator, of falling powers of s.")
-    u: float = signal(0.0, unit="any", doc="Input.")
+    u: Number = signal(0.0, unit="any", doc="Input.")
     x: Any = state(0.0, unit="any", count=lambda known: len(known["denominator"]) - 1, doc="States.")
 
     def check_values(self) -> None:

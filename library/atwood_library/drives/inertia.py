@@ -10,10 +10,12 @@ from atwood import (
     BodyInertia,
     Component,
     Frame,
+    Number,
     Outline,
     Placement,
     Scalar,
     Shaft,
+    Triple,
     Vector,
     as_vector,
     atan2,
@@ -42,11 +44,9 @@ class Inertia(Component):
     synonyms = ("Flywheel", "Rotor", "Rotational.Components.Inertia")
     spaces = ("plane", "space")
 
-    moment: float = parameter(1.0, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the axis.")
-    position: tuple[float, float, float] = parameter(
-        (0.0, 0.0, 0.0), unit="m", size=3, place=True, doc="Where it is in the world."
-    )
-    axis: tuple[float, float, float] = parameter(
+    moment: Number = parameter(1.0, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the axis.")
+    position: Triple = parameter((0.0, 0.0, 0.0), unit="m", size=3, place=True, doc="Where it is in the world.")
+    axis: Triple = parameter(
         (0.0, -1.0, 0.0), turning=True, doc="Axis in the world; the angle is right-handed about it."
     )
     rotor: Frame = connector(Frame, "The frame that turns.")

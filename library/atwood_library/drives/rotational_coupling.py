@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, Shaft, connector, constraint, observable, parameter
+from atwood import Component, Number, Scalar, Shaft, connector, constraint, observable, parameter
 
 
 class RotationalCoupling(Component):
@@ -14,7 +14,7 @@ class RotationalCoupling(Component):
     )
     spaces = ("plane", "space")
 
-    offset: float = parameter(0.0, unit="rad", doc="By how much b is ahead of a.")
+    offset: Number = parameter(0.0, unit="rad", doc="By how much b is ahead of a.")
     a: Shaft = connector(Shaft, "One angle.")
     b: Shaft = connector(Shaft, "The other angle.")
 

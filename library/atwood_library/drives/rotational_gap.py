@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from atwood import (
+    Number,
     Scalar,
     Shaft,
     connector,
@@ -27,11 +28,11 @@ class RotationalGap(Gap):
     )
     spaces = ("plane", "space")
 
-    stiffness: float = parameter(1e4, unit="N*m/rad", above=0.0, doc="Torque for a unit beyond the play.")
-    damping: float = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a unit of the rate in contact.")
+    stiffness: Number = parameter(1e4, unit="N*m/rad", above=0.0, doc="Torque for a unit beyond the play.")
+    damping: Number = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a unit of the rate in contact.")
     ends: str = parameter("both", choices=("both", "upper", "lower"), doc="Where the play ends.")
-    lower: float = parameter(-0.5, unit="rad", doc="Where it ends below.")
-    upper: float = parameter(0.5, unit="rad", doc="Where it ends above.")
+    lower: Number = parameter(-0.5, unit="rad", doc="Where it ends below.")
+    upper: Number = parameter(0.5, unit="rad", doc="Where it ends above.")
     against: str = parameter("flange", choices=("flange", "ground"), doc="What it acts against.")
     a: Shaft = connector(Shaft, "The angle that it acts against.", when={"against": ("flange",)})
     b: Shaft = connector(Shaft, "The angle that it acts on.")

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from atwood import Component, CoordinateLoad, Scalar, Shaft, connector, derivative, force, observable, parameter, state
+from atwood import (
+    Component,
+    CoordinateLoad,
+    Number,
+    Scalar,
+    Shaft,
+    connector,
+    derivative,
+    force,
+    observable,
+    parameter,
+    state,
+)
 from atwood_library.interfaces.along_coordinates import between, push
 
 
@@ -14,8 +26,8 @@ class RotationalMaxwell(Component):
     synonyms = ("Maxwell element", "Rotational spring and damper in series", "Relaxation")
     spaces = ("plane", "space")
 
-    stiffness: float = parameter(1.0, unit="N*m/rad", above=0.0, doc="Torque for a unit of extension of the spring.")
-    damping: float = parameter(1.0, unit="N*m*s/rad", above=0.0, doc="Torque for a unit of the damper's rate.")
+    stiffness: Number = parameter(1.0, unit="N*m/rad", above=0.0, doc="Torque for a unit of extension of the spring.")
+    damping: Number = parameter(1.0, unit="N*m*s/rad", above=0.0, doc="Torque for a unit of the damper's rate.")
     against: str = parameter("flange", choices=("flange", "ground"), doc="What it acts against.")
     a: Shaft = connector(Shaft, "The angle that it acts against.", when={"against": ("flange",)})
     b: Shaft = connector(Shaft, "The angle that it acts on.")

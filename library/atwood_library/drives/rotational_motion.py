@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, Shaft, connector, constraint, derivative, observable, parameter, signal, state
+from atwood import (
+    Component,
+    Number,
+    Scalar,
+    Shaft,
+    connector,
+    constraint,
+    derivative,
+    observable,
+    parameter,
+    signal,
+    state,
+)
 from atwood_library.interfaces.along_coordinates import between
 
 
@@ -23,9 +35,9 @@ class RotationalMotion(Component):
     follows: str = parameter(
         "place", choices=("place", "speed", "acceleration"), doc="What is given: the angle, or one of its rates."
     )
-    place: float = signal(0.0, unit="rad", doc="The angle, a function of time.")
-    speed: float = signal(0.0, unit="rad/s", doc="Its rate, a function of time.")
-    acceleration: float = signal(0.0, unit="rad/s^2", doc="Its second rate, a function of time.")
+    place: Number = signal(0.0, unit="rad", doc="The angle, a function of time.")
+    speed: Number = signal(0.0, unit="rad/s", doc="Its rate, a function of time.")
+    acceleration: Number = signal(0.0, unit="rad/s^2", doc="Its second rate, a function of time.")
     planned: Scalar = state(0.0, unit="rad/s", doc="The rate, where the second one is given.")
     against: str = parameter("ground", choices=("flange", "ground"), doc="What it acts against.")
     a: Shaft = connector(Shaft, "The angle that it acts against.", when={"against": ("flange",)})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from atwood import Component, CoordinateLoad, Scalar, Shaft, connector, force, observable, parameter, signal
+from atwood import Component, CoordinateLoad, Number, Scalar, Shaft, connector, force, observable, parameter, signal
 from atwood_library.interfaces.along_coordinates import between, push, resistance
 
 
@@ -23,19 +23,19 @@ class RotationalResistance(Component):
     )
     spaces = ("plane", "space")
 
-    linear: float = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a unit of speed.")
-    quadratic: float = parameter(
+    linear: Number = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a unit of speed.")
+    quadratic: Number = parameter(
         0.0, unit="N*m*s^2/rad^2", minimum=0.0, doc="Torque for the square of a unit of speed."
     )
-    constant: float = parameter(0.0, unit="N*m", minimum=0.0, doc="Torque at any speed.")
-    power: float = parameter(0.0, unit="W", minimum=0.0, doc="Power that is taken at any speed.")
-    smooth_below: float = parameter(
+    constant: Number = parameter(0.0, unit="N*m", minimum=0.0, doc="Torque at any speed.")
+    power: Number = parameter(0.0, unit="W", minimum=0.0, doc="Power that is taken at any speed.")
+    smooth_below: Number = parameter(
         1e-3,
         unit="rad/s",
         above=0.0,
         doc="Speed below which what does not vanish with the speed is proportional to it.",
     )
-    level: float = signal(1.0, doc="What all of it is multiplied by.")
+    level: Number = signal(1.0, doc="What all of it is multiplied by.")
     against: str = parameter("ground", choices=("flange", "ground"), doc="What it acts against.")
     a: Shaft = connector(Shaft, "The angle that it acts against.", when={"against": ("flange",)})
     b: Shaft = connector(Shaft, "The angle that it acts on.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, CoordinateLoad, Scalar, Shaft, connector, force, observable, parameter, signal
+from atwood import Component, CoordinateLoad, Number, Scalar, Shaft, connector, force, observable, parameter, signal
 from atwood_library.interfaces.along_coordinates import between, push
 
 
@@ -21,7 +21,7 @@ class RotationalSource(Component):
     )
     spaces = ("plane", "space")
 
-    value: float = signal(0.0, unit="N*m", doc="The torque, positive where it makes b grow.")
+    value: Number = signal(0.0, unit="N*m", doc="The torque, positive where it makes b grow.")
     law: Any = parameter(
         0.0,
         unit="N*m",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, Shaft, connector, dissipation, observable, parameter, potential
+from atwood import Component, Number, Scalar, Shaft, connector, dissipation, observable, parameter, potential
 from atwood_library.interfaces.along_coordinates import between
 
 
@@ -15,9 +15,9 @@ class RotationalSpringDamper(Component):
     )
     spaces = ("plane", "space")
 
-    stiffness: float = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque for a unit of extension.")
-    damping: float = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a unit of its rate.")
-    natural: float = parameter(0.0, unit="rad", doc="Extension at which the spring has no torque.")
+    stiffness: Number = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque for a unit of extension.")
+    damping: Number = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a unit of its rate.")
+    natural: Number = parameter(0.0, unit="rad", doc="Extension at which the spring has no torque.")
     against: str = parameter("flange", choices=("flange", "ground"), doc="What it acts against.")
     a: Shaft = connector(Shaft, "The angle that it acts against.", when={"against": ("flange",)})
     b: Shaft = connector(Shaft, "The angle that it acts on.")

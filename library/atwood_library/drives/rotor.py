@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scalar, as_vector, dot, lagrangian, parameter
+from atwood import Number, Scalar, as_vector, dot, lagrangian, parameter
 from atwood_library.joints.pivot import Pivot
 
 
@@ -24,7 +24,7 @@ class Rotor(Pivot):
     )
     spaces = ("plane", "space")
 
-    moment: float = parameter(1.0, unit="kg*m^2", above=0.0, doc="Moment of inertia about the axis.")
+    moment: Number = parameter(1.0, unit="kg*m^2", above=0.0, doc="Moment of inertia about the axis.")
 
     @lagrangian
     def energy(self) -> Scalar:

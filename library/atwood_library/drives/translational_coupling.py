@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, Slide, connector, constraint, observable, parameter
+from atwood import Component, Number, Scalar, Slide, connector, constraint, observable, parameter
 
 
 class TranslationalCoupling(Component):
@@ -13,7 +13,7 @@ class TranslationalCoupling(Component):
         *("Flange connection", "Translational.Components.Rod"),
     )
 
-    offset: float = parameter(0.0, unit="m", doc="By how much b is ahead of a.")
+    offset: Number = parameter(0.0, unit="m", doc="By how much b is ahead of a.")
     a: Slide = connector(Slide, "One displacement.")
     b: Slide = connector(Slide, "The other displacement.")
 

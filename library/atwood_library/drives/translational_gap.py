@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from atwood import (
+    Number,
     Scalar,
     Slide,
     connector,
@@ -23,11 +24,11 @@ class TranslationalGap(Gap):
 
     synonyms = ("ElastoGap", "Backlash", "Stop", "MassWithStopAndFriction")
 
-    stiffness: float = parameter(1e4, unit="N/m", above=0.0, doc="Force for a unit beyond the play.")
-    damping: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of the rate in contact.")
+    stiffness: Number = parameter(1e4, unit="N/m", above=0.0, doc="Force for a unit beyond the play.")
+    damping: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of the rate in contact.")
     ends: str = parameter("both", choices=("both", "upper", "lower"), doc="Where the play ends.")
-    lower: float = parameter(-0.5, unit="m", doc="Where it ends below.")
-    upper: float = parameter(0.5, unit="m", doc="Where it ends above.")
+    lower: Number = parameter(-0.5, unit="m", doc="Where it ends below.")
+    upper: Number = parameter(0.5, unit="m", doc="Where it ends above.")
     against: str = parameter("flange", choices=("flange", "ground"), doc="What it acts against.")
     a: Slide = connector(Slide, "The displacement that it acts against.", when={"against": ("flange",)})
     b: Slide = connector(Slide, "The displacement that it acts on.")

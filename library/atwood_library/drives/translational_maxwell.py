@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from atwood import Component, CoordinateLoad, Scalar, Slide, connector, derivative, force, observable, parameter, state
+from atwood import (
+    Component,
+    CoordinateLoad,
+    Number,
+    Scalar,
+    Slide,
+    connector,
+    derivative,
+    force,
+    observable,
+    parameter,
+    state,
+)
 from atwood_library.interfaces.along_coordinates import between, push
 
 
@@ -13,8 +25,8 @@ class TranslationalMaxwell(Component):
 
     synonyms = ("Maxwell element", "Translational spring and damper in series", "Relaxation")
 
-    stiffness: float = parameter(1.0, unit="N/m", above=0.0, doc="Force for a unit of extension of the spring.")
-    damping: float = parameter(1.0, unit="N*s/m", above=0.0, doc="Force for a unit of the damper's rate.")
+    stiffness: Number = parameter(1.0, unit="N/m", above=0.0, doc="Force for a unit of extension of the spring.")
+    damping: Number = parameter(1.0, unit="N*s/m", above=0.0, doc="Force for a unit of the damper's rate.")
     against: str = parameter("flange", choices=("flange", "ground"), doc="What it acts against.")
     a: Slide = connector(Slide, "The displacement that it acts against.", when={"against": ("flange",)})
     b: Slide = connector(Slide, "The displacement that it acts on.")

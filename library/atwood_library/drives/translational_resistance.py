@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from atwood import Component, CoordinateLoad, Scalar, Slide, connector, force, observable, parameter, signal
+from atwood import Component, CoordinateLoad, Number, Scalar, Slide, connector, force, observable, parameter, signal
 from atwood_library.interfaces.along_coordinates import between, push, resistance
 
 
@@ -22,14 +22,14 @@ class TranslationalResistance(Component):
         *("SupportFriction", "Translational.Components.Brake"),
     )
 
-    linear: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of speed.")
-    quadratic: float = parameter(0.0, unit="N*s^2/m^2", minimum=0.0, doc="Force for the square of a unit of speed.")
-    constant: float = parameter(0.0, unit="N", minimum=0.0, doc="Force at any speed.")
-    power: float = parameter(0.0, unit="W", minimum=0.0, doc="Power that is taken at any speed.")
-    smooth_below: float = parameter(
+    linear: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of speed.")
+    quadratic: Number = parameter(0.0, unit="N*s^2/m^2", minimum=0.0, doc="Force for the square of a unit of speed.")
+    constant: Number = parameter(0.0, unit="N", minimum=0.0, doc="Force at any speed.")
+    power: Number = parameter(0.0, unit="W", minimum=0.0, doc="Power that is taken at any speed.")
+    smooth_below: Number = parameter(
         1e-3, unit="m/s", above=0.0, doc="Speed below which what does not vanish with the speed is proportional to it."
     )
-    level: float = signal(1.0, doc="What all of it is multiplied by.")
+    level: Number = signal(1.0, doc="What all of it is multiplied by.")
     against: str = parameter("ground", choices=("flange", "ground"), doc="What it acts against.")
     a: Slide = connector(Slide, "The displacement that it acts against.", when={"against": ("flange",)})
     b: Slide = connector(Slide, "The displacement that it acts on.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, CoordinateLoad, Scalar, Slide, connector, force, observable, parameter, signal
+from atwood import Component, CoordinateLoad, Number, Scalar, Slide, connector, force, observable, parameter, signal
 from atwood_library.interfaces.along_coordinates import between, push
 
 
@@ -20,7 +20,7 @@ class TranslationalSource(Component):
         *("Translational.Sources.ForceStep", "ForceToPositionAdaptor"),
     )
 
-    value: float = signal(0.0, unit="N", doc="The force, positive where it makes b grow.")
+    value: Number = signal(0.0, unit="N", doc="The force, positive where it makes b grow.")
     law: Any = parameter(
         0.0,
         unit="N",

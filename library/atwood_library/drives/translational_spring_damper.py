@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, Slide, connector, dissipation, observable, parameter, potential
+from atwood import Component, Number, Scalar, Slide, connector, dissipation, observable, parameter, potential
 from atwood_library.interfaces.along_coordinates import between
 
 
@@ -14,9 +14,9 @@ class TranslationalSpringDamper(Component):
         *("Translational.Components.Spring", "Translational.Components.Damper"),
     )
 
-    stiffness: float = parameter(0.0, unit="N/m", minimum=0.0, doc="Force for a unit of extension.")
-    damping: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of its rate.")
-    natural: float = parameter(0.0, unit="m", doc="Extension at which the spring has no force.")
+    stiffness: Number = parameter(0.0, unit="N/m", minimum=0.0, doc="Force for a unit of extension.")
+    damping: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of its rate.")
+    natural: Number = parameter(0.0, unit="m", doc="Extension at which the spring has no force.")
     against: str = parameter("flange", choices=("flange", "ground"), doc="What it acts against.")
     a: Slide = connector(Slide, "The displacement that it acts against.", when={"against": ("flange",)})
     b: Slide = connector(Slide, "The displacement that it acts on.")

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Component, Point, Scalar, Vector, connector, cross, dot, lagrangian, observable, parameter, potential
+from atwood import (
+    Component,
+    Number,
+    Point,
+    Scalar,
+    Vector,
+    connector,
+    cross,
+    dot,
+    lagrangian,
+    observable,
+    parameter,
+    potential,
+)
 
 PLACE_AND_TIME = {"x": "m", "y": "m", "z": "m", "t": "s"}
 """What fields are functions of: the position in world axes, and time."""
@@ -20,7 +33,7 @@ class Charge(Component):
 
     synonyms = ("Charged particle", "Electromagnetic potentials", "Generalized potential")
 
-    charge: float = parameter(1.0, unit="C", doc="Charge.")
+    charge: Number = parameter(1.0, unit="C", doc="Charge.")
     scalar_potential: Any = parameter(0.0, unit="V", function_of=PLACE_AND_TIME, doc="Electric potential phi.")
     vector_potential: Any = parameter(
         (0.0, 0.0, 0.0), unit="Wb/m", size=3, function_of=PLACE_AND_TIME, doc="Vector potential A in world axes."

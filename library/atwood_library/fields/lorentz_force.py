@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, Load, Point, Vector, connector, cross, force, observable, parameter
+from atwood import Component, Load, Number, Point, Vector, connector, cross, force, observable, parameter
 from atwood_library.fields.charge import PLACE_AND_TIME
 
 
@@ -18,7 +18,7 @@ class LorentzForce(Component):
 
     synonyms = ("Charge in fields", "Electromagnetic force")
 
-    charge: float = parameter(1.0, unit="C", doc="Charge.")
+    charge: Number = parameter(1.0, unit="C", doc="Charge.")
     electric_field: Any = parameter(
         (0.0, 0.0, 0.0), unit="V/m", size=3, function_of=PLACE_AND_TIME, doc="Electric field E in world axes."
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 
-from atwood import Point, Scalar, connector, parameter
+from atwood import Number, Point, Scalar, connector, parameter
 from atwood_library.interfaces.interaction import Interaction
 
 
@@ -15,7 +15,7 @@ class MutualPotential(Interaction):
     synonyms = ("N-body gravity", "All pairs")
 
     count: int = parameter(2, minimum=2, integer=True, doc="How many points.")
-    charge: float = parameter(1.0, unit="C", doc="For charges: that of each point.")
+    charge: Number = parameter(1.0, unit="C", doc="For charges: that of each point.")
     point: Sequence[Point] = connector(Point, "The points.", count="count")
 
     def pairs(self) -> Iterator[tuple[Point, Point, Scalar]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from atwood import Point, Scalar, Vector, connector, norm, observable, parameter
+from atwood import Number, Point, Scalar, Vector, connector, norm, observable, parameter
 from atwood_library.interfaces.interaction import Interaction
 
 
@@ -16,8 +16,8 @@ class PairPotential(Interaction):
 
     synonyms = ("Two-body force", "Central force", "Coulomb force", "Newtonian gravity")
 
-    charge_a: float = parameter(1.0, unit="C", doc="For charges: that of a.")
-    charge_b: float = parameter(1.0, unit="C", doc="For charges: that of b.")
+    charge_a: Number = parameter(1.0, unit="C", doc="For charges: that of a.")
+    charge_b: Number = parameter(1.0, unit="C", doc="For charges: that of b.")
     a: Point = connector(Point, "One point.")
     b: Point = connector(Point, "The other point.")
 

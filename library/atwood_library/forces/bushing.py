@@ -6,6 +6,7 @@ from atwood import (
     Component,
     Frame,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -40,22 +41,20 @@ class Bushing(Component):
 
     synonyms = ("Rubber mount",)
 
-    stiffness: tuple[float, float, float] = parameter(
+    stiffness: Triple = parameter(
         (1.0, 1.0, 1.0), unit="N/m", size=3, minimum=0.0, doc="Stiffness along the axes of frame a."
     )
-    damping: tuple[float, float, float] = parameter(
-        _ZERO, unit="N*s/m", size=3, minimum=0.0, doc="Damping along the axes of frame a."
-    )
-    free_displacement: tuple[float, float, float] = parameter(
+    damping: Triple = parameter(_ZERO, unit="N*s/m", size=3, minimum=0.0, doc="Damping along the axes of frame a.")
+    free_displacement: Triple = parameter(
         _ZERO, unit="m", size=3, doc="Displacement of frame b without force, in the axes of frame a."
     )
-    turning_stiffness: tuple[float, float, float] = parameter(
+    turning_stiffness: Triple = parameter(
         (1.0, 1.0, 1.0), unit="N*m/rad", size=3, minimum=0.0, doc="Stiffness about the axes of frame a."
     )
-    turning_damping: tuple[float, float, float] = parameter(
+    turning_damping: Triple = parameter(
         _ZERO, unit="N*m*s/rad", size=3, minimum=0.0, doc="Damping about the axes of frame a."
     )
-    free_rotation: tuple[float, float, float] = parameter(
+    free_rotation: Triple = parameter(
         _ZERO, unit="rad", size=3, doc="Rotation vector of frame b without torque; about y, clockwise in a plane."
     )
     a: Frame = connector(Frame, "The frame that displacement and rotation are measured from.")

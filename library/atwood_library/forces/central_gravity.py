@@ -5,6 +5,7 @@ from __future__ import annotations
 from atwood import (
     Component,
     Frame,
+    Number,
     Point,
     Scalar,
     Vector,
@@ -34,7 +35,7 @@ class CentralGravity(Component):
 
     synonyms = ("PointGravity", "Kepler force")
 
-    gravitational_parameter: float = parameter(
+    gravitational_parameter: Number = parameter(
         3.986004418e14, unit="m^3/s^2", minimum=0.0, doc="G M of the source; by default that of the Earth."
     )
     attracts: str = parameter("point", choices=("point", "body"), doc="Whether a point mass or an extended body.")

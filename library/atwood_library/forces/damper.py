@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Point, Scalar, connector, dissipation, dot, observable, parameter
+from atwood import Component, Number, Point, Scalar, connector, dissipation, dot, observable, parameter
 
 
 class Damper(Component):
@@ -13,7 +13,7 @@ class Damper(Component):
 
     synonyms = ("DamperParallel", "Dashpot", "SpringDamperParallel", "SpringDamperSeries")
 
-    damping: float = parameter(1.0, unit="N*s/m", minimum=0.0, doc="Force for a rate of one metre a second.")
+    damping: Number = parameter(1.0, unit="N*s/m", minimum=0.0, doc="Force for a rate of one metre a second.")
     a: Point = connector(Point, "One end.")
     b: Point = connector(Point, "The other end.")
 

@@ -8,8 +8,10 @@ from typing import Any
 from atwood import (
     Component,
     Load,
+    Number,
     Point,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -32,17 +34,17 @@ class Drag(Component):
 
     synonyms = ("Air resistance", "Viscous drag")
 
-    linear: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for one metre a second, where it is slow.")
-    quadratic: float | None = parameter(
+    linear: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for one metre a second, where it is slow.")
+    quadratic: Number | None = parameter(
         None,
         unit="N*s^2/m^2",
         minimum=0.0,
         doc="Force for one metre a second, where it is fast; half density times area times c_d if not given.",
     )
-    density: float = parameter(1.225, unit="kg/m^3", minimum=0.0, doc="Density of the medium.")
-    area: float = parameter(0.0, unit="m^2", minimum=0.0, doc="Area that faces the stream.")
-    drag_coefficient: float = parameter(1.0, minimum=0.0, doc="Drag coefficient c_d of that area.")
-    wind: tuple[float, float, float] = parameter(
+    density: Number = parameter(1.225, unit="kg/m^3", minimum=0.0, doc="Density of the medium.")
+    area: Number = parameter(0.0, unit="m^2", minimum=0.0, doc="Area that faces the stream.")
+    drag_coefficient: Number = parameter(1.0, minimum=0.0, doc="Drag coefficient c_d of that area.")
+    wind: Triple = parameter(
         (0.0, 0.0, 0.0),
         unit="m/s",
         size=3,

@@ -8,8 +8,10 @@ from atwood import (
     Component,
     Frame,
     Load,
+    Number,
     Point,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -30,13 +32,11 @@ class Force(Component):
 
     synonyms = ("WorldForce", "Applied force", "Thruster", "WorldForceAndTorque", "ForceAndTorque")
 
-    direction: tuple[float, float, float] = parameter(
-        (1.0, 0.0, 0.0), direction=True, doc="Direction, in the axes that it is resolved in."
-    )
+    direction: Triple = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction, in the axes that it is resolved in.")
     resolved_in: str = parameter(
         "world", choices=("world", "body", "other"), doc="The axes in which the direction is given."
     )
-    value: float = signal(0.0, unit="N", doc="Force along the direction, a function of time.")
+    value: Number = signal(0.0, unit="N", doc="Force along the direction, a function of time.")
     point: Point = connector(Point, "Where the force acts.", when={"resolved_in": ("world", "other")})
     frame: Frame = connector(Frame, "Where the force acts, and what it turns with.", when={"resolved_in": ("body",)})
     other: Frame = connector(Frame, "The frame that the direction is given in.", when={"resolved_in": ("other",)})

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from atwood import (
     Component,
+    Number,
     Point,
     PointInertia,
     Scalar,
@@ -33,15 +34,15 @@ class Spring(Component):
         *("LineForceWithTwoMasses", "SpringDamperParallel", "SpringDamperSeries"),
     )
 
-    stiffness: float = parameter(1.0, unit="N/m", minimum=0.0, doc="Force for an extension by one metre.")
-    natural_length: float = parameter(0.0, unit="m", minimum=0.0, doc="Length without force.")
+    stiffness: Number = parameter(1.0, unit="N/m", minimum=0.0, doc="Force for an extension by one metre.")
+    natural_length: Number = parameter(0.0, unit="m", minimum=0.0, doc="Length without force.")
     acts: str = parameter(
         "restoring",
         choices=("restoring", "repelling"),
         doc="Whether it pulls back to its natural length, or pushes away from it as one of negative stiffness.",
     )
-    mass: float = parameter(0.0, unit="kg", minimum=0.0, doc="Mass of the spring.")
-    mass_at: float | None = parameter(
+    mass: Number = parameter(0.0, unit="kg", minimum=0.0, doc="Mass of the spring.")
+    mass_at: Number | None = parameter(
         None, minimum=0.0, maximum=1.0, doc="Where the mass is, from 0 at a to 1 at b; none if it is spread evenly."
     )
     a: Point = connector(Point, "One end.")

@@ -4,7 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from atwood import Component, Frame, Load, Scalar, Vector, as_vector, connector, force, observable, parameter, signal
+from atwood import (
+    Component,
+    Frame,
+    Load,
+    Number,
+    Scalar,
+    Triple,
+    Vector,
+    as_vector,
+    connector,
+    force,
+    observable,
+    parameter,
+    signal,
+)
 
 
 class Torque(Component):
@@ -18,7 +32,7 @@ class Torque(Component):
     synonyms = ("WorldTorque", "Applied torque", "Couple", "WorldForceAndTorque", "ForceAndTorque")
     spaces = ("plane", "space")
 
-    axis: tuple[float, float, float] = parameter(
+    axis: Triple = parameter(
         (0.0, -1.0, 0.0),
         turning=True,
         doc="Axis, in the axes that it is resolved in; the torque is right-handed about it, so counter-clockwise in a "
@@ -28,7 +42,7 @@ class Torque(Component):
         "world", choices=("world", "body", "other"), doc="The axes in which the torque's axis is given."
     )
     reacts_on: str = parameter("world", choices=("world", "other"), doc="What takes the opposite torque.")
-    value: float = signal(0.0, unit="N*m", doc="Torque about the axis, a function of time.")
+    value: Number = signal(0.0, unit="N*m", doc="Torque about the axis, a function of time.")
     frame: Frame = connector(Frame, "Where the torque acts.")
     other: Frame = connector(
         Frame,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scalar, dissipation, observable, parameter
+from atwood import Number, Scalar, dissipation, observable, parameter
 from atwood_library.interfaces.twisted import Twisted
 
 
@@ -15,7 +15,7 @@ class TorsionDamper(Twisted):
 
     synonyms = ("Rotational damper",)
 
-    damping: float = parameter(1.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a rate of one radian a second.")
+    damping: Number = parameter(1.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a rate of one radian a second.")
 
     @dissipation
     def rayleigh_function(self) -> Scalar:

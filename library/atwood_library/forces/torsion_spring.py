@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scalar, as_vector, event, is_zero, observable, parameter, potential
+from atwood import Number, Scalar, as_vector, event, is_zero, observable, parameter, potential
 from atwood_library.interfaces.bearings import twist_cosine
 from atwood_library.interfaces.twisted import Twisted
 
@@ -24,8 +24,8 @@ class TorsionSpring(Twisted):
 
     synonyms = ("Rotational spring", "Torsional spring")
 
-    stiffness: float = parameter(1.0, unit="N*m/rad", minimum=0.0, doc="Torque for a twist by one radian.")
-    natural_angle: float = parameter(0.0, unit="rad", doc="Angle without torque.")
+    stiffness: Number = parameter(1.0, unit="N*m/rad", minimum=0.0, doc="Torque for a twist by one radian.")
+    natural_angle: Number = parameter(0.0, unit="rad", doc="Angle without torque.")
 
     @potential
     def elastic_energy(self) -> Scalar:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, Load, force, is_zero, signal
+from atwood import Component, Load, Number, force, is_zero, signal
 from atwood_library.interfaces.loads import turn_apart
 
 
 class AxisMotor(Component):
     """A joint between frames a and b with an `axis_in_world`, about which a motor turns b against a."""
 
-    motor: float = signal(0.0, unit="N*m", doc="Torque of the motor on frame b, and against frame a.")
+    motor: Number = signal(0.0, unit="N*m", doc="Torque of the motor on frame b, and against frame a.")
 
     @force
     def motor_torque(self) -> Iterable[Load]:

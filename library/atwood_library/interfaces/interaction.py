@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from atwood import Component, Outline, Point, Scalar, Vector, norm, observable, parameter, potential
+from atwood import Component, Number, Outline, Point, Scalar, Vector, norm, observable, parameter, potential
 
 __all__ = ["Interaction"]
 
@@ -26,10 +26,10 @@ class Interaction(Component):
     energy_function: Any = parameter(
         0.0, unit="J", function_of={"r": "m", "t": "s"}, doc="For a function: energy of a pair at the distance r."
     )
-    gravitational_constant: float = parameter(
+    gravitational_constant: Number = parameter(
         GRAVITATIONAL_CONSTANT, unit="m^3/(kg*s^2)", doc="For gravity: the constant G; negative to repel."
     )
-    coulomb_constant: float = parameter(
+    coulomb_constant: Number = parameter(
         COULOMB_CONSTANT, unit="N*m^2/C^2", minimum=0.0, doc="For charges: the constant k, ``1/(4 pi epsilon)``."
     )
 

@@ -8,7 +8,9 @@ from typing import Any
 from atwood import (
     Component,
     Load,
+    Number,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     cos,
@@ -31,24 +33,24 @@ class LoadedBall(Component):
     The stop is a cone about an axis of frame a, in which the same axis of frame b stays.
     """
 
-    stiffness: float = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring for one small radian.")
-    damping: float = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper for one radian a second.")
-    stop_stiffness: float = parameter(
+    stiffness: Number = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring for one small radian.")
+    damping: Number = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper for one radian a second.")
+    stop_stiffness: Number = parameter(
         0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the stop for one radian beyond it."
     )
-    stop_axis: tuple[float, float, float] = parameter(
+    stop_axis: Triple = parameter(
         (0.0, 0.0, 1.0), direction=True, doc="Axis of the cone in frame a, and what stays within it in frame b."
     )
-    bend_stop: float | None = parameter(
+    bend_stop: Number | None = parameter(
         None,
         unit="rad",
         above=0.0,
         maximum=3.1,
         doc="Angle between the axes at which the stop acts; none if not given.",
     )
-    motor_x: float = signal(0.0, unit="N*m", doc="Torque on frame b along x of frame a, and against frame a.")
-    motor_y: float = signal(0.0, unit="N*m", doc="Torque on frame b along y of frame a, and against frame a.")
-    motor_z: float = signal(0.0, unit="N*m", doc="Torque on frame b along z of frame a, and against frame a.")
+    motor_x: Number = signal(0.0, unit="N*m", doc="Torque on frame b along x of frame a, and against frame a.")
+    motor_y: Number = signal(0.0, unit="N*m", doc="Torque on frame b along y of frame a, and against frame a.")
+    motor_z: Number = signal(0.0, unit="N*m", doc="Torque on frame b along z of frame a, and against frame a.")
 
     @potential
     def spring_energy(self) -> Scalar:

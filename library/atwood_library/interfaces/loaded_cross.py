@@ -5,34 +5,34 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, Load, Scalar, as_vector, dissipation, force, is_zero, parameter, potential, signal
+from atwood import Component, Load, Number, Scalar, as_vector, dissipation, force, is_zero, parameter, potential, signal
 from atwood_library.interfaces.loads import damper_function, elastic_energy, turn_apart
 
 
 class LoadedCross(Component):
     """A joint with `angle_a` and `rate_a` about `axis_a` of frame a, and `angle_b` and `rate_b` about `axis_b` of b."""
 
-    stiffness_a: float = parameter(
+    stiffness_a: Number = parameter(
         0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring about the first axis for one radian."
     )
-    natural_angle_a: float = parameter(0.0, unit="rad", doc="First angle at which its spring has no torque.")
-    damping_a: float = parameter(
+    natural_angle_a: Number = parameter(0.0, unit="rad", doc="First angle at which its spring has no torque.")
+    damping_a: Number = parameter(
         0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper about the first axis for one radian a second."
     )
-    lower_stop_a: float | None = parameter(None, unit="rad", doc="First angle below which a stop acts, if any.")
-    upper_stop_a: float | None = parameter(None, unit="rad", doc="First angle above which a stop acts, if any.")
-    motor_a: float = signal(0.0, unit="N*m", doc="Torque of the motor about the first axis on frame b, against a.")
-    stiffness_b: float = parameter(
+    lower_stop_a: Number | None = parameter(None, unit="rad", doc="First angle below which a stop acts, if any.")
+    upper_stop_a: Number | None = parameter(None, unit="rad", doc="First angle above which a stop acts, if any.")
+    motor_a: Number = signal(0.0, unit="N*m", doc="Torque of the motor about the first axis on frame b, against a.")
+    stiffness_b: Number = parameter(
         0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring about the second axis for one radian."
     )
-    natural_angle_b: float = parameter(0.0, unit="rad", doc="Second angle at which its spring has no torque.")
-    damping_b: float = parameter(
+    natural_angle_b: Number = parameter(0.0, unit="rad", doc="Second angle at which its spring has no torque.")
+    damping_b: Number = parameter(
         0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper about the second axis for one radian a second."
     )
-    lower_stop_b: float | None = parameter(None, unit="rad", doc="Second angle below which a stop acts, if any.")
-    upper_stop_b: float | None = parameter(None, unit="rad", doc="Second angle above which a stop acts, if any.")
-    motor_b: float = signal(0.0, unit="N*m", doc="Torque of the motor about the second axis on frame b, against a.")
-    stop_stiffness: float = parameter(
+    lower_stop_b: Number | None = parameter(None, unit="rad", doc="Second angle below which a stop acts, if any.")
+    upper_stop_b: Number | None = parameter(None, unit="rad", doc="Second angle above which a stop acts, if any.")
+    motor_b: Number = signal(0.0, unit="N*m", doc="Torque of the motor about the second axis on frame b, against a.")
+    stop_stiffness: Number = parameter(
         0.0, unit="N*m/rad", minimum=0.0, doc="Torque of a stop for one radian beyond it."
     )
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Scalar, dissipation, parameter, potential
+from atwood import Number, Scalar, dissipation, parameter, potential
 from atwood_library.interfaces.axis_motor import AxisMotor
 from atwood_library.interfaces.loads import damper_function, elastic_energy
 
@@ -15,14 +15,14 @@ from atwood_library.interfaces.loads import damper_function, elastic_energy
 class LoadedHinge(AxisMotor):
     """A joint between frames a and b with the observables `angle` and `angular_velocity`, which can carry loads."""
 
-    stiffness: float = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring for one radian.")
-    natural_angle: float = parameter(0.0, unit="rad", doc="Angle at which the spring has no torque.")
-    damping: float = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper for one radian a second.")
-    stop_stiffness: float = parameter(
+    stiffness: Number = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring for one radian.")
+    natural_angle: Number = parameter(0.0, unit="rad", doc="Angle at which the spring has no torque.")
+    damping: Number = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper for one radian a second.")
+    stop_stiffness: Number = parameter(
         0.0, unit="N*m/rad", minimum=0.0, doc="Torque of a stop for one radian beyond it."
     )
-    lower_stop: float | None = parameter(None, unit="rad", doc="Angle below which a stop acts; none if not given.")
-    upper_stop: float | None = parameter(None, unit="rad", doc="Angle above which a stop acts; none if not given.")
+    lower_stop: Number | None = parameter(None, unit="rad", doc="Angle below which a stop acts; none if not given.")
+    upper_stop: Number | None = parameter(None, unit="rad", doc="Angle above which a stop acts; none if not given.")
 
     @potential
     def spring_energy(self) -> Scalar:

@@ -8,6 +8,7 @@ from typing import Any
 from atwood import (
     Component,
     Load,
+    Number,
     Scalar,
     Vector,
     as_vector,
@@ -31,14 +32,14 @@ class LoadedPlate(Component):
     The spring pulls towards the origin, the damper against the motion over the plane, and the stop is a round rim.
     """
 
-    stiffness: float = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of the spring for one metre from the origin.")
-    damping: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force of the damper for one metre a second.")
-    stop_stiffness: float = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of the rim for one metre beyond it.")
-    rim: float | None = parameter(
+    stiffness: Number = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of the spring a metre from the origin.")
+    damping: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force of the damper for one metre a second.")
+    stop_stiffness: Number = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of the rim for one metre beyond it.")
+    rim: Number | None = parameter(
         None, unit="m", above=0.0, doc="Distance from the origin at which the stop acts; none if not given."
     )
-    actuator_1: float = signal(0.0, unit="N", doc="Force on b along the first direction of the plane, and against a.")
-    actuator_2: float = signal(0.0, unit="N", doc="Force on b along the second direction of the plane, and against a.")
+    actuator_1: Number = signal(0.0, unit="N", doc="Force on b along the first direction of the plane, and against a.")
+    actuator_2: Number = signal(0.0, unit="N", doc="Force on b along the second direction of the plane, and against a.")
 
     @potential
     def spring_energy(self) -> Scalar:

@@ -8,20 +8,24 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, Load, Scalar, dissipation, force, is_zero, parameter, potential, signal
+from atwood import Component, Load, Number, Scalar, dissipation, force, is_zero, parameter, potential, signal
 from atwood_library.interfaces.loads import damper_function, elastic_energy, push_apart
 
 
 class LoadedSlide(Component):
     """A joint between frames a and b with the observables `displacement` and `speed`, which can carry loads."""
 
-    stiffness: float = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of the spring for one metre.")
-    natural_length: float = parameter(0.0, unit="m", doc="Displacement at which the spring has no force.")
-    damping: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force of the damper for one metre a second.")
-    stop_stiffness: float = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of a stop for one metre beyond it.")
-    lower_stop: float | None = parameter(None, unit="m", doc="Displacement below which a stop acts; none if not given.")
-    upper_stop: float | None = parameter(None, unit="m", doc="Displacement above which a stop acts; none if not given.")
-    actuator: float = signal(0.0, unit="N", doc="Force of the actuator on frame b, and against frame a.")
+    stiffness: Number = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of the spring for one metre.")
+    natural_length: Number = parameter(0.0, unit="m", doc="Displacement at which the spring has no force.")
+    damping: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force of the damper for one metre a second.")
+    stop_stiffness: Number = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of a stop for one metre beyond it.")
+    lower_stop: Number | None = parameter(
+        None, unit="m", doc="Displacement below which a stop acts; none if not given."
+    )
+    upper_stop: Number | None = parameter(
+        None, unit="m", doc="Displacement above which a stop acts; none if not given."
+    )
+    actuator: Number = signal(0.0, unit="N", doc="Force of the actuator on frame b, and against frame a.")
 
     @potential
     def spring_energy(self) -> Scalar:

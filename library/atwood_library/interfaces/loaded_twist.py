@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Scalar, dissipation, parameter, potential
+from atwood import Number, Scalar, dissipation, parameter, potential
 from atwood_library.interfaces.axis_motor import AxisMotor
 from atwood_library.interfaces.loads import damper_function, elastic_energy
 
@@ -12,20 +12,20 @@ from atwood_library.interfaces.loads import damper_function, elastic_energy
 class LoadedTwist(AxisMotor):
     """A joint with `angle` and `angular_velocity` about an axis, beside displacements with loads of their own."""
 
-    torsional_stiffness: float = parameter(
+    torsional_stiffness: Number = parameter(
         0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the torsion spring for one radian."
     )
-    natural_angle: float = parameter(0.0, unit="rad", doc="Angle at which the torsion spring has no torque.")
-    torsional_damping: float = parameter(
+    natural_angle: Number = parameter(0.0, unit="rad", doc="Angle at which the torsion spring has no torque.")
+    torsional_damping: Number = parameter(
         0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the torsion damper for one radian a second."
     )
-    angle_stop_stiffness: float = parameter(
+    angle_stop_stiffness: Number = parameter(
         0.0, unit="N*m/rad", minimum=0.0, doc="Torque of a stop of the angle for one radian beyond it."
     )
-    lower_angle_stop: float | None = parameter(
+    lower_angle_stop: Number | None = parameter(
         None, unit="rad", doc="Angle below which a stop acts; none if not given."
     )
-    upper_angle_stop: float | None = parameter(
+    upper_angle_stop: Number | None = parameter(
         None, unit="rad", doc="Angle above which a stop acts; none if not given."
     )
 

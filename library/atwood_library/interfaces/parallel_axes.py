@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from atwood import Component, Frame, Scalar, Vector, as_vector, connector, constraint, dot, observable, parameter
+from atwood import (
+    Component,
+    Frame,
+    Scalar,
+    Triple,
+    Vector,
+    as_vector,
+    connector,
+    constraint,
+    dot,
+    observable,
+    parameter,
+)
 from atwood_library.interfaces.bearings import angle_about, axes_parallel, rate_about, rate_along, sideways
 
 
@@ -11,7 +23,7 @@ class ParallelAxes(Component):
 
     spaces = ("space",)
 
-    axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis, in both frames.")
+    axis: Triple = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis, in both frames.")
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")
 

@@ -8,8 +8,10 @@ from atwood import (
     FREE,
     Component,
     Frame,
+    Number,
     Placement,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -36,10 +38,8 @@ class Rolling(Component):
 
     spaces: ClassVar[tuple[str, ...]] = ("plane", "space")
 
-    radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius.")
-    normal: tuple[float, float, float] = parameter(
-        (0.0, 0.0, 1.0), direction=True, doc="Normal of the plane in frame a, towards the body."
-    )
+    radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius.")
+    normal: Triple = parameter((0.0, 0.0, 1.0), direction=True, doc="Normal of the plane in frame a, towards the body.")
     a: Frame = connector(Frame, "The frame that carries the plane; its origin is in it.")
     b: Frame = connector(Frame, "The frame of what rolls, at its centre.")
 

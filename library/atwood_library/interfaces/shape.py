@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import ParameterError, Scalar, Vector, as_vector, parameter
+from atwood import Number, ParameterError, Scalar, Vector, as_vector, parameter
 from atwood_library.interfaces.solid import Solid, Tensor
 
 __all__ = ["Axis", "Shape", "along", "diagonal", "revolved"]
@@ -19,10 +19,10 @@ class Shape(Solid):
     Beer and Johnston, Vector Mechanics for Engineers, table of mass moments of inertia.
     """
 
-    mass: float | None = parameter(
+    mass: Number | None = parameter(
         None, unit="kg", minimum=0.0, doc="Mass; if neither it nor the density is given, 1 kg."
     )
-    density: float | None = parameter(
+    density: Number | None = parameter(
         None, unit="kg/m^3", above=0.0, doc="Density, from which the mass follows; give it or the mass."
     )
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from atwood import Frame, Placement, connector, joint, parameter
+from atwood import Frame, Number, Placement, Triple, connector, joint, parameter
 from atwood_library.interfaces.shape import Axis, Shape, along
 
 
 class StraightShape(Shape):
     """A shape along an axis of its frame, which is at its centre; frames a and b are in the middles of its ends."""
 
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length, from a to b.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length, from a to b.")
     axis: str = parameter(
         "z", choices=("x", "y", "z", "direction"), doc="Axis of the frame that it lies along, from a to b."
     )
-    direction: tuple[float, float, float] = parameter(
-        (0.0, 0.0, 1.0), direction=True, doc="With that axis, any direction in the frame."
-    )
+    direction: Triple = parameter((0.0, 0.0, 1.0), direction=True, doc="With that axis, any direction in the frame.")
     a: Frame = connector(Frame, "The middle of the end at the negative side of the axis.")
     b: Frame = connector(Frame, "The middle of the end at the positive side of the axis.")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Frame, Scalar, as_vector, connector, parameter
+from atwood import Component, Frame, Scalar, Triple, as_vector, connector, parameter
 from atwood_library.interfaces.bearings import twist_about, twist_rate
 
 
@@ -14,7 +14,7 @@ class Twisted(Component):
 
     spaces = ("plane", "space")
 
-    axis: tuple[float, float, float] = parameter(
+    axis: Triple = parameter(
         (0.0, -1.0, 0.0),
         turning=True,
         doc="Axis in both frames; the angle is right-handed about it, so counter-clockwise in a plane unless reversed.",

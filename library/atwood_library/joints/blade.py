@@ -7,6 +7,7 @@ from atwood import (
     Frame,
     Outline,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -32,10 +33,8 @@ class Blade(Component):
     synonyms = ("Knife edge", "Skate", "Ice skate")
     spaces = ("plane", "space")
 
-    axis: tuple[float, float, float] = parameter(
-        (1.0, 0.0, 0.0), direction=True, doc="Direction of the blade in its frame b."
-    )
-    normal: tuple[float, float, float] = parameter(
+    axis: Triple = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction of the blade in its frame b.")
+    normal: Triple = parameter(
         (0.0, 1.0, 0.0), turning=True, doc="Normal, in frame a, of the surface that it cuts into."
     )
     a: Frame = connector(Frame, "The frame that carries the surface.")

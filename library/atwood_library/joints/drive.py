@@ -5,8 +5,10 @@ from __future__ import annotations
 from atwood import (
     Component,
     Frame,
+    Number,
     Placement,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -27,10 +29,8 @@ class Drive(Component):
 
     synonyms = ("Rheonomic constraint", "Prismatic with prescribed motion", "Actuator")
 
-    axis: tuple[float, float, float] = parameter(
-        (1.0, 0.0, 0.0), direction=True, doc="Direction of the motion in frame a."
-    )
-    motion: float = signal(0.0, unit="m", doc="Displacement of frame b along the axis, a function of time.")
+    axis: Triple = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction of the motion in frame a.")
+    motion: Number = signal(0.0, unit="m", doc="Displacement of frame b along the axis, a function of time.")
     a: Frame = connector(Frame, "The frame that carries the drive.")
     b: Frame = connector(Frame, "The frame that is moved.")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, Shaft, connector, constraint, observable, parameter
+from atwood import Component, Number, Scalar, Shaft, connector, constraint, observable, parameter
 
 
 class Gear(Component):
@@ -16,8 +16,8 @@ class Gear(Component):
 
     synonyms = ("IdealGear", "Gear pair", "Transmission", "GearConstraint", "Gearbox", "BevelGear1D", "LossyGear")
 
-    ratio: float = parameter(-1.0, doc="Turns of joint a for one turn of joint b; negative for outer wheels.")
-    offset: float = parameter(0.0, unit="rad", doc="Angle of joint a where that of joint b is zero.")
+    ratio: Number = parameter(-1.0, doc="Turns of joint a for one turn of joint b; negative for outer wheels.")
+    offset: Number = parameter(0.0, unit="rad", doc="Angle of joint a where that of joint b is zero.")
     support: str = parameter("ground", choices=("flange", "ground"), doc="What the housing is fixed to.")
     a: Shaft = connector(Shaft, "The angle of one joint.")
     b: Shaft = connector(Shaft, "The angle of the other joint.")

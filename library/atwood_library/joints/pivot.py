@@ -9,6 +9,7 @@ from atwood import (
     Placement,
     Scalar,
     Shaft,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -35,7 +36,7 @@ class Pivot(LoadedHinge):
         *("MultiBody.Joints.Constraints.Revolute", "JointUSR", "JointSSR", "JointRRR", "JointRRP"),
     )
 
-    axis: tuple[float, float, float] = parameter(
+    axis: Triple = parameter(
         (0.0, -1.0, 0.0),
         turning=True,
         doc="Axis in both frames; the angle is right-handed about it, so counter-clockwise in a plane unless reversed.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, Shaft, connector, constraint, observable, parameter
+from atwood import Component, Number, Scalar, Shaft, connector, constraint, observable, parameter
 
 
 class PlanetaryGear(Component):
@@ -15,8 +15,8 @@ class PlanetaryGear(Component):
 
     synonyms = ("IdealPlanetary", "Epicyclic gear")
 
-    ratio: float = parameter(2.0, above=0.0, doc="Teeth of the ring over teeth of the sun.")
-    offset: float = parameter(0.0, unit="rad", doc="Angle of the sun where carrier and ring are at zero.")
+    ratio: Number = parameter(2.0, above=0.0, doc="Teeth of the ring over teeth of the sun.")
+    offset: Number = parameter(0.0, unit="rad", doc="Angle of the sun where carrier and ring are at zero.")
     sun: Shaft = connector(Shaft, "The angle of the sun's joint.")
     carrier: Shaft = connector(Shaft, "The angle of the carrier's joint.")
     ring: Shaft = connector(Shaft, "The angle of the ring's joint.")

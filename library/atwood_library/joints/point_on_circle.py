@@ -7,9 +7,11 @@ from collections.abc import Iterable
 from atwood import (
     Frame,
     Load,
+    Number,
     Placement,
     Point,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     atan2,
@@ -42,8 +44,8 @@ class PointOnCircle(LoadedHinge):
 
     spaces = ("plane", "space")
 
-    axis: tuple[float, float, float] = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis of the circle, in frame a.")
-    radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius of the circle.")
+    axis: Triple = parameter((0.0, 0.0, 1.0), direction=True, doc="Axis of the circle, in frame a.")
+    radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius of the circle.")
     a: Frame = connector(Frame, "The frame that carries the circle; its origin is the centre.")
     b: Point = connector(Point, "The point.")
 

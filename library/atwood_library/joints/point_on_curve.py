@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 from atwood import (
     Component,
     Frame,
+    Number,
     Placement,
     Point,
     Scalar,
@@ -50,16 +51,16 @@ class PointOnCurve(Component):
     curve: Any = parameter(
         ("p", 0.0, 0.0), size=3, function_of={"p": "rad"}, doc="The curve in the axes of frame a, in units of scale."
     )
-    scale: float = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the curve's functions.")
-    offset: float = parameter(
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the curve's functions.")
+    offset: Number = parameter(
         0.0,
         unit="m",
         doc="Distance of the point from a curve in the x-z plane of frame a, to its left as the parameter grows.",
     )
-    lower_end: float | None = parameter(
+    lower_end: Number | None = parameter(
         None, unit="rad", doc="Parameter at which the curve begins; none if it goes on."
     )
-    upper_end: float | None = parameter(None, unit="rad", doc="Parameter at which the curve ends; none if it goes on.")
+    upper_end: Number | None = parameter(None, unit="rad", doc="Parameter at which the curve ends; none if it goes on.")
     a: Frame = connector(Frame, "The frame that carries the curve.")
     b: Point = connector(Point, "The point.")
     marker: Point = connector(Point, "The marker on the x axis of frame a; nothing need be joined to it.")

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Component, Frame, Outline, Point, Scalar, Vector, connector, constraint, norm, observable, parameter
+from atwood import (
+    Component,
+    Frame,
+    Number,
+    Outline,
+    Point,
+    Scalar,
+    Vector,
+    connector,
+    constraint,
+    norm,
+    observable,
+    parameter,
+)
 
 
 class PointOnLevelSurface(Component):
@@ -20,7 +33,7 @@ class PointOnLevelSurface(Component):
     function: Any = parameter(
         "z", function_of={"x": "1", "y": "1", "z": "1"}, doc="What is zero there; of place in units of scale."
     )
-    scale: float = parameter(1.0, unit="m", above=0.0, doc="Unit of length of the function.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Unit of length of the function.")
     a: Frame = connector(Frame, "The frame that carries the surface.")
     b: Point = connector(Point, "The point.")
 

@@ -7,6 +7,7 @@ from atwood import (
     Placement,
     Point,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -30,7 +31,7 @@ class PointOnLine(LoadedSlide):
 
     spaces = ("plane", "space")
 
-    axis: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction, in frame a.")
+    axis: Triple = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction, in frame a.")
     a: Frame = connector(Frame, "The frame that carries the line; its origin is on it.")
     b: Point = connector(Point, "The point.")
 

@@ -7,6 +7,7 @@ from atwood import (
     Placement,
     Point,
     Scalar,
+    Triple,
     as_vector,
     connector,
     constraint,
@@ -27,9 +28,7 @@ class PointOnPlane(LoadedPlate):
 
     spaces = ("space",)
 
-    axis: tuple[float, float, float] = parameter(
-        (0.0, 0.0, 1.0), direction=True, doc="Normal of the plane, in frame a."
-    )
+    axis: Triple = parameter((0.0, 0.0, 1.0), direction=True, doc="Normal of the plane, in frame a.")
     a: Frame = connector(Frame, "The frame that carries the plane; its origin is in it.")
     b: Point = connector(Point, "The point.")
 

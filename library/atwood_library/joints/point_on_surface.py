@@ -7,6 +7,7 @@ from typing import Any
 from atwood import (
     Component,
     Frame,
+    Number,
     Placement,
     Point,
     Scalar,
@@ -43,7 +44,7 @@ class PointOnSurface(Component):
         function_of=_PARAMETERS,
         doc="The surface in the axes of frame a, in units of scale.",
     )
-    scale: float = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the surface's functions.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the surface's functions.")
     edge: Any = parameter(
         1.0, function_of=_PARAMETERS, doc="A function that is positive within the surface and zero at its edge."
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, Shaft, Slide, connector, constraint, observable, parameter
+from atwood import Component, Number, Scalar, Shaft, Slide, connector, constraint, observable, parameter
 
 
 class RackAndPinion(Component):
@@ -13,8 +13,8 @@ class RackAndPinion(Component):
 
     synonyms = ("IdealGearR2T", "Rack and pinion", "IdealRollingWheel")
 
-    radius: float = parameter(1.0, unit="m", doc="Displacement of the rack for one radian of the pinion.")
-    offset: float = parameter(0.0, unit="m", doc="Displacement of the rack where the pinion's angle is zero.")
+    radius: Number = parameter(1.0, unit="m", doc="Displacement of the rack for one radian of the pinion.")
+    offset: Number = parameter(0.0, unit="m", doc="Displacement of the rack where the pinion's angle is zero.")
     rack: Slide = connector(Slide, "The displacement of the rack's joint.")
     pinion: Shaft = connector(Shaft, "The angle of the pinion's joint.")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scalar, Vector, as_vector, dot, parameter, sqrt
+from atwood import Scalar, Triple, Vector, as_vector, dot, parameter, sqrt
 from atwood_library.interfaces.rolling import Rolling
 
 
@@ -15,9 +15,7 @@ class RollingDisc(Rolling):
 
     synonyms = ("RollingWheel", "Rolling contact", "RollingWheelSet", "MultiBody.Joints.RollingWheelSet")
 
-    axis: tuple[float, float, float] = parameter(
-        (0.0, 1.0, 0.0), turning=True, doc="Axis of symmetry of the disc in frame b."
-    )
+    axis: Triple = parameter((0.0, 1.0, 0.0), turning=True, doc="Axis of symmetry of the disc in frame b.")
 
     def uprightness(self) -> tuple[Scalar, Scalar]:
         """Return cosine and sine of the angle between the disc's axis and the plane's normal."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scalar, Vector, as_vector, dot, parameter, sqrt
+from atwood import Number, Scalar, Triple, Vector, as_vector, dot, parameter, sqrt
 from atwood_library.interfaces.rolling import Rolling
 
 
@@ -17,8 +17,8 @@ class RollingEllipsoid(Rolling):
     synonyms = ("Rattleback", "Celt", "Ellipsoid on a plane")
     spaces = ("space",)
 
-    radius: float = parameter(1.0, unit="m", above=0.0, doc="Unit of the semi-axes.")
-    semi_axes: tuple[float, float, float] = parameter(
+    radius: Number = parameter(1.0, unit="m", above=0.0, doc="Unit of the semi-axes.")
+    semi_axes: Triple = parameter(
         (1.0, 1.0, 1.0), size=3, above=0.0, doc="Semi-axes along x, y and z of frame b, in units of the radius."
     )
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from atwood import (
     Component,
     Frame,
+    Number,
     Outline,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -33,12 +35,12 @@ class RollingOnRound(Component):
 
     shape: str = parameter("sphere", choices=("sphere", "cylinder"), doc="What it rolls on; in a plane a circle.")
     rolls: str = parameter("inside", choices=("inside", "outside"), doc="Whether it rolls in it or on it.")
-    ground_radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius R of what it rolls on.")
-    radius: float = parameter(0.1, unit="m", above=0.0, doc="Radius r of the ball.")
-    axis: tuple[float, float, float] = parameter(
+    ground_radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius R of what it rolls on.")
+    radius: Number = parameter(0.1, unit="m", above=0.0, doc="Radius r of the ball.")
+    axis: Triple = parameter(
         (0.0, 1.0, 0.0), turning=True, doc="Axis of a cylinder, in frame a; in a plane its normal."
     )
-    pole: tuple[float, float, float] = parameter(
+    pole: Triple = parameter(
         (0.0, 0.0, 1.0), direction=True, doc="Direction, in frame a, from the contact to the ball near which it rolls."
     )
     a: Frame = connector(Frame, "The frame in the middle of what it rolls on.")

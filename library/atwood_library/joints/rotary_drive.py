@@ -5,8 +5,10 @@ from __future__ import annotations
 from atwood import (
     Component,
     Frame,
+    Number,
     Placement,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -33,12 +35,12 @@ class RotaryDrive(Component):
     synonyms = ("Revolute with prescribed motion", "Servo")
     spaces = ("plane", "space")
 
-    axis: tuple[float, float, float] = parameter(
+    axis: Triple = parameter(
         (0.0, -1.0, 0.0),
         turning=True,
         doc="Axis in both frames; the angle is right-handed about it, so counter-clockwise in a plane unless reversed.",
     )
-    rotation: float = signal(0.0, unit="rad", doc="Angle of frame b from frame a, a function of time.")
+    rotation: Number = signal(0.0, unit="rad", doc="Angle of frame b from frame a, a function of time.")
     a: Frame = connector(Frame, "The frame that carries the motor.")
     b: Frame = connector(Frame, "The frame that is turned.")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import pi
 
 from atwood import (
+    Number,
     Placement,
     Scalar,
     Shaft,
@@ -31,7 +32,7 @@ class Screw(CommonAxis, LoadedHinge):
 
     synonyms = ("Helical joint", "Screw joint")
 
-    pitch: float = parameter(0.01, unit="m", doc="Displacement for one turn; negative for a left-handed thread.")
+    pitch: Number = parameter(0.01, unit="m", doc="Displacement for one turn; negative for a left-handed thread.")
     shaft: Shaft = connector(Shaft, "The angle, where gears take hold of it.", of="angle")
 
     @constraint(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, Slide, connector, constraint, observable, parameter
+from atwood import Component, Number, Scalar, Slide, connector, constraint, observable, parameter
 
 
 class SlideGear(Component):
@@ -13,8 +13,8 @@ class SlideGear(Component):
 
     synonyms = ("Hydraulic transmission",)
 
-    ratio: float = parameter(-1.0, doc="Displacement of joint a for one metre of joint b.")
-    offset: float = parameter(0.0, unit="m", doc="Displacement of joint a where that of joint b is zero.")
+    ratio: Number = parameter(-1.0, doc="Displacement of joint a for one metre of joint b.")
+    offset: Number = parameter(0.0, unit="m", doc="Displacement of joint a where that of joint b is zero.")
     a: Slide = connector(Slide, "The displacement of one joint.")
     b: Slide = connector(Slide, "The displacement of the other joint.")
 

@@ -7,6 +7,7 @@ from atwood import (
     Placement,
     Scalar,
     Slide,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -34,7 +35,7 @@ class Slider(LoadedSlide):
         *("JointUPS", "JointUSP", "JointSSP", "JointRRP"),
     )
 
-    axis: tuple[float, float, float] = parameter(
+    axis: Triple = parameter(
         (1.0, 0.0, 0.0),
         direction=True,
         doc="Direction of the guide in frame a.",

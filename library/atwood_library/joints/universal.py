@@ -10,6 +10,7 @@ from atwood import (
     Placement,
     Scalar,
     Shaft,
+    Triple,
     Vector,
     as_vector,
     atan2,
@@ -40,8 +41,8 @@ class Universal(LoadedCross):
     )
     spaces = ("space",)
 
-    axis_a: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="First axis, in frame a.")
-    axis_b: tuple[float, float, float] = parameter((0.0, 1.0, 0.0), direction=True, doc="Second axis, in frame b.")
+    axis_a: Triple = parameter((1.0, 0.0, 0.0), direction=True, doc="First axis, in frame a.")
+    axis_b: Triple = parameter((0.0, 1.0, 0.0), direction=True, doc="Second axis, in frame b.")
     a: Frame = connector(Frame, "The frame that carries the joint.")
     b: Frame = connector(Frame, "The frame that moves.")
     shaft_a: Shaft = connector(Shaft, "The angle of the cross, where gears take hold of it.", of="angle_a")

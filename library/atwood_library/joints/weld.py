@@ -7,9 +7,11 @@ from typing import Any
 from atwood import (
     Component,
     Frame,
+    Number,
     ParameterError,
     Placement,
     Scalar,
+    Triple,
     as_vector,
     atan2,
     connector,
@@ -35,27 +37,27 @@ class Weld(Component):
 
     synonyms = ("FixedTranslation", "FixedRotation", "Rigid connection", "Fixed joint")
 
-    displacement: tuple[float, float, float] = parameter(
+    displacement: Triple = parameter(
         (0.0, 0.0, 0.0), unit="m", size=3, doc="Position of frame b in the axes of frame a."
     )
     turned_by: str = parameter(
         "angle", choices=("angle", "two axes", "three angles"), doc="What says how frame b is turned."
     )
-    angle: float = parameter(0.0, unit="rad", doc="Rotation of frame b from frame a, right-handed about the axis.")
-    axis: tuple[float, float, float] = parameter(
+    angle: Number = parameter(0.0, unit="rad", doc="Rotation of frame b from frame a, right-handed about the axis.")
+    axis: Triple = parameter(
         (0.0, -1.0, 0.0), turning=True, doc="Axis of the rotation; unless reversed, counter-clockwise in a plane."
     )
-    x_axis: tuple[float, float, float] = parameter(
+    x_axis: Triple = parameter(
         (1.0, 0.0, 0.0), direction=True, doc="Of two axes, where the x axis of frame b points, in frame a."
     )
-    y_axis: tuple[float, float, float] = parameter(
+    y_axis: Triple = parameter(
         (0.0, 1.0, 0.0),
         size=3,
         structural=True,
         doc="Of two axes, where the y axis of frame b points, as far as it is square to its x axis; in a plane unused.",
     )
     convention: str = parameter("xyz", choices=CONVENTIONS, doc="Axes of the three turns, in order.")
-    angles: tuple[float, float, float] = parameter(
+    angles: Triple = parameter(
         (0.0, 0.0, 0.0), unit="rad", size=3, doc="Three angles, each about an axis that the turns before it have made."
     )
     a: Frame = connector(Frame, "One frame.")

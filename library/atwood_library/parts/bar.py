@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Outline, Scalar, parameter
+from atwood import Number, Outline, Scalar, parameter
 from atwood_library.interfaces.shape import revolved
 from atwood_library.interfaces.solid import Tensor
 from atwood_library.interfaces.straight_shape import StraightShape
@@ -20,7 +20,7 @@ class Bar(StraightShape):
 
     synonyms = ("Slender rod",)
 
-    area: float = parameter(1e-4, unit="m^2", above=0.0, doc="Area of its section, which counts with a density only.")
+    area: Number = parameter(1e-4, unit="m^2", above=0.0, doc="Area of its section, which counts with a density only.")
 
     def volume(self) -> Scalar:
         """Return the volume."""

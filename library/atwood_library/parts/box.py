@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from atwood import (
     Frame,
+    Number,
     Outline,
     ParameterError,
     Placement,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -29,13 +31,13 @@ class Box(Shape):
 
     synonyms = ("BodyBox", "Cuboid")
 
-    length_x: float = parameter(1.0, unit="m", above=0.0, doc="Length along x, from a to b.")
-    length_y: float = parameter(1.0, unit="m", above=0.0, doc="Length along y.")
-    length_z: float = parameter(1.0, unit="m", above=0.0, doc="Length along z.")
-    direction: tuple[float, float, float] = parameter(
+    length_x: Number = parameter(1.0, unit="m", above=0.0, doc="Length along x, from a to b.")
+    length_y: Number = parameter(1.0, unit="m", above=0.0, doc="Length along y.")
+    length_z: Number = parameter(1.0, unit="m", above=0.0, doc="Length along z.")
+    direction: Triple = parameter(
         (1.0, 0.0, 0.0), direction=True, doc="Direction in the frame of the edges of length_x, from a to b."
     )
-    upward: tuple[float, float, float] = parameter(
+    upward: Triple = parameter(
         (0.0, 0.0, 1.0),
         direction=True,
         doc="Direction of the edges of length_z, as far as it is square to `direction`.",

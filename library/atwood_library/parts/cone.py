@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Frame, Outline, Placement, Scalar, Vector, connector, joint, parameter
+from atwood import Frame, Number, Outline, Placement, Scalar, Vector, connector, joint, parameter
 from atwood_library.interfaces.shape import Shape, along, revolved
 from atwood_library.interfaces.solid import Tensor
 
@@ -16,8 +16,8 @@ class Cone(Shape):
     ``3 m (4 r^2 + h^2)/80`` across.
     """
 
-    radius: float = parameter(0.1, unit="m", above=0.0, doc="Radius of the base, r.")
-    height: float = parameter(0.2, unit="m", above=0.0, doc="Height, h, from the base to the tip.")
+    radius: Number = parameter(0.1, unit="m", above=0.0, doc="Radius of the base, r.")
+    height: Number = parameter(0.2, unit="m", above=0.0, doc="Height, h, from the base to the tip.")
     axis: str = parameter("z", choices=("x", "y", "z"), doc="Axis of the frame that points from the base to the tip.")
     tip: Frame = connector(Frame, "The tip.")
 

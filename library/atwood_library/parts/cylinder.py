@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Outline, Scalar, parameter
+from atwood import Number, Outline, Scalar, parameter
 from atwood_library.interfaces.shape import revolved
 from atwood_library.interfaces.solid import Tensor
 from atwood_library.interfaces.straight_shape import StraightShape
@@ -15,7 +15,7 @@ class Cylinder(StraightShape):
 
     synonyms = ("BodyCylinder",)
 
-    radius: float = parameter(0.1, unit="m", above=0.0, doc="Radius.")
+    radius: Number = parameter(0.1, unit="m", above=0.0, doc="Radius.")
 
     def volume(self) -> Scalar:
         """Return the volume."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Outline, Scalar, parameter
+from atwood import Number, Outline, Scalar, parameter
 from atwood_library.interfaces.shape import Shape, revolved
 from atwood_library.interfaces.solid import Tensor
 
@@ -19,9 +19,9 @@ class Disc(Shape):
 
     synonyms = ("Disk",)
 
-    radius: float = parameter(0.5, unit="m", above=0.0, doc="Outer radius, R.")
-    inner_radius: float = parameter(0.0, unit="m", minimum=0.0, doc="Radius of the hole, r; at most the outer one.")
-    thickness: float = parameter(0.0, unit="m", minimum=0.0, doc="Thickness along the axis, h.")
+    radius: Number = parameter(0.5, unit="m", above=0.0, doc="Outer radius, R.")
+    inner_radius: Number = parameter(0.0, unit="m", minimum=0.0, doc="Radius of the hole, r; at most the outer one.")
+    thickness: Number = parameter(0.0, unit="m", minimum=0.0, doc="Thickness along the axis, h.")
     axis: str = parameter("y", choices=("x", "y", "z"), doc="Axis of the frame that it is square to.")
 
     def check_values(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Frame, Placement, as_vector, connector, joint, parameter
+from atwood import Component, Frame, Number, Placement, Triple, as_vector, connector, joint, parameter
 
 
 class Ground(Component):
@@ -13,14 +13,14 @@ class Ground(Component):
 
     synonyms = ("Fixed", "World frame", "World", "MultiBody.Parts.Fixed")
 
-    position: tuple[float, float, float] = parameter(
+    position: Triple = parameter(
         (0.0, 0.0, 0.0),
         unit="m",
         size=3,
         place=True,
         doc="Position in world axes (x right, y into the page, z up).",
     )
-    angle: float = parameter(0.0, unit="rad", doc="Rotation in the plane x-z, counter-clockwise; in space, about -y.")
+    angle: Number = parameter(0.0, unit="rad", doc="Rotation in the plane x-z, counter-clockwise; in space, about -y.")
     frame: Frame = connector(Frame, "The fixed frame.")
 
     @joint("world", "frame", rigid=True, spaces=("line", "plane", "space"), reaction="exerted by the ground")

@@ -8,6 +8,7 @@ from atwood import (
     BodyInertia,
     Component,
     Frame,
+    Number,
     Placement,
     Scalar,
     Vector,
@@ -30,15 +31,15 @@ class Link(Component):
 
     synonyms = ("BodyShape",)
 
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Distance from a to b.")
-    mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
-    center: float | None = parameter(
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Distance from a to b.")
+    mass: Number = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
+    center: Number | None = parameter(
         None, unit="m", doc="Distance of the centre of mass from a, towards b; half the length if not given."
     )
-    moment: float | None = parameter(
+    moment: Number | None = parameter(
         None, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the centre of mass; m l^2/12 if not given."
     )
-    axial_moment: float = parameter(
+    axial_moment: Number = parameter(
         0.0, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about its own axis, which only space knows."
     )
     a: Frame = connector(Frame, "The frame at the origin of the link.")

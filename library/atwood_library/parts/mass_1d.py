@@ -6,11 +6,13 @@ from collections.abc import Iterable
 
 from atwood import (
     Component,
+    Number,
     Placement,
     Point,
     PointInertia,
     Scalar,
     Slide,
+    Triple,
     Vector,
     as_vector,
     connector,
@@ -32,11 +34,11 @@ class Mass1D(Component):
 
     synonyms = ("Mass on a line", "Translational.Components.Mass", "MassWithStopAndFriction")
 
-    mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
-    origin: tuple[float, float, float] = parameter(
+    mass: Number = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
+    origin: Triple = parameter(
         (0.0, 0.0, 0.0), unit="m", size=3, place=True, doc="Point of the line where the displacement is zero."
     )
-    axis: tuple[float, float, float] = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction of the line.")
+    axis: Triple = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction of the line.")
     flange: Point = connector(Point, "The mass.")
     slide: Slide = connector(Slide, "The displacement, where drives take hold of it.", of="displacement")
 

@@ -6,7 +6,7 @@ import os
 from functools import lru_cache
 from pathlib import Path
 
-from atwood import AtwoodError, Outline, ParameterError, Scalar, Vector, parameter
+from atwood import AtwoodError, Number, Outline, ParameterError, Scalar, Vector, parameter
 from atwood.solids import MassProperties, TriangleMesh, closed_mesh, mesh_solid, read_stl
 from atwood_library.interfaces.shape import Shape
 from atwood_library.interfaces.solid import Tensor
@@ -19,7 +19,7 @@ class MeshBody(Shape):
     """
 
     file: str = parameter(text=True, doc="Path of the STL file, text or binary, from where the program runs.")
-    scale: float = parameter(1.0, unit="m", above=0.0, doc="Length of the file's unit: 1 mm for most drawings.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the file's unit: 1 mm for most drawings.")
 
     def check_values(self) -> None:
         """Refuse a file that cannot be read, and a mesh that is not closed."""

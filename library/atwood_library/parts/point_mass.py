@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from atwood import Component, Point, PointInertia, Vector, connector, inertia, observable, parameter
+from atwood import Component, Number, Point, PointInertia, Vector, connector, inertia, observable, parameter
 
 
 class PointMass(Component):
@@ -15,7 +15,7 @@ class PointMass(Component):
 
     synonyms = ("Particle", "Material point")
 
-    mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
+    mass: Number = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     point: Point = connector(Point, "Where the mass is.")
 
     @inertia

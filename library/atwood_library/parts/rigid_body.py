@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Self
 
-from atwood import Scalar, Vector, as_vector, parameter
+from atwood import Number, Scalar, Triple, Vector, as_vector, parameter
 from atwood.solids import MassProperties
 from atwood_library.interfaces.solid import Solid, Tensor
 
@@ -18,18 +18,16 @@ class RigidBody(Solid):
 
     synonyms = ("Body",)
 
-    mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
-    center: tuple[float, float, float] = parameter(
-        (0.0, 0.0, 0.0), unit="m", size=3, doc="Centre of mass in the axes of the frame."
-    )
-    moments: tuple[float, float, float] = parameter(
+    mass: Number = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
+    center: Triple = parameter((0.0, 0.0, 0.0), unit="m", size=3, doc="Centre of mass in the axes of the frame.")
+    moments: Triple = parameter(
         (0.0, 0.0, 0.0),
         unit="kg*m^2",
         size=3,
         minimum=0.0,
         doc="Moments of inertia Jxx, Jyy, Jzz about the centre of mass; in a plane Jyy alone will do.",
     )
-    products: tuple[float, float, float] = parameter(
+    products: Triple = parameter(
         (0.0, 0.0, 0.0),
         unit="kg*m^2",
         size=3,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Outline, parameter
+from atwood import Number, Outline, Triple, parameter
 from atwood_library.parts.rigid_body import RigidBody
 
 
@@ -11,8 +11,8 @@ class Rim(RigidBody):
 
     synonyms = ("Rotor",)
 
-    radius: float = parameter(0.3, unit="m", above=0.0, doc="Radius.")
-    axis: tuple[float, float, float] = parameter((0.0, 1.0, 0.0), turning=True, doc="Axis in the frame.")
+    radius: Number = parameter(0.3, unit="m", above=0.0, doc="Radius.")
+    axis: Triple = parameter((0.0, 1.0, 0.0), turning=True, doc="Axis in the frame.")
 
     def outline(self) -> Outline | None:
         """Return a thin disc, where the axis is along one of the frame's."""

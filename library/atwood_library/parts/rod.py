@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from atwood import (
     Component,
+    Number,
     Placement,
     Point,
     PointInertia,
@@ -36,8 +37,8 @@ class Rod(Component):
 
     synonyms = ("SphericalSpherical", "Massless rod")
 
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length.")
-    mass: float = parameter(0.0, unit="kg", minimum=0.0, doc="Mass, spread uniformly.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length.")
+    mass: Number = parameter(0.0, unit="kg", minimum=0.0, doc="Mass, spread uniformly.")
     a: Point = connector(Point, "One end.")
     b: Point = connector(Point, "The other end.")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Outline, Scalar, parameter
+from atwood import Number, Outline, Scalar, parameter
 from atwood_library.interfaces.shape import Shape, diagonal
 from atwood_library.interfaces.solid import Tensor
 
@@ -17,8 +17,8 @@ class Sphere(Shape):
 
     synonyms = ("Ball",)
 
-    radius: float = parameter(0.1, unit="m", above=0.0, doc="Outer radius, R.")
-    inner_radius: float = parameter(0.0, unit="m", minimum=0.0, doc="Radius of the cavity, r; at most the outer one.")
+    radius: Number = parameter(0.1, unit="m", above=0.0, doc="Outer radius, R.")
+    inner_radius: Number = parameter(0.0, unit="m", minimum=0.0, doc="Radius of the cavity, r; at most the outer one.")
 
     def check_values(self) -> None:
         """Refuse a cavity that is larger than the ball."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Outline, Scalar, parameter
+from atwood import Number, Outline, Scalar, parameter
 from atwood_library.interfaces.shape import revolved
 from atwood_library.interfaces.solid import Tensor
 from atwood_library.interfaces.straight_shape import StraightShape
@@ -18,8 +18,8 @@ class Tube(StraightShape):
 
     synonyms = ("Hollow cylinder",)
 
-    outer_radius: float = parameter(0.1, unit="m", above=0.0, doc="Outer radius, R.")
-    inner_radius: float = parameter(0.08, unit="m", minimum=0.0, doc="Inner radius, r; at most the outer one.")
+    outer_radius: Number = parameter(0.1, unit="m", above=0.0, doc="Outer radius, R.")
+    inner_radius: Number = parameter(0.08, unit="m", minimum=0.0, doc="Inner radius, r; at most the outer one.")
 
     def check_values(self) -> None:
         """Refuse a bore that is wider than the tube."""

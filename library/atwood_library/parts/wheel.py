@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Frame, Model, connect, connector, parameter
+from atwood import Frame, Model, Number, Triple, connect, connector, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.rolling_disc import RollingDisc
 from atwood_library.parts.rim import Rim
@@ -18,18 +18,18 @@ class Wheel(Model):
 
     synonyms = ("RollingWheel", "RollingWheelSet", "MultiBody.Parts.RollingWheelSet")
 
-    radius: float = parameter(0.3, unit="m", above=0.0, doc="Radius.")
-    mass: float = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
-    axial: float | None = parameter(
+    radius: Number = parameter(0.3, unit="m", above=0.0, doc="Radius.")
+    mass: Number = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
+    axial: Number | None = parameter(
         None, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the axle; of a uniform disc if not given."
     )
-    transverse: float | None = parameter(
+    transverse: Number | None = parameter(
         None, unit="kg*m^2", minimum=0.0, doc="Moment of inertia across the axle; half of that about it if not given."
     )
-    axis: tuple[float, float, float] = parameter(
+    axis: Triple = parameter(
         (0.0, 1.0, 0.0), turning=True, doc="Direction of the axle in its frame; the wheel turns right-handed about it."
     )
-    normal: tuple[float, float, float] = parameter(
+    normal: Triple = parameter(
         (0.0, 0.0, 1.0), direction=True, doc="Normal of the plane in the frame of the ground, towards the wheel."
     )
     axle: Frame = connector(Frame, "The frame that carries the wheel, at its centre.")

@@ -8,6 +8,7 @@ from itertools import pairwise
 from atwood import (
     Component,
     Groove,
+    Number,
     Point,
     Scalar,
     connector,
@@ -32,10 +33,10 @@ class ElasticRope(Component):
     synonyms = ("Bungee", "Elastic cable", "Tether")
 
     pulleys: int = parameter(0, minimum=0, integer=True, doc="How many pulleys it passes.")
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length without tension.")
-    stiffness: float = parameter(1e3, unit="N/m", above=0.0, doc="Tension for an extension by one metre.")
-    damping: float = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Tension for a metre a second, while stretched.")
-    paid_out: float = signal(0.0, unit="m", doc="Length that is let out besides, a function of time.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length without tension.")
+    stiffness: Number = parameter(1e3, unit="N/m", above=0.0, doc="Tension for an extension by one metre.")
+    damping: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Tension for a metre a second, while stretched.")
+    paid_out: Number = signal(0.0, unit="m", doc="Length that is let out besides, a function of time.")
     a: Point = connector(Point, "One end.")
     over: Sequence[Groove] = connector(Groove, "The pulleys it passes, in order from a to b.", count="pulleys")
     b: Point = connector(Point, "The other end.")

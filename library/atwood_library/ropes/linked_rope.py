@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Model, Point, connector, parameter
+from atwood import Model, Number, Point, connector, parameter
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.parts.rod import Rod
 
@@ -16,8 +16,8 @@ class LinkedRope(Model):
     synonyms = ("Heavy rope", "Cable", "Catenary")
 
     links: int = parameter(10, minimum=2, integer=True, doc="Number of links.")
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the whole rope.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the whole rope.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the whole rope.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the whole rope.")
     a: Point = connector(Point, "One end.")
     b: Point = connector(Point, "The other end.")
 

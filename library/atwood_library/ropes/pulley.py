@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from atwood import (
     Component,
     Groove,
+    Number,
     Placement,
     Point,
     PointInertia,
@@ -25,7 +26,7 @@ class Pulley(Component):
     Fixed if its centre is joined to the ground, moving if it is joined to anything else or to nothing.
     """
 
-    mass: float = parameter(0.0, unit="kg", minimum=0.0, doc="Mass of the pulley, taken at its centre.")
+    mass: Number = parameter(0.0, unit="kg", minimum=0.0, doc="Mass of the pulley, taken at its centre.")
     center: Point = connector(Point, "The centre, where it is held.")
     groove: Groove = connector(Groove, "The groove, which takes a rope.")
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 from atwood import (
     Component,
     Groove,
+    Number,
     Point,
     Scalar,
     absolute,
@@ -39,15 +40,15 @@ class Rope(Component):
     mode_parameter = "starts"
 
     pulleys: int = parameter(0, minimum=0, integer=True, doc="How many pulleys it passes.")
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length from a to b.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length from a to b.")
     when_slack: str = parameter(
         "stop", choices=("stop", "slack"), doc="What happens when the tension becomes negative."
     )
-    pulley_inertia: float = parameter(
+    pulley_inertia: Number = parameter(
         0.0, unit="kg", minimum=0.0, doc="Moment of inertia of each pulley it passes, over the square of its radius."
     )
-    paid_out: float = signal(0.0, unit="m", doc="Length that is let out besides, a function of time.")
-    release: float = signal(1.0, unit="any", doc="The rope lets go where this falls through zero.")
+    paid_out: Number = signal(0.0, unit="m", doc="Length that is let out besides, a function of time.")
+    release: Number = signal(1.0, unit="any", doc="The rope lets go where this falls through zero.")
     starts: str = parameter("taut", choices=("taut", "slack"), doc="Whether it is taut or slack at the start.")
     a: Point = connector(Point, "One end.")
     over: Sequence[Groove] = connector(Groove, "The pulleys it passes, in order from a to b.", count="pulleys")

@@ -5,8 +5,10 @@ from __future__ import annotations
 from atwood import (
     Component,
     Frame,
+    Number,
     Point,
     Scalar,
+    Triple,
     Vector,
     as_vector,
     atan2,
@@ -34,13 +36,13 @@ class WoundRope(Component):
     synonyms = ("Winch", "Drum", "Pulley with inertia", "Rope on a wheel")
     spaces = ("plane",)
 
-    radius: float = parameter(0.1, unit="m", above=0.0, doc="Radius of the drum.")
-    length: float = parameter(
+    radius: Number = parameter(0.1, unit="m", above=0.0, doc="Radius of the drum.")
+    length: Number = parameter(
         1.0,
         unit="m",
         doc="Length of the straight piece where the drum's angle is zero and the rope leaves along the direction.",
     )
-    direction: tuple[float, float, float] = parameter(
+    direction: Triple = parameter(
         (0.0, 0.0, -1.0), direction=True, doc="About where the rope leaves to, in world axes; within half a turn."
     )
     unwinds: str = parameter(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.forces.spring import Spring
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.weld import Weld
@@ -31,9 +31,9 @@ class AndrewsSqueezer(Scene):
     plus a quarter turn, delta of `k5`, Omega + epsilon of `k6`, epsilon of `k7`.
     """
 
-    torque: float = parameter(0.033, unit="N*m", doc="Torque of the motor on the crank.")
-    stiffness: float = parameter(4530.0, unit="N/m", minimum=0.0, doc="Stiffness of the spring.")
-    natural_length: float = parameter(0.07785, unit="m", doc="Length of the spring without force.")
+    torque: Number = parameter(0.033, unit="N*m", doc="Torque of the motor on the crank.")
+    stiffness: Number = parameter(4530.0, unit="N/m", minimum=0.0, doc="Stiffness of the spring.")
+    natural_length: Number = parameter(0.07785, unit="m", doc="Length of the spring without force.")
     gravity = 0.0
     t_end = 0.03
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.ropes.pulley import Pulley
@@ -15,9 +15,9 @@ from atwood_library.ropes.rope import Rope
 class Atwood(Scene):
     """Two masses on a rope over a fixed ideal pulley, released at rest (Atwood's machine)."""
 
-    mass1: float = parameter(2.0, unit="kg", above=0.0, doc="Mass on one side.")
-    mass2: float = parameter(1.0, unit="kg", above=0.0, doc="Mass on the other side.")
-    rope_length: float = parameter(4.0, unit="m", above=0.0, doc="Length of the rope; half hangs on each side.")
+    mass1: Number = parameter(2.0, unit="kg", above=0.0, doc="Mass on one side.")
+    mass2: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass on the other side.")
+    rope_length: Number = parameter(4.0, unit="m", above=0.0, doc="Length of the rope; half hangs on each side.")
     space = "line"
     line_axis = (0.0, 0.0, 1.0)
     t_end = 1.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.rolling_on_round import RollingOnRound
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.sphere import Sphere
@@ -18,12 +18,12 @@ class BallInShell(Scene):
     the contact, which an ellipse of the centre's path turns with, are what is known besides.
     """
 
-    shell: float = parameter(1.0, unit="m", above=0.0, doc="Radius R of the shell.")
-    radius: float = parameter(0.2, unit="m", above=0.0, doc="Radius r of the ball.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the ball.")
-    inclination: float = parameter(1.0, unit="rad", doc="Angle of the ball from the downward vertical at the start.")
-    speed: float = parameter(1.0, unit="m/s", doc="Speed of its centre around, at the start.")
-    spin: float = parameter(2.0, unit="rad/s", doc="Angular velocity about the normal of the shell at the start.")
+    shell: Number = parameter(1.0, unit="m", above=0.0, doc="Radius R of the shell.")
+    radius: Number = parameter(0.2, unit="m", above=0.0, doc="Radius r of the ball.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the ball.")
+    inclination: Number = parameter(1.0, unit="rad", doc="Angle of the ball from the downward vertical at the start.")
+    speed: Number = parameter(1.0, unit="m/s", doc="Speed of its centre around, at the start.")
+    spin: Number = parameter(2.0, unit="rad/s", doc="Angular velocity about the normal of the shell at the start.")
     space = "space"
     t_end = 5.0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.point_on_surface import PointOnSurface
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
@@ -24,10 +24,10 @@ class BeadOnSurface(Scene):
     """
 
     shape: str = parameter("sphere", choices=tuple(_SHAPES), doc="Shape of the surface.")
-    scale: float = parameter(1.0, unit="m", above=0.0, doc="Size of the surface: radius of the sphere.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
-    away: float = parameter(1.0, unit="rad", doc="First parameter at the start: angle, or distance over size.")
-    azimuth_rate: float = parameter(2.0, unit="rad/s", doc="Rate of the azimuth at the start.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Size of the surface: radius of the sphere.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
+    away: Number = parameter(1.0, unit="rad", doc="First parameter at the start: angle, or distance over size.")
+    azimuth_rate: Number = parameter(2.0, unit="rad/s", doc="Rate of the azimuth at the start.")
     space = "space"
     t_end = 5.0
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.point_on_curve import PointOnCurve
 from atwood_library.joints.rotary_drive import RotaryDrive
 from atwood_library.parts.ground import Ground
@@ -32,11 +32,11 @@ class BeadOnWire(Scene):
     """
 
     shape: str = parameter("cycloid", choices=tuple(_SHAPES), doc="Shape of the wire.")
-    scale: float = parameter(1.0, unit="m", above=0.0, doc="Size a of the wire.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Size a of the wire.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
     turning: str = parameter("z", choices=("z", "x"), doc="Axis about which the wire is turned.")
-    rate: float = parameter(0.0, unit="rad/s", doc="Rate at which it is turned.")
-    away: float = parameter(1.0, unit="rad", doc="Parameter of the bead at the start, where it rests on the wire.")
+    rate: Number = parameter(0.0, unit="rad/s", doc="Rate at which it is turned.")
+    away: Number = parameter(1.0, unit="rad", doc="Parameter of the bead at the start, where it rests on the wire.")
     space = "space"
     t_end = 5.0
 

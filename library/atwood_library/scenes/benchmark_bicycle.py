@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.rolling_disc import RollingDisc
 from atwood_library.joints.weld import Weld
@@ -28,8 +28,8 @@ class BenchmarkBicycle(Scene):
     table 2.
     """
 
-    speed: float = parameter(4.6, unit="m/s", doc="Forward speed.")
-    lean_rate: float = parameter(0.1, unit="rad/s", doc="Rate at which it leans at the start.")
+    speed: Number = parameter(4.6, unit="m/s", doc="Forward speed.")
+    lean_rate: Number = parameter(0.1, unit="rad/s", doc="Rate at which it leans at the start.")
     space = "space"
     t_end = 5.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.weld import Weld
 from atwood_library.parts.ground import Ground
@@ -22,9 +22,9 @@ class Bricard(Scene):
     it moves along ``(1 + sin a)(1 + sin b) = 1``.
     """
 
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of each rod.")
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of each rod.")
-    width: float = parameter(0.1, unit="m", above=0.0, doc="Width of the rods' square section.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of each rod.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of each rod.")
+    width: Number = parameter(0.1, unit="m", above=0.0, doc="Width of the rods' square section.")
     space = "space"
     t_end = 10.0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, asin, connect, parameter, sin
+from atwood import Number, Scene, asin, connect, parameter, sin
 from atwood_library.forces.spring import Spring
 from atwood_library.joints.point_on_line import PointOnLine
 from atwood_library.joints.rotary_drive import RotaryDrive
@@ -19,12 +19,12 @@ class CarAxis(Scene):
     1999). Two degrees of freedom, driven.
     """
 
-    mass: float = parameter(5e-4, unit="kg", above=0.0, doc="Mass of each hub.")
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the axis, and of the rod.")
-    spring_length: float = parameter(0.5, unit="m", above=0.0, doc="Length of the springs without force.")
-    stiffness: float = parameter(1.0, unit="N/m", minimum=0.0, doc="Stiffness of the springs.")
-    height: float = parameter(0.1, unit="m", doc="By how much the right end goes up and down.")
-    rate: float = parameter(10.0, unit="rad/s", doc="How fast the road comes up and down.")
+    mass: Number = parameter(5e-4, unit="kg", above=0.0, doc="Mass of each hub.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the axis, and of the rod.")
+    spring_length: Number = parameter(0.5, unit="m", above=0.0, doc="Length of the springs without force.")
+    stiffness: Number = parameter(1.0, unit="N/m", minimum=0.0, doc="Stiffness of the springs.")
+    height: Number = parameter(0.1, unit="m", doc="By how much the right end goes up and down.")
+    rate: Number = parameter(10.0, unit="rad/s", doc="How fast the road comes up and down.")
     gravity = 1.0
     t_end = 3.0
 

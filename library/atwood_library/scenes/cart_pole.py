@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.blocks.sampled_feedback import SampledFeedback
 from atwood_library.forces.force import Force
 from atwood_library.joints.pivot import Pivot
@@ -24,11 +24,11 @@ class CartPole(Scene):
     are those that cost ``x^2 + 10 phi^2 + F^2/100`` least, of the linear model about the upright (`linear_model`).
     """
 
-    cart_mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the cart.")
-    bob_mass: float = parameter(0.2, unit="kg", above=0.0, doc="Mass of the bob.")
-    length: float = parameter(0.5, unit="m", above=0.0, doc="Length of the pole.")
-    period: float = parameter(0.02, unit="s", above=0.0, doc="Sample time of the regulator.")
-    lean: float = parameter(0.2, unit="rad", doc="How far it leans at the start.")
+    cart_mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the cart.")
+    bob_mass: Number = parameter(0.2, unit="kg", above=0.0, doc="Mass of the bob.")
+    length: Number = parameter(0.5, unit="m", above=0.0, doc="Length of the pole.")
+    period: Number = parameter(0.02, unit="s", above=0.0, doc="Sample time of the regulator.")
+    lean: Number = parameter(0.2, unit="rad", doc="How far it leans at the start.")
     t_end = 6.0
 
     ground: Ground = Ground()

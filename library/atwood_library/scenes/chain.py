@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Point, Scene, parameter
+from atwood import Number, Point, Scene, parameter
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.parts.rod import Rod
@@ -14,8 +14,8 @@ class Chain(Scene):
     """A chain of equal links, one end fixed, released horizontally at rest."""
 
     links: int = parameter(10, minimum=1, integer=True, doc="Number of links.")
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the whole chain.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass at the end of each link.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the whole chain.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass at the end of each link.")
     t_end = 1.0
 
     ground: Ground = Ground()

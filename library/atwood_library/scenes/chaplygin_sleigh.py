@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.blade import Blade
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.rigid_body import RigidBody
@@ -20,11 +20,11 @@ class ChaplyginSleigh(Scene):
     goes as a hyperbolic tangent (Neimark and Fufaev, Dynamics of Nonholonomic Systems, chapter 2). Energy is kept.
     """
 
-    mass: float = parameter(2.0, unit="kg", above=0.0, doc="Mass m.")
-    inertia: float = parameter(0.5, unit="kg*m^2", above=0.0, doc="Moment of inertia J about the centre of mass.")
-    ahead: float = parameter(0.4, unit="m", above=0.0, doc="Distance a of the centre of mass ahead of the blade.")
-    speed: float = parameter(-1.0, unit="m/s", doc="Speed v along the blade at the start.")
-    spin: float = parameter(1.5, unit="rad/s", doc="Angular velocity w at the start, counter-clockwise.")
+    mass: Number = parameter(2.0, unit="kg", above=0.0, doc="Mass m.")
+    inertia: Number = parameter(0.5, unit="kg*m^2", above=0.0, doc="Moment of inertia J about the centre of mass.")
+    ahead: Number = parameter(0.4, unit="m", above=0.0, doc="Distance a of the centre of mass ahead of the blade.")
+    speed: Number = parameter(-1.0, unit="m/s", doc="Speed v along the blade at the start.")
+    spin: Number = parameter(1.5, unit="rad/s", doc="Angular velocity w at the start, counter-clockwise.")
     gravity = 0.0
     t_end = 5.0
 

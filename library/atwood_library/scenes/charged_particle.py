@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.fields.charge import Charge
 from atwood_library.parts.point_mass import PointMass
 
@@ -21,12 +21,12 @@ class ChargedParticle(Scene):
     electric field has no component along it, ``"z"`` that along z.
     """
 
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
-    charge: float = parameter(1.0, unit="C", doc="Charge.")
-    magnetic: float = parameter(2.0, unit="T", doc="Magnetic field along y.")
-    electric_x: float = parameter(0.0, unit="V/m", doc="Electric field along x.")
-    electric_z: float = parameter(0.5, unit="V/m", doc="Electric field along z.")
-    speed: float = parameter(1.0, unit="m/s", doc="Speed along x at the start.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
+    charge: Number = parameter(1.0, unit="C", doc="Charge.")
+    magnetic: Number = parameter(2.0, unit="T", doc="Magnetic field along y.")
+    electric_x: Number = parameter(0.0, unit="V/m", doc="Electric field along x.")
+    electric_z: Number = parameter(0.5, unit="V/m", doc="Electric field along z.")
+    speed: Number = parameter(1.0, unit="m/s", doc="Speed along x at the start.")
     gauge: str = parameter("symmetric", choices=("symmetric", "x", "z"), doc="Gauge of the vector potential.")
     gravity = 0.0
     t_end = 10.0
@@ -64,4 +64,5 @@ class ChargedParticle(Scene):
 
     def period(self) -> float:
         """Return the time for one turn, s."""
-        return 2.0 * math.pi * self.mass / abs(self.charge * self.magnetic)
+        period: float = 2.0 * math.pi * self.mass / abs(self.charge * self.magnetic)
+        return period

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.ropes.pulley import Pulley
@@ -15,11 +15,11 @@ from atwood_library.ropes.rope import Rope
 class DoubleAtwood(Scene):
     """Atwood's machine with a second one in the place of a mass: m1 against a moving pulley with m2 and m3."""
 
-    mass1: float = parameter(4.0, unit="kg", above=0.0, doc="Mass against the moving pulley.")
-    mass2: float = parameter(3.0, unit="kg", above=0.0, doc="First mass on the moving pulley.")
-    mass3: float = parameter(1.0, unit="kg", above=0.0, doc="Second mass on the moving pulley.")
-    length1: float = parameter(10.0, unit="m", above=0.0, doc="Length of the rope over the fixed pulley.")
-    length2: float = parameter(24.0, unit="m", above=0.0, doc="Length of the rope over the moving pulley.")
+    mass1: Number = parameter(4.0, unit="kg", above=0.0, doc="Mass against the moving pulley.")
+    mass2: Number = parameter(3.0, unit="kg", above=0.0, doc="First mass on the moving pulley.")
+    mass3: Number = parameter(1.0, unit="kg", above=0.0, doc="Second mass on the moving pulley.")
+    length1: Number = parameter(10.0, unit="m", above=0.0, doc="Length of the rope over the fixed pulley.")
+    length2: Number = parameter(24.0, unit="m", above=0.0, doc="Length of the rope over the moving pulley.")
     space = "line"
     line_axis = (0.0, 0.0, 1.0)
     t_end = 2.0

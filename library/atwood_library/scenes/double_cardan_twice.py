@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.universal import Universal
 from atwood_library.joints.weld import Weld
@@ -20,10 +20,10 @@ class DoubleCardanTwice(Scene):
     slanting shaft has one constraint that follows from the others, which the report names.
     """
 
-    bend: float = parameter(math.radians(25.0), unit="rad", doc="Angle of the slanting shafts.")
-    length: float = parameter(0.6, unit="m", above=0.0, doc="Length of each shaft.")
-    moment: float = parameter(0.01, unit="kg*m^2", above=0.0, doc="Moment of inertia of each shaft about its axis.")
-    rate: float = parameter(10.0, unit="rad/s", doc="Rate of the first shaft at the start.")
+    bend: Number = parameter(math.radians(25.0), unit="rad", doc="Angle of the slanting shafts.")
+    length: Number = parameter(0.6, unit="m", above=0.0, doc="Length of each shaft.")
+    moment: Number = parameter(0.01, unit="kg*m^2", above=0.0, doc="Moment of inertia of each shaft about its axis.")
+    rate: Number = parameter(10.0, unit="rad/s", doc="Rate of the first shaft at the start.")
     space = "space"
     gravity = 0.0
     t_end = 1.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.parts.rod import Rod
@@ -13,10 +13,10 @@ from atwood_library.parts.rod import Rod
 class DoublePendulum(Scene):
     """Two bobs on massless rods, one below the other, both released horizontally at rest."""
 
-    length1: float = parameter(1.0, unit="m", above=0.0, doc="Length of the upper rod.")
-    length2: float = parameter(1.0, unit="m", above=0.0, doc="Length of the lower rod.")
-    mass1: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the upper bob.")
-    mass2: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the lower bob.")
+    length1: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the upper rod.")
+    length2: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the lower rod.")
+    mass1: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the upper bob.")
+    mass2: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the lower bob.")
     t_end = 3.0
 
     ground: Ground = Ground()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.universal import Universal
 from atwood_library.joints.weld import Weld
 from atwood_library.parts.ground import Ground
@@ -12,9 +12,9 @@ from atwood_library.parts.rigid_body import RigidBody
 class DoublePendulum3D(Scene):
     """Two equal solid rods that hang on universal joints: four degrees of freedom."""
 
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of each rod.")
-    radius: float = parameter(0.05, unit="m", above=0.0, doc="Radius of each rod.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of each rod.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of each rod.")
+    radius: Number = parameter(0.05, unit="m", above=0.0, doc="Radius of each rod.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of each rod.")
     space = "space"
     t_end = 5.0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.drive import Drive
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
@@ -13,10 +13,10 @@ from atwood_library.sources.sine import Sine
 class DrivenPendulum(Scene):
     """A pendulum whose pivot is moved to and fro, horizontally and harmonically."""
 
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bob.")
-    amplitude: float = parameter(0.1, unit="m", doc="Amplitude of the pivot's motion.")
-    angular_frequency: float = parameter(2.5, unit="rad/s", doc="Angular frequency of the pivot's motion.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bob.")
+    amplitude: Number = parameter(0.1, unit="m", doc="Amplitude of the pivot's motion.")
+    angular_frequency: Number = parameter(2.5, unit="rad/s", doc="Angular frequency of the pivot's motion.")
     t_end = 5.0
 
     ground: Ground = Ground()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.forces.spring import Spring
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
@@ -14,11 +14,11 @@ class ElasticPendulum(Scene):
     Its energy is kept, and nothing else (Vitt and Gorelik, 1933).
     """
 
-    stiffness: float = parameter(39.24, unit="N/m", above=0.0, doc="Stiffness of the spring.")
-    natural_length: float = parameter(0.75, unit="m", minimum=0.0, doc="Length of the spring without force.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
-    down: float = parameter(1.2, unit="m", doc="Distance below the pivot at the start.")
-    aside: float = parameter(0.05, unit="m", doc="Distance aside at the start.")
+    stiffness: Number = parameter(39.24, unit="N/m", above=0.0, doc="Stiffness of the spring.")
+    natural_length: Number = parameter(0.75, unit="m", minimum=0.0, doc="Length of the spring without force.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
+    down: Number = parameter(1.2, unit="m", doc="Distance below the pivot at the start.")
+    aside: Number = parameter(0.05, unit="m", doc="Distance aside at the start.")
     t_end = 10.0
 
     ground: Ground = Ground()

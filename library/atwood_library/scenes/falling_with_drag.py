@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.forces.drag import Drag
 from atwood_library.parts.point_mass import PointMass
 
@@ -17,11 +17,11 @@ class FallingWithDrag(Scene):
     same motion (Goldstein, section 1.5). By the quadratic law it comes to ``sqrt(m g/k)``.
     """
 
-    mass: float = parameter(0.4, unit="kg", above=0.0, doc="Mass of the ball.")
+    mass: Number = parameter(0.4, unit="kg", above=0.0, doc="Mass of the ball.")
     law: str = parameter("linear", choices=("linear", "quadratic"), doc="Law of the drag.")
-    coefficient: float = parameter(0.3, above=0.0, unit="any", doc="N s/m by the linear law, N s^2/m^2 by the other.")
-    wind: float = parameter(3.0, unit="m/s", doc="Wind along x, by the linear law.")
-    speed: float = parameter(2.0, unit="m/s", doc="Speed along x at the start, by the linear law.")
+    coefficient: Number = parameter(0.3, above=0.0, unit="any", doc="N s/m by the linear law, N s^2/m^2 by the other.")
+    wind: Number = parameter(3.0, unit="m/s", doc="Wind along x, by the linear law.")
+    speed: Number = parameter(2.0, unit="m/s", doc="Speed along x at the start, by the linear law.")
     t_end = 3.0
 
     air: Drag = Drag()

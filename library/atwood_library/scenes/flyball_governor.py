@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.forces.damper import Damper
 from atwood_library.forces.spring import Spring
 from atwood_library.joints.pivot import Pivot
@@ -26,12 +26,12 @@ class FlyballGovernor(Scene):
     thousand times faster than the governor swings.
     """
 
-    stiffness: float = parameter(8e5, unit="N/m", above=0.0, doc="Stiffness of each spring.")
-    damping: float = parameter(4e4, unit="N*s/m", minimum=0.0, doc="Damping of each damper.")
-    ball_mass: float = parameter(5.0, unit="kg", above=0.0, doc="Mass of each ball.")
-    arm_mass: float = parameter(0.3, unit="kg", above=0.0, doc="Mass of each arm.")
-    sleeve_mass: float = parameter(3.0, unit="kg", above=0.0, doc="Mass of the sleeve.")
-    rate: float = parameter(2.0 * math.pi, unit="rad/s", doc="Rate of the shaft at the start.")
+    stiffness: Number = parameter(8e5, unit="N/m", above=0.0, doc="Stiffness of each spring.")
+    damping: Number = parameter(4e4, unit="N*s/m", minimum=0.0, doc="Damping of each damper.")
+    ball_mass: Number = parameter(5.0, unit="kg", above=0.0, doc="Mass of each ball.")
+    arm_mass: Number = parameter(0.3, unit="kg", above=0.0, doc="Mass of each arm.")
+    sleeve_mass: Number = parameter(3.0, unit="kg", above=0.0, doc="Mass of the sleeve.")
+    rate: Number = parameter(2.0 * math.pi, unit="rad/s", doc="Rate of the shaft at the start.")
     space = "space"
     t_end = 10.0
 

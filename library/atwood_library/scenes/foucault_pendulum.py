@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.rotary_drive import RotaryDrive
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
@@ -19,10 +19,10 @@ class FoucaultPendulum(Scene):
     centrifugal force, is left out.
     """
 
-    length: float = parameter(67.0, unit="m", above=0.0, doc="Length of the wire; as in the Pantheon unless given.")
-    mass: float = parameter(28.0, unit="kg", above=0.0, doc="Mass of the bob.")
-    amplitude: float = parameter(3.0, unit="m", above=0.0, doc="Horizontal distance at which it is released.")
-    rate: float = parameter(
+    length: Number = parameter(67.0, unit="m", above=0.0, doc="Length of the wire; as in the Pantheon unless given.")
+    mass: Number = parameter(28.0, unit="kg", above=0.0, doc="Mass of the bob.")
+    amplitude: Number = parameter(3.0, unit="m", above=0.0, doc="Horizontal distance at which it is released.")
+    rate: Number = parameter(
         5.490550562345950e-5, unit="rad/s", doc="Rate of the platform: of the Earth, times the sine of the latitude."
     )
     space = "space"

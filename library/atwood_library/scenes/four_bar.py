@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.link import Link
@@ -11,10 +11,10 @@ from atwood_library.parts.link import Link
 class FourBar(Scene):
     """A four-bar linkage of uniform links: a crank that turns fully, a coupler and a rocker."""
 
-    crank_length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the crank.")
-    coupler_length: float = parameter(2.5, unit="m", above=0.0, doc="Length of the coupler.")
-    rocker_length: float = parameter(2.0, unit="m", above=0.0, doc="Length of the rocker.")
-    frame_length: float = parameter(2.5, unit="m", above=0.0, doc="Distance of the fixed pivots.")
+    crank_length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the crank.")
+    coupler_length: Number = parameter(2.5, unit="m", above=0.0, doc="Length of the coupler.")
+    rocker_length: Number = parameter(2.0, unit="m", above=0.0, doc="Length of the rocker.")
+    frame_length: Number = parameter(2.5, unit="m", above=0.0, doc="Distance of the fixed pivots.")
     t_end = 2.0
 
     left: Ground = Ground()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Frame, Scene, parameter
+from atwood import Frame, Number, Scene, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.link import Link
@@ -19,9 +19,9 @@ class FourBarRow(Scene):
     """
 
     windows: int = parameter(2, minimum=1, integer=True, doc="Number of four-bars.")
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of every bar.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of every bar.")
-    speed: float = parameter(1.0, unit="m/s", doc="Velocity of the first crank's top at the start, to the right.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of every bar.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of every bar.")
+    speed: Number = parameter(1.0, unit="m/s", doc="Velocity of the first crank's top at the start, to the right.")
     t_end = 10.0
 
     def build(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, parameter
+from atwood import Number, Scene, parameter
 from atwood_library.parts.rigid_body import RigidBody
 
 
@@ -16,10 +16,10 @@ class FreeSymmetricBody(Scene):
     its angular momentum upwards.
     """
 
-    across: float = parameter(1.0, unit="kg*m^2", above=0.0, doc="Moment of inertia I1 across the axis of symmetry.")
-    along: float = parameter(1.6, unit="kg*m^2", above=0.0, doc="Moment of inertia I3 about the axis of symmetry.")
-    spin: float = parameter(3.0, unit="rad/s", doc="Angular velocity w3 about the axis of symmetry.")
-    inclination: float = parameter(
+    across: Number = parameter(1.0, unit="kg*m^2", above=0.0, doc="Moment of inertia I1 across the axis of symmetry.")
+    along: Number = parameter(1.6, unit="kg*m^2", above=0.0, doc="Moment of inertia I3 about the axis of symmetry.")
+    spin: Number = parameter(3.0, unit="rad/s", doc="Angular velocity w3 about the axis of symmetry.")
+    inclination: Number = parameter(
         0.5, unit="rad", above=0.0, maximum=1.5, doc="Angle theta of the axis from the angular momentum."
     )
     space = "space"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.link import Link
@@ -15,10 +15,10 @@ class FurutaPendulum(Scene):
     The arm's hinge can carry a motor, `motor.motor`; the pendulum swings across the arm.
     """
 
-    arm_length: float = parameter(0.3, unit="m", above=0.0, doc="Length of the arm.")
-    arm_mass: float = parameter(0.2, unit="kg", above=0.0, doc="Mass of the arm.")
-    pendulum_length: float = parameter(0.4, unit="m", above=0.0, doc="Length of the pendulum.")
-    pendulum_mass: float = parameter(0.1, unit="kg", above=0.0, doc="Mass of the pendulum.")
+    arm_length: Number = parameter(0.3, unit="m", above=0.0, doc="Length of the arm.")
+    arm_mass: Number = parameter(0.2, unit="kg", above=0.0, doc="Mass of the arm.")
+    pendulum_length: Number = parameter(0.4, unit="m", above=0.0, doc="Length of the pendulum.")
+    pendulum_mass: Number = parameter(0.1, unit="kg", above=0.0, doc="Mass of the pendulum.")
     space = "space"
     t_end = 5.0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, Triple, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.rigid_body import RigidBody
@@ -16,16 +16,16 @@ class Gyroscope(Scene):
     own inertia carries the motion through. A weight on the inner gimbal makes it precess.
     """
 
-    rotor_moments: tuple[float, float, float] = parameter(
+    rotor_moments: Triple = parameter(
         (0.002, 0.002, 0.004), unit="kg*m^2", size=3, doc="Moments of inertia of the rotor; the last is about its axis."
     )
-    gimbal_moments: tuple[float, float, float] = parameter(
+    gimbal_moments: Triple = parameter(
         (0.0006, 0.0006, 0.0009), unit="kg*m^2", size=3, doc="Moments of inertia of each gimbal."
     )
-    weight: float = parameter(0.05, unit="kg", above=0.0, doc="Mass of the inner gimbal with its weight.")
-    offset: float = parameter(0.02, unit="m", doc="Distance of the weight from the centre, along the rotor's axis.")
-    spin: float = parameter(100.0, unit="rad/s", doc="Angular velocity of the rotor.")
-    inclination: float = parameter(1.0, unit="rad", doc="Angle of the inner gimbal at the start.")
+    weight: Number = parameter(0.05, unit="kg", above=0.0, doc="Mass of the inner gimbal with its weight.")
+    offset: Number = parameter(0.02, unit="m", doc="Distance of the weight from the centre, along the rotor's axis.")
+    spin: Number = parameter(100.0, unit="rad/s", doc="Angular velocity of the rotor.")
+    inclination: Number = parameter(1.0, unit="rad", doc="Angle of the inner gimbal at the start.")
     space = "space"
     t_end = 3.0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, Triple, connect, parameter
 from atwood_library.joints.spherical import Spherical
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.rigid_body import RigidBody
@@ -11,11 +11,11 @@ from atwood_library.parts.rigid_body import RigidBody
 class HeavyTop(Scene):
     """An asymmetric rigid body on a fixed point: no closed form, energy and vertical angular momentum are kept."""
 
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
-    center: tuple[float, float, float] = parameter(
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
+    center: Triple = parameter(
         (0.05, 0.02, 0.3), unit="m", size=3, doc="Centre of mass from the fixed point, in the axes of the body."
     )
-    moments: tuple[float, float, float] = parameter(
+    moments: Triple = parameter(
         (0.02, 0.03, 0.04), unit="kg*m^2", size=3, doc="Moments of inertia about the centre of mass."
     )
     space = "space"

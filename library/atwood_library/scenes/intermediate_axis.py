@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, parameter
+from atwood import Number, Scene, Triple, parameter
 from atwood_library.parts.rigid_body import RigidBody
 
 
@@ -13,11 +13,9 @@ class IntermediateAxis(Scene):
     ``exp(w t sqrt((J2 - J1)(J3 - J2)/(J1 J3)))``.
     """
 
-    moments: tuple[float, float, float] = parameter(
-        (1.0, 2.0, 3.0), unit="kg*m^2", size=3, doc="Principal moments of inertia, rising."
-    )
-    rate: float = parameter(1.0, unit="rad/s", doc="Angular velocity about the middle axis.")
-    deviation: float = parameter(1e-3, unit="rad/s", doc="Angular velocity about the axis of least inertia.")
+    moments: Triple = parameter((1.0, 2.0, 3.0), unit="kg*m^2", size=3, doc="Principal moments of inertia, rising.")
+    rate: Number = parameter(1.0, unit="rad/s", doc="Angular velocity about the middle axis.")
+    deviation: Number = parameter(1e-3, unit="rad/s", doc="Angular velocity about the axis of least inertia.")
     space = "space"
     gravity = 0.0
     t_end = 60.0

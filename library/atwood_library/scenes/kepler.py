@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.fields.pair_potential import PairPotential
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
@@ -18,10 +18,10 @@ class Kepler(Scene):
     From there it turns by ``asin(1/e)``, half the angle of scattering.
     """
 
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the body.")
-    strength: float = parameter(1.0, unit="N*m^2", doc="k; negative to repel.")
-    semi_major_axis: float = parameter(1.0, unit="m", above=0.0, doc="Semi-major axis a, of a hyperbola without sign.")
-    eccentricity: float = parameter(0.5, minimum=0.0, doc="Eccentricity e; not 1.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the body.")
+    strength: Number = parameter(1.0, unit="N*m^2", doc="k; negative to repel.")
+    semi_major_axis: Number = parameter(1.0, unit="m", above=0.0, doc="Semi-major axis a, of a hyperbola without sign.")
+    eccentricity: Number = parameter(0.5, minimum=0.0, doc="Eccentricity e; not 1.")
     gravity = 0.0
     t_end = 2.0 * math.pi
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import ParameterError, Scene, connect, parameter
+from atwood import Number, ParameterError, Scene, connect, parameter
 from atwood_library.joints.spherical import Spherical
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.rigid_body import RigidBody
@@ -20,20 +20,20 @@ class LagrangeTop(Scene):
     5.57).
     """
 
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
-    height: float = parameter(0.1, unit="m", above=0.0, doc="Distance of the centre of mass from the tip.")
-    transverse: float = parameter(
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
+    height: Number = parameter(0.1, unit="m", above=0.0, doc="Distance of the centre of mass from the tip.")
+    transverse: Number = parameter(
         0.015, unit="kg*m^2", above=0.0, doc="Moment of inertia across its axis, about the centre of mass."
     )
-    axial: float = parameter(0.01, unit="kg*m^2", above=0.0, doc="Moment of inertia about its axis.")
-    inclination: float = parameter(math.pi / 6.0, unit="rad", doc="Angle of the axis from the vertical at the start.")
-    spin: float = parameter(50.0, unit="rad/s", doc="Angular velocity about its own axis.")
+    axial: Number = parameter(0.01, unit="kg*m^2", above=0.0, doc="Moment of inertia about its axis.")
+    inclination: Number = parameter(math.pi / 6.0, unit="rad", doc="Angle of the axis from the vertical at the start.")
+    spin: Number = parameter(50.0, unit="rad/s", doc="Angular velocity about its own axis.")
     motion: str = parameter(
         "cusps",
         choices=("cusps", "loops", "waves", "steady", "momentum"),
         doc="Which of the four motions it begins, or by its momentum.",
     )
-    vertical_momentum: float = parameter(
+    vertical_momentum: Number = parameter(
         0.0, unit="kg*m^2/s", doc="Angular momentum about the vertical, for the motion from it."
     )
     space = "space"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.forces.spring import Spring
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.mass_1d import Mass1D
@@ -17,10 +17,10 @@ class MassSpringChain(Scene):
     It starts at rest with the first mass out of place, so that both modes of vibration are excited.
     """
 
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of each body.")
-    stiffness: float = parameter(10.0, unit="N/m", above=0.0, doc="Stiffness of each spring.")
-    spacing: float = parameter(1.0, unit="m", above=0.0, doc="Natural length of each spring.")
-    shift: float = parameter(0.2, unit="m", doc="How far the first mass starts from its place.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of each body.")
+    stiffness: Number = parameter(10.0, unit="N/m", above=0.0, doc="Stiffness of each spring.")
+    spacing: Number = parameter(1.0, unit="m", above=0.0, doc="Natural length of each spring.")
+    shift: Number = parameter(0.2, unit="m", doc="How far the first mass starts from its place.")
     space = "line"
     t_end = 5.0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, parameter
+from atwood import Number, Scene, parameter
 from atwood_library.fields.mutual_potential import MutualPotential
 from atwood_library.parts.point_mass import PointMass
 
@@ -18,9 +18,9 @@ class NBody(Scene):
     takes the same part, `MutualPotential`.
     """
 
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of each body.")
-    scale: float = parameter(1.0, unit="m", above=0.0, doc="Unit of length of the figure.")
-    constant: float = parameter(1.0, unit="m^3/(kg*s^2)", above=0.0, doc="Constant of gravitation.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of each body.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Unit of length of the figure.")
+    constant: Number = parameter(1.0, unit="m^3/(kg*s^2)", above=0.0, doc="Constant of gravitation.")
     space = "space"
     gravity = 0.0
     t_end = 6.32591398292621

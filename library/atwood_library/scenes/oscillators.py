@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.fields.potential import Potential
 from atwood_library.joints.point_on_curve import PointOnCurve
 from atwood_library.parts.ground import Ground
@@ -22,11 +22,11 @@ class Oscillators(Scene):
     """
 
     kind: str = parameter("harmonic", choices=("free", "harmonic", "inverted", "pendulum"), doc="The potential.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
-    stiffness: float = parameter(4.0, unit="N/m", above=0.0, doc="Size k of the potential.")
-    radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius a of the pendulum, and unit of the displacement.")
-    away: float = parameter(0.5, unit="rad", doc="Displacement at the start, over a.")
-    rate: float = parameter(0.3, unit="rad/s", doc="Its rate at the start.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
+    stiffness: Number = parameter(4.0, unit="N/m", above=0.0, doc="Size k of the potential.")
+    radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius a of the pendulum, and unit of the displacement.")
+    away: Number = parameter(0.5, unit="rad", doc="Displacement at the start, over a.")
+    rate: Number = parameter(0.3, unit="rad/s", doc="Its rate at the start.")
     gravity = 0.0
     t_end = 5.0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.drive import Drive
 from atwood_library.joints.pivot import Pivot
 from atwood_library.parts.ground import Ground
@@ -16,11 +16,11 @@ class OverheadCrane(Scene):
     Bessel functions of ``s = 2 sqrt(g l)/l'`` for a trolley that stands.
     """
 
-    mass: float = parameter(500.0, unit="kg", above=0.0, doc="Mass of the load.")
-    length: float = parameter(4.0, unit="m", above=0.0, doc="Length of the rope at the start.")
-    hoist: float = parameter(0.5, unit="m/s", doc="Speed at which the rope is let out; negative to haul the load up.")
-    acceleration: float = parameter(0.0, unit="m/s^2", doc="Acceleration of the trolley along x, from rest.")
-    sway: float = parameter(1e-3, unit="rad", doc="Angle of the rope at the start.")
+    mass: Number = parameter(500.0, unit="kg", above=0.0, doc="Mass of the load.")
+    length: Number = parameter(4.0, unit="m", above=0.0, doc="Length of the rope at the start.")
+    hoist: Number = parameter(0.5, unit="m/s", doc="Speed at which the rope is let out; negative to haul the load up.")
+    acceleration: Number = parameter(0.0, unit="m/s^2", doc="Acceleration of the trolley along x, from rest.")
+    sway: Number = parameter(1e-3, unit="rad", doc="Angle of the rope at the start.")
     t_end = 10.0
 
     ground: Ground = Ground()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.slider import Slider
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
@@ -12,9 +12,9 @@ from atwood_library.parts.rod import Rod
 class PendulumOnCart(Scene):
     """A cart that slides freely on a horizontal rail, with a pendulum on it, released at rest."""
 
-    cart_mass: float = parameter(2.0, unit="kg", above=0.0, doc="Mass of the cart.")
-    bob_mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bob.")
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
+    cart_mass: Number = parameter(2.0, unit="kg", above=0.0, doc="Mass of the cart.")
+    bob_mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bob.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
     t_end = 5.0
 
     ground: Ground = Ground()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.ropes.pulley import Pulley
@@ -19,10 +19,10 @@ class PulleyWithInertia(Scene):
     swing aside, `WoundRope` has the wheel's radius and the points where the rope leaves it.
     """
 
-    mass1: float = parameter(2.0, unit="kg", above=0.0, doc="Mass on one side.")
-    mass2: float = parameter(1.0, unit="kg", above=0.0, doc="Mass on the other side.")
-    inertia: float = parameter(0.03, unit="kg*m^2", minimum=0.0, doc="Moment of inertia J of the wheel.")
-    radius: float = parameter(0.2, unit="m", above=0.0, doc="Radius R of the wheel.")
+    mass1: Number = parameter(2.0, unit="kg", above=0.0, doc="Mass on one side.")
+    mass2: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass on the other side.")
+    inertia: Number = parameter(0.03, unit="kg*m^2", minimum=0.0, doc="Moment of inertia J of the wheel.")
+    radius: Number = parameter(0.2, unit="m", above=0.0, doc="Radius R of the wheel.")
     space = "line"
     line_axis = (0.0, 0.0, 1.0)
     t_end = 1.0

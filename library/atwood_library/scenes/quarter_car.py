@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.forces.damper import Damper
 from atwood_library.forces.spring import Spring
 from atwood_library.joints.drive import Drive
@@ -20,13 +20,13 @@ class QuarterCar(Scene):
     It starts on its steady motion, in which everything moves at the frequency of the road (`steady_motion`).
     """
 
-    body_mass: float = parameter(300.0, unit="kg", above=0.0, doc="Mass of the body.")
-    wheel_mass: float = parameter(40.0, unit="kg", above=0.0, doc="Mass of the wheel.")
-    spring_stiffness: float = parameter(16e3, unit="N/m", above=0.0, doc="Stiffness of the suspension.")
-    damping: float = parameter(1.2e3, unit="N*s/m", minimum=0.0, doc="Damping of the suspension.")
-    tyre_stiffness: float = parameter(160e3, unit="N/m", above=0.0, doc="Stiffness of the tyre.")
-    height: float = parameter(0.02, unit="m", doc="Height of the waves above the mean.")
-    angular_frequency: float = parameter(8.0, unit="rad/s", above=0.0, doc="Angular frequency at which waves come.")
+    body_mass: Number = parameter(300.0, unit="kg", above=0.0, doc="Mass of the body.")
+    wheel_mass: Number = parameter(40.0, unit="kg", above=0.0, doc="Mass of the wheel.")
+    spring_stiffness: Number = parameter(16e3, unit="N/m", above=0.0, doc="Stiffness of the suspension.")
+    damping: Number = parameter(1.2e3, unit="N*s/m", minimum=0.0, doc="Damping of the suspension.")
+    tyre_stiffness: Number = parameter(160e3, unit="N/m", above=0.0, doc="Stiffness of the tyre.")
+    height: Number = parameter(0.02, unit="m", doc="Height of the waves above the mean.")
+    angular_frequency: Number = parameter(8.0, unit="rad/s", above=0.0, doc="Angular frequency at which waves come.")
     space = "line"
     line_axis = (0.0, 0.0, 1.0)
     t_end = 5.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, Triple, connect, parameter
 from atwood_library.joints.rolling_ellipsoid import RollingEllipsoid
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.rigid_body import RigidBody
@@ -18,19 +18,17 @@ class Rattleback(Scene):
     and energy is kept.
     """
 
-    semi_axes: tuple[float, float, float] = parameter(
-        (0.2, 0.03, 0.02), unit="m", size=3, doc="Semi-axes of the ellipsoid."
-    )
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
-    moments: tuple[float, float, float] = parameter(
+    semi_axes: Triple = parameter((0.2, 0.03, 0.02), unit="m", size=3, doc="Semi-axes of the ellipsoid.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
+    moments: Triple = parameter(
         (2e-4, 1.6e-3, 1.7e-3), unit="kg*m^2", size=3, doc="Principal moments of inertia about the centre of mass."
     )
-    skew: float = parameter(
+    skew: Number = parameter(
         math.radians(-5.0), unit="rad", doc="Angle of the principal axes from those of the ellipsoid."
     )
-    depth: float = parameter(0.01, unit="m", doc="Depth of the centre of mass below the centre of the ellipsoid.")
-    spin: float = parameter(-5.0, unit="rad/s", doc="Angular velocity about the vertical at the start.")
-    rattle: float = parameter(0.01, unit="rad/s", doc="Angular velocity across at the start.")
+    depth: Number = parameter(0.01, unit="m", doc="Depth of the centre of mass below the centre of the ellipsoid.")
+    spin: Number = parameter(-5.0, unit="rad/s", doc="Angular velocity about the vertical at the start.")
+    rattle: Number = parameter(0.01, unit="rad/s", doc="Angular velocity across at the start.")
     space = "space"
     t_end = 3.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Model, Scene, parameter
+from atwood import Model, Number, Scene, Triple, parameter
 from atwood_library.parts.box import Box
 from atwood_library.parts.disc import Disc
 from atwood_library.parts.point_mass import PointMass
@@ -19,11 +19,11 @@ class RigidBodies(Scene):
     moments of inertia are those of textbooks: ``m (b^2 + c^2)/12``, ``m r^2/2`` and ``m r^2/4``, and sums over masses.
     """
 
-    sides: tuple[float, float, float] = parameter((0.3, 0.5, 0.8), unit="m", size=3, doc="Sides of the cuboid.")
-    radius: float = parameter(0.4, unit="m", above=0.0, doc="Radius of the disc, and of the triangle.")
-    height: float = parameter(0.5, unit="m", above=0.0, doc="Height of the poles above and below the triangle.")
-    mass: float = parameter(1.2, unit="kg", above=0.0, doc="Mass of the cuboid, of the disc and of each of the five.")
-    rate: float = parameter(3.0, unit="rad/s", doc="Rate at which they turn.")
+    sides: Triple = parameter((0.3, 0.5, 0.8), unit="m", size=3, doc="Sides of the cuboid.")
+    radius: Number = parameter(0.4, unit="m", above=0.0, doc="Radius of the disc, and of the triangle.")
+    height: Number = parameter(0.5, unit="m", above=0.0, doc="Height of the poles above and below the triangle.")
+    mass: Number = parameter(1.2, unit="kg", above=0.0, doc="Mass of the cuboid, of the disc and of each of the five.")
+    rate: Number = parameter(3.0, unit="rad/s", doc="Rate at which they turn.")
     space = "space"
     gravity = 0.0
     t_end = 2.0

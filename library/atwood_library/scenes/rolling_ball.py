@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.rolling_sphere import RollingSphere
 from atwood_library.joints.rotary_drive import RotaryDrive
 from atwood_library.parts.ground import Ground
@@ -17,13 +17,13 @@ class RollingBall(Scene):
     (Earnshaw, Dynamics, 1844; Weltner, American Journal of Physics 47, 1979). Hollow it circles faster, at up to 2/5.
     """
 
-    radius: float = parameter(0.1, unit="m", above=0.0, doc="Radius of the ball.")
-    cavity: float = parameter(0.0, unit="m", minimum=0.0, doc="Radius of its cavity.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the ball.")
-    rate: float = parameter(3.0, unit="rad/s", doc="Rate of the table.")
-    away: float = parameter(0.5, unit="m", doc="Distance of the ball from the middle of the table at the start.")
-    speed: float = parameter(0.3, unit="m/s", doc="Speed of the ball across that distance at the start.")
-    spin: float = parameter(0.0, unit="rad/s", doc="Angular velocity of the ball about the vertical.")
+    radius: Number = parameter(0.1, unit="m", above=0.0, doc="Radius of the ball.")
+    cavity: Number = parameter(0.0, unit="m", minimum=0.0, doc="Radius of its cavity.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the ball.")
+    rate: Number = parameter(3.0, unit="rad/s", doc="Rate of the table.")
+    away: Number = parameter(0.5, unit="m", doc="Distance of the ball from the middle of the table at the start.")
+    speed: Number = parameter(0.3, unit="m/s", doc="Speed of the ball across that distance at the start.")
+    spin: Number = parameter(0.0, unit="rad/s", doc="Angular velocity of the ball about the vertical.")
     space = "space"
     t_end = 10.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import ParameterError, Scene, connect, parameter
+from atwood import Number, ParameterError, Scene, connect, parameter
 from atwood_library.joints.rolling_disc import RollingDisc as RollingContact
 from atwood_library.parts.disc import Disc
 from atwood_library.parts.ground import Ground
@@ -20,13 +20,13 @@ class RollingDisc(Scene):
     turns if it is slow.
     """
 
-    radius: float = parameter(0.1, unit="m", above=0.0, doc="Radius.")
-    hole: float = parameter(0.0, unit="m", minimum=0.0, doc="Radius of its hole: a hoop, if it is the radius.")
-    mass: float = parameter(0.5, unit="kg", above=0.0, doc="Mass.")
-    inclination: float = parameter(math.radians(60.0), unit="rad", doc="Angle of its axis from the vertical at first.")
-    precession: float = parameter(6.0, unit="rad/s", doc="Rate at which its axis turns about the vertical at first.")
-    fall: float = parameter(2.0, unit="rad/s", doc="For 'wobble': rate at which the inclination grows at first.")
-    speed: float = parameter(1.0, unit="m/s", doc="For 'straight': speed of its centre.")
+    radius: Number = parameter(0.1, unit="m", above=0.0, doc="Radius.")
+    hole: Number = parameter(0.0, unit="m", minimum=0.0, doc="Radius of its hole: a hoop, if it is the radius.")
+    mass: Number = parameter(0.5, unit="kg", above=0.0, doc="Mass.")
+    inclination: Number = parameter(math.radians(60.0), unit="rad", doc="Angle of its axis from the vertical at first.")
+    precession: Number = parameter(6.0, unit="rad/s", doc="Rate at which its axis turns about the vertical at first.")
+    fall: Number = parameter(2.0, unit="rad/s", doc="For 'wobble': rate at which the inclination grows at first.")
+    speed: Number = parameter(1.0, unit="m/s", doc="For 'straight': speed of its centre.")
     motion: str = parameter("wobble", choices=("steady", "wobble", "coin", "straight"), doc="Which motion it begins.")
     space = "space"
     t_end = 4.0

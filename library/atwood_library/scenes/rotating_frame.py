@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.drive import Drive
 from atwood_library.joints.point_on_plane import PointOnPlane
 from atwood_library.joints.rotary_drive import RotaryDrive
@@ -22,12 +22,12 @@ class RotatingFrame(Scene):
     straight on.
     """
 
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the puck.")
-    rate: float = parameter(1.5, unit="rad/s", doc="Rate of the table at the start.")
-    speed_up: float = parameter(0.4, unit="rad/s^2", doc="Angular acceleration of the table.")
-    acceleration: float = parameter(0.3, unit="m/s^2", doc="Acceleration of the table's middle along x, from rest.")
-    away: float = parameter(0.5, unit="m", doc="Distance of the puck from the middle at the start, along x.")
-    speed: float = parameter(0.2, unit="m/s", doc="Speed of the puck on the table at the start, along y.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the puck.")
+    rate: Number = parameter(1.5, unit="rad/s", doc="Rate of the table at the start.")
+    speed_up: Number = parameter(0.4, unit="rad/s^2", doc="Angular acceleration of the table.")
+    acceleration: Number = parameter(0.3, unit="m/s^2", doc="Acceleration of the table's middle along x, from rest.")
+    away: Number = parameter(0.5, unit="m", doc="Distance of the puck from the middle at the start, along x.")
+    speed: Number = parameter(0.2, unit="m/s", doc="Speed of the puck on the table at the start, along y.")
     space = "space"
     gravity = 0.0
     t_end = 5.0

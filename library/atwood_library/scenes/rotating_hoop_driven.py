@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.point_on_circle import PointOnCircle
 from atwood_library.joints.rotary_drive import RotaryDrive
 from atwood_library.parts.ground import Ground
@@ -20,10 +20,10 @@ class RotatingHoopDriven(Scene):
     the bead rests at ``cos theta = -g/(omega^2 a)``.
     """
 
-    radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius of the hoop.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
-    rate: float = parameter(5.0, unit="rad/s", doc="Rate of the hoop about the vertical.")
-    inclination: float = parameter(
+    radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius of the hoop.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
+    rate: Number = parameter(5.0, unit="rad/s", doc="Rate of the hoop about the vertical.")
+    inclination: Number = parameter(
         2.0 * math.pi / 3.0, unit="rad", doc="Angle of the bead from the upward vertical at the start."
     )
     space = "space"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.point_on_circle import PointOnCircle
 from atwood_library.parts.ground import Ground
@@ -20,15 +20,15 @@ class RotatingHoopFree(Scene):
     vertical.
     """
 
-    radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius of the hoop.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
-    inertia: float = parameter(
+    radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius of the hoop.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
+    inertia: Number = parameter(
         0.0, unit="kg*m^2", minimum=0.0, doc="Moment of inertia of the hoop about its vertical diameter."
     )
-    inclination: float = parameter(
+    inclination: Number = parameter(
         2.0 * math.pi / 3.0, unit="rad", doc="Angle of the bead from the upward vertical at the start."
     )
-    rate: float = parameter(2.0, unit="rad/s", doc="Rate of the hoop about the vertical at the start.")
+    rate: Number = parameter(2.0, unit="rad/s", doc="Rate of the hoop about the vertical at the start.")
     space = "space"
     t_end = 5.0
 

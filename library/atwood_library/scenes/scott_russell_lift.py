@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.point_on_line import PointOnLine
 from atwood_library.joints.weld import Weld
@@ -21,14 +21,14 @@ class ScottRussellLift(Scene):
     on a rope, and swings: two degrees of freedom. The foot is pushed in by an actuator.
     """
 
-    crank: float = parameter(0.5, unit="m", above=0.0, doc="Length of the crank, half that of the beam.")
-    beam_mass: float = parameter(4.0, unit="kg", above=0.0, doc="Mass of the beam.")
-    crank_mass: float = parameter(1.5, unit="kg", above=0.0, doc="Mass of the crank.")
-    load_mass: float = parameter(10.0, unit="kg", above=0.0, doc="Mass of the load.")
-    rope_length: float = parameter(0.3, unit="m", above=0.0, doc="Length of the rope of the load.")
-    push: float = parameter(-150.0, unit="N", doc="Force of the actuator on the foot, outwards.")
-    angle: float = parameter(math.radians(35.0), unit="rad", doc="Angle of the crank above the floor at the start.")
-    sway: float = parameter(0.2, unit="rad", doc="Angle of the rope from the vertical at the start.")
+    crank: Number = parameter(0.5, unit="m", above=0.0, doc="Length of the crank, half that of the beam.")
+    beam_mass: Number = parameter(4.0, unit="kg", above=0.0, doc="Mass of the beam.")
+    crank_mass: Number = parameter(1.5, unit="kg", above=0.0, doc="Mass of the crank.")
+    load_mass: Number = parameter(10.0, unit="kg", above=0.0, doc="Mass of the load.")
+    rope_length: Number = parameter(0.3, unit="m", above=0.0, doc="Length of the rope of the load.")
+    push: Number = parameter(-150.0, unit="N", doc="Force of the actuator on the foot, outwards.")
+    angle: Number = parameter(math.radians(35.0), unit="rad", doc="Angle of the crank above the floor at the start.")
+    sway: Number = parameter(0.2, unit="rad", doc="Angle of the rope from the vertical at the start.")
     t_end = 0.4
 
     floor: Ground = Ground()

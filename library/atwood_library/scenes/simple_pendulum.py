@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.parts.rod import Rod
@@ -14,9 +14,9 @@ from atwood_library.parts.rod import Rod
 class SimplePendulum(Scene):
     """A bob on a massless rod, released at rest from an angle."""
 
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bob.")
-    release_angle: float = parameter(1.0, unit="rad", doc="Angle at the start.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bob.")
+    release_angle: Number = parameter(1.0, unit="rad", doc="Angle at the start.")
     t_end = 5.0
 
     ground: Ground = Ground()

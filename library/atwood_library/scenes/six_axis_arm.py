@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, parameter
+from atwood import Number, Scene, parameter
 from atwood_library.blocks.servo_controller import ServoController
 from atwood_library.drives.inertia import Inertia
 from atwood_library.drives.rotational_motion import RotationalMotion
@@ -37,12 +37,12 @@ class SixAxisArm(Scene):
     travel: tuple[float, float, float, float, float, float] = parameter(
         (1.2, 0.8, -0.6, 1.0, 0.9, -1.5), unit="rad", size=6, doc="How far each axis turns."
     )
-    duration: float = parameter(1.5, unit="s", above=0.0, doc="How long the motion takes.")
-    load: float = parameter(10.0, unit="kg", minimum=0.0, doc="Mass at the tip of the arm.")
-    ratio: float = parameter(100.0, above=0.0, doc="Turns of a motor for one of its axis.")
-    rotor: float = parameter(2e-3, unit="kg*m^2", above=0.0, doc="Moment of inertia of a motor.")
-    position_gain: float = parameter(20.0, unit="1/s", above=0.0, doc="Gain of the controllers of positions.")
-    gain: float = parameter(60.0, unit="N*m*s/rad", above=0.0, doc="Torque of a motor if its axis lags by 1 rad/s.")
+    duration: Number = parameter(1.5, unit="s", above=0.0, doc="How long the motion takes.")
+    load: Number = parameter(10.0, unit="kg", minimum=0.0, doc="Mass at the tip of the arm.")
+    ratio: Number = parameter(100.0, above=0.0, doc="Turns of a motor for one of its axis.")
+    rotor: Number = parameter(2e-3, unit="kg*m^2", above=0.0, doc="Moment of inertia of a motor.")
+    position_gain: Number = parameter(20.0, unit="1/s", above=0.0, doc="Gain of the controllers of positions.")
+    gain: Number = parameter(60.0, unit="N*m*s/rad", above=0.0, doc="Torque of a motor if its axis lags by 1 rad/s.")
     drives: str = parameter("controlled", choices=("controlled", "ideal"), doc="What turns the axes.")
     space = "space"
     t_end = 2.0

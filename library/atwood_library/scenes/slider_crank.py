@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.slider import Slider
 from atwood_library.parts.ground import Ground
@@ -13,9 +13,9 @@ from atwood_library.parts.point_mass import PointMass
 class SliderCrank(Scene):
     """A crank and a connecting rod, both uniform, and a piston on a horizontal guide."""
 
-    crank_length: float = parameter(0.5, unit="m", above=0.0, doc="Length of the crank.")
-    rod_length: float = parameter(1.5, unit="m", above=0.0, doc="Length of the connecting rod.")
-    piston_mass: float = parameter(0.5, unit="kg", above=0.0, doc="Mass of the piston.")
+    crank_length: Number = parameter(0.5, unit="m", above=0.0, doc="Length of the crank.")
+    rod_length: Number = parameter(1.5, unit="m", above=0.0, doc="Length of the connecting rod.")
+    piston_mass: Number = parameter(0.5, unit="kg", above=0.0, doc="Mass of the piston.")
     t_end = 2.0
 
     ground: Ground = Ground()

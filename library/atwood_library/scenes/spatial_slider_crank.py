@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.slider import Slider
 from atwood_library.joints.spherical import Spherical
@@ -19,11 +19,11 @@ class SpatialSliderCrank(Scene):
     itself. With the crank at angle a above y, the pin is at ``(0, d + r cos a, h + r sin a)``.
     """
 
-    crank_length: float = parameter(0.08, unit="m", above=0.0, doc="Length of the crank, r.")
-    rod_length: float = parameter(0.3, unit="m", above=0.0, doc="Length of the connecting rod.")
-    depth: float = parameter(0.1, unit="m", doc="Distance of the crank's bearing behind the slider's line, d.")
-    height: float = parameter(0.12, unit="m", doc="Height of the crank's bearing above the slider's line, h.")
-    crank_rate: float = parameter(6.0, unit="rad/s", doc="Rate of the crank at the start.")
+    crank_length: Number = parameter(0.08, unit="m", above=0.0, doc="Length of the crank, r.")
+    rod_length: Number = parameter(0.3, unit="m", above=0.0, doc="Length of the connecting rod.")
+    depth: Number = parameter(0.1, unit="m", doc="Distance of the crank's bearing behind the slider's line, d.")
+    height: Number = parameter(0.12, unit="m", doc="Height of the crank's bearing above the slider's line, h.")
+    crank_rate: Number = parameter(6.0, unit="rad/s", doc="Rate of the crank at the start.")
     space = "space"
     t_end = 5.0
 

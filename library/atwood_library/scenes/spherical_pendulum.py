@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.point_on_surface import PointOnSurface
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
@@ -19,13 +19,13 @@ class SphericalPendulum(Scene):
     `parameter_1` and `parameter_2` of the rod, without a constraint; these have no rates straight below the pivot.
     """
 
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bob.")
-    inclination: float = parameter(math.pi / 3.0, unit="rad", doc="Angle from the downward vertical at the start.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the rod.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bob.")
+    inclination: Number = parameter(math.pi / 3.0, unit="rad", doc="Angle from the downward vertical at the start.")
     coordinates: str = parameter(
         "places", choices=("places", "angles"), doc="States: place and constraint, or the angles theta and phi."
     )
-    azimuth_rate: float = parameter(2.0, unit="rad/s", doc="Rate at which it goes round at the start.")
+    azimuth_rate: Number = parameter(2.0, unit="rad/s", doc="Rate at which it goes round at the start.")
     space = "space"
     t_end = 10.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from atwood import Scalar, Scene, cos, maximum, minimum, parameter, sin, sqrt
+from atwood import Number, Scalar, Scene, cos, maximum, minimum, parameter, sin, sqrt
 from atwood_library.blocks.servo_controller import ServoController
 from atwood_library.drives.translational_motion import TranslationalMotion
 from atwood_library.joints.slider import Slider
@@ -28,19 +28,19 @@ class StewartPlatform(Scene):
     that the lap asks for, over that stiffness. ``legs="ideal"`` prescribes the lengths instead, and gives these forces.
     """
 
-    base_radius: float = parameter(1.0, unit="m", above=0.0, doc="Radius of the circle of the feet.")
-    platform_radius: float = parameter(0.6, unit="m", above=0.0, doc="Radius of the circle of the balls.")
-    height: float = parameter(1.0, unit="m", above=0.0, doc="Height of the platform without load.")
-    platform_mass: float = parameter(20.0, unit="kg", above=0.0, doc="Mass of the platform, a disc.")
-    leg_mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of each half of a leg.")
-    stiffness: float = parameter(4000.0, unit="N/m", minimum=0.0, doc="Stiffness of each leg.")
-    damping: float = parameter(40.0, unit="N*s/m", minimum=0.0, doc="Damping of each leg.")
-    aside: float = parameter(0.1, unit="m", doc="Displacement of the platform along x at the start.")
+    base_radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius of the circle of the feet.")
+    platform_radius: Number = parameter(0.6, unit="m", above=0.0, doc="Radius of the circle of the balls.")
+    height: Number = parameter(1.0, unit="m", above=0.0, doc="Height of the platform without load.")
+    platform_mass: Number = parameter(20.0, unit="kg", above=0.0, doc="Mass of the platform, a disc.")
+    leg_mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of each half of a leg.")
+    stiffness: Number = parameter(4000.0, unit="N/m", minimum=0.0, doc="Stiffness of each leg.")
+    damping: Number = parameter(40.0, unit="N*s/m", minimum=0.0, doc="Damping of each leg.")
+    aside: Number = parameter(0.1, unit="m", doc="Displacement of the platform along x at the start.")
     legs: str = parameter("sprung", choices=("sprung", "controlled", "ideal"), doc="What acts along the legs.")
-    yaw: float = parameter(0.2, unit="rad", doc="How far the platform turns on its lap.")
-    lap: float = parameter(2.0, unit="s", above=0.0, doc="How long the lap takes.")
-    position_gain: float = parameter(20.0, unit="1/s", above=0.0, doc="Gain of the controllers of positions.")
-    gain: float = parameter(3000.0, unit="N*s/m", above=0.0, doc="Force of an actuator for a leg that lags by 1 m/s.")
+    yaw: Number = parameter(0.2, unit="rad", doc="How far the platform turns on its lap.")
+    lap: Number = parameter(2.0, unit="s", above=0.0, doc="How long the lap takes.")
+    position_gain: Number = parameter(20.0, unit="1/s", above=0.0, doc="Gain of the controllers of positions.")
+    gain: Number = parameter(3000.0, unit="N*s/m", above=0.0, doc="Force of an actuator for a leg that lags by 1 m/s.")
     space = "space"
     t_end = 2.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, parameter
+from atwood import Number, Scene, parameter
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.parts.rod import Rod
@@ -33,10 +33,10 @@ class Strandbeest(Scene):
     each. Where the joints are follows from the crank by intersections of circles, one after another.
     """
 
-    scale: float = parameter(0.01, unit="m", above=0.0, doc="Size: length of a bar of length one.")
-    mass: float = parameter(0.2, unit="kg", above=0.0, doc="Mass at each joint.")
-    angle: float = parameter(0.3, unit="rad", doc="Angle of the crank at the start.")
-    rate: float = parameter(12.0, unit="rad/s", doc="Rate of the crank at the start.")
+    scale: Number = parameter(0.01, unit="m", above=0.0, doc="Size: length of a bar of length one.")
+    mass: Number = parameter(0.2, unit="kg", above=0.0, doc="Mass at each joint.")
+    angle: Number = parameter(0.3, unit="rad", doc="Angle of the crank at the start.")
+    rate: Number = parameter(12.0, unit="rad/s", doc="Rate of the crank at the start.")
     t_end = 1.0
 
     axle: Ground = Ground()

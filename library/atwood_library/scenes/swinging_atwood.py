@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.slide_gear import SlideGear
 from atwood_library.joints.slider import Slider
@@ -20,10 +20,10 @@ class SwingingAtwood(Scene):
     angle, are the coordinates: ``(m + M) r'' = m r theta'^2 + g (m cos theta - M)``.
     """
 
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass m that swings.")
-    ratio: float = parameter(3.0, above=0.0, doc="Mass M of the other one over m.")
-    length: float = parameter(1.0, unit="m", above=0.0, doc="Length of the side that swings at the start.")
-    angle: float = parameter(math.pi / 2.0, unit="rad", doc="Angle from the downward vertical at the start.")
+    mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass m that swings.")
+    ratio: Number = parameter(3.0, above=0.0, doc="Mass M of the other one over m.")
+    length: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the side that swings at the start.")
+    angle: Number = parameter(math.pi / 2.0, unit="rad", doc="Angle from the downward vertical at the start.")
     t_end = 3.0
 
     ground: Ground = Ground()

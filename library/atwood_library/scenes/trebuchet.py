@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.weld import Weld
 from atwood_library.parts.ground import Ground
@@ -21,18 +21,18 @@ class Trebuchet(Scene):
     there the stone flies along a parabola. The beam's angle is zero where the long arm points to the right.
     """
 
-    short_arm: float = parameter(1.0, unit="m", above=0.0, doc="Length of the arm with the weight.")
-    long_arm: float = parameter(4.0, unit="m", above=0.0, doc="Length of the arm with the sling.")
-    sling: float = parameter(3.5, unit="m", above=0.0, doc="Length of the sling.")
-    height: float = parameter(3.0, unit="m", above=0.0, doc="Height of the axle above the ground.")
-    weight: float = parameter(1000.0, unit="kg", above=0.0, doc="Mass of the counterweight.")
-    stone: float = parameter(10.0, unit="kg", above=0.0, doc="Mass of the stone.")
-    beam: float = parameter(50.0, unit="kg", minimum=0.0, doc="Mass of the beam.")
-    start_angle: float = parameter(math.radians(-45.0), unit="rad", doc="Angle of the beam at the start.")
-    sling_angle: float = parameter(
+    short_arm: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the arm with the weight.")
+    long_arm: Number = parameter(4.0, unit="m", above=0.0, doc="Length of the arm with the sling.")
+    sling: Number = parameter(3.5, unit="m", above=0.0, doc="Length of the sling.")
+    height: Number = parameter(3.0, unit="m", above=0.0, doc="Height of the axle above the ground.")
+    weight: Number = parameter(1000.0, unit="kg", above=0.0, doc="Mass of the counterweight.")
+    stone: Number = parameter(10.0, unit="kg", above=0.0, doc="Mass of the stone.")
+    beam: Number = parameter(50.0, unit="kg", minimum=0.0, doc="Mass of the beam.")
+    start_angle: Number = parameter(math.radians(-45.0), unit="rad", doc="Angle of the beam at the start.")
+    sling_angle: Number = parameter(
         math.radians(-70.0), unit="rad", doc="Angle of the sling from straight down at the start; negative inwards."
     )
-    release: float = parameter(math.radians(80.0), unit="rad", doc="Angle of the beam at which the sling lets go.")
+    release: Number = parameter(math.radians(80.0), unit="rad", doc="Angle of the beam at which the sling lets go.")
     t_end = 3.0
 
     ground: Ground = Ground()

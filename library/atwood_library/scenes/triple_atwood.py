@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.parts.ground import Ground
 from atwood_library.parts.point_mass import PointMass
 from atwood_library.ropes.pulley import Pulley
@@ -20,10 +20,10 @@ class TripleAtwood(Scene):
     moves as with two such masses.
     """
 
-    mass1: float = parameter(3.0, unit="kg", above=0.0, doc="First mass on the left.")
-    mass2: float = parameter(2.0, unit="kg", above=0.0, doc="Second mass on the left.")
-    mass3: float = parameter(2.5, unit="kg", above=0.0, doc="First mass on the right.")
-    mass4: float = parameter(1.0, unit="kg", above=0.0, doc="Second mass on the right.")
+    mass1: Number = parameter(3.0, unit="kg", above=0.0, doc="First mass on the left.")
+    mass2: Number = parameter(2.0, unit="kg", above=0.0, doc="Second mass on the left.")
+    mass3: Number = parameter(2.5, unit="kg", above=0.0, doc="First mass on the right.")
+    mass4: Number = parameter(1.0, unit="kg", above=0.0, doc="Second mass on the right.")
     space = "line"
     line_axis = (0.0, 0.0, 1.0)
     t_end = 1.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.fields.pair_potential import PairPotential
 from atwood_library.parts.point_mass import PointMass
 
@@ -16,11 +16,11 @@ class TwoBody(Scene):
     Any other interaction comes with ``scene.set("force.law", "function")`` and its energy as a function of distance.
     """
 
-    mass1: float = parameter(2.0, unit="kg", above=0.0, doc="Mass of the first body.")
-    mass2: float = parameter(1.0, unit="kg", above=0.0, doc="Mass of the second body.")
-    constant: float = parameter(1.0, unit="m^3/(kg*s^2)", above=0.0, doc="Constant of gravitation.")
-    semi_major_axis: float = parameter(1.0, unit="m", above=0.0, doc="Of the ellipse of one body about the other.")
-    eccentricity: float = parameter(0.5, minimum=0.0, maximum=0.99, doc="Eccentricity of the ellipses.")
+    mass1: Number = parameter(2.0, unit="kg", above=0.0, doc="Mass of the first body.")
+    mass2: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the second body.")
+    constant: Number = parameter(1.0, unit="m^3/(kg*s^2)", above=0.0, doc="Constant of gravitation.")
+    semi_major_axis: Number = parameter(1.0, unit="m", above=0.0, doc="Of the ellipse of one body about the other.")
+    eccentricity: Number = parameter(0.5, minimum=0.0, maximum=0.99, doc="Eccentricity of the ellipses.")
     space = "space"
     gravity = 0.0
     t_end = 5.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.joints.pivot import Pivot
 from atwood_library.joints.universal import Universal
 from atwood_library.parts.ground import Ground
@@ -18,10 +18,10 @@ class UniversalShaft(Scene):
     driving one, twice in each turn. The bearings carry the couple that bends the cross.
     """
 
-    bend: float = parameter(math.radians(30.0), unit="rad", doc="Angle between the shafts.")
-    driving_moment: float = parameter(0.01, unit="kg*m^2", above=0.0, doc="Moment of inertia of the driving shaft.")
-    driven_moment: float = parameter(0.02, unit="kg*m^2", above=0.0, doc="Moment of inertia of the driven shaft.")
-    rate: float = parameter(10.0, unit="rad/s", doc="Rate of the driving shaft at the start.")
+    bend: Number = parameter(math.radians(30.0), unit="rad", doc="Angle between the shafts.")
+    driving_moment: Number = parameter(0.01, unit="kg*m^2", above=0.0, doc="Moment of inertia of the driving shaft.")
+    driven_moment: Number = parameter(0.02, unit="kg*m^2", above=0.0, doc="Moment of inertia of the driven shaft.")
+    rate: Number = parameter(10.0, unit="rad/s", doc="Rate of the driving shaft at the start.")
     space = "space"
     gravity = 0.0
     t_end = 2.0

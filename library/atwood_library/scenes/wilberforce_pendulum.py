@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Scene, connect, parameter
+from atwood import Number, Scene, connect, parameter
 from atwood_library.fields.coordinate_lagrangian import CoordinateLagrangian
 from atwood_library.joints.cylindrical import Cylindrical
 from atwood_library.parts.ground import Ground
@@ -22,11 +22,11 @@ class WilberforcePendulum(Scene):
     1991). Displacement and angle are those from where it hangs at rest.
     """
 
-    mass: float = parameter(0.5, unit="kg", above=0.0, doc="Mass of the body.")
-    inertia: float = parameter(1.4e-4, unit="kg*m^2", above=0.0, doc="Moment of inertia about the vertical.")
-    rate: float = parameter(2.3, unit="rad/s", above=0.0, doc="Rate w of either motion without the other.")
-    coupling: float = parameter(9.3e-3, unit="N", doc="Coupling e.")
-    lift: float = parameter(0.1, unit="m", doc="Height above rest at the start.")
+    mass: Number = parameter(0.5, unit="kg", above=0.0, doc="Mass of the body.")
+    inertia: Number = parameter(1.4e-4, unit="kg*m^2", above=0.0, doc="Moment of inertia about the vertical.")
+    rate: Number = parameter(2.3, unit="rad/s", above=0.0, doc="Rate w of either motion without the other.")
+    coupling: Number = parameter(9.3e-3, unit="N", doc="Coupling e.")
+    lift: Number = parameter(0.1, unit="m", doc="Height above rest at the start.")
     space = "space"
     gravity = 0.0
     t_end = 40.0

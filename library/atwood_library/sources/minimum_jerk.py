@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, maximum, minimum, observable, parameter
+from atwood import Component, Number, Scalar, maximum, minimum, observable, parameter
 
 
 class MinimumJerk(Component):
@@ -14,10 +14,10 @@ class MinimumJerk(Component):
 
     synonyms = ("Minimum-jerk trajectory", "Smooth step", "Quintic rest-to-rest polynomial")
 
-    travel: float = parameter(1.0, unit="any", doc="How far it goes, in the unit of the input.")
-    duration: float = parameter(1.0, unit="s", above=0.0, doc="How long it takes.")
-    start_time: float = parameter(0.0, unit="s", doc="When it begins.")
-    offset: float = parameter(0.0, unit="any", doc="Where it begins, in the unit of the input.")
+    travel: Number = parameter(1.0, unit="any", doc="How far it goes, in the unit of the input.")
+    duration: Number = parameter(1.0, unit="s", above=0.0, doc="How long it takes.")
+    start_time: Number = parameter(0.0, unit="s", doc="When it begins.")
+    offset: Number = parameter(0.0, unit="any", doc="Where it begins, in the unit of the input.")
 
     def share(self) -> Scalar:
         """Return the share of the duration that has passed."""

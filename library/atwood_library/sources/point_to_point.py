@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, absolute, maximum, minimum, observable, parameter, select, sign, sqrt
+from atwood import Component, Number, Scalar, absolute, maximum, minimum, observable, parameter, select, sign, sqrt
 
 
 class PointToPoint(Component):
@@ -14,11 +14,11 @@ class PointToPoint(Component):
 
     synonyms = ("KinematicPTP", "KinematicPTP2", "Trapezoidal speed profile", "Bang-bang trajectory")
 
-    travel: float = parameter(1.0, unit="any", doc="How far it goes, in the unit of the input.")
-    largest_rate: float = parameter(1.0, unit="any", above=0.0, doc="Largest rate.")
-    largest_acceleration: float = parameter(1.0, unit="any", above=0.0, doc="Largest second rate.")
-    start_time: float = parameter(0.0, unit="s", doc="When it begins.")
-    offset: float = parameter(0.0, unit="any", doc="Where it begins, in the unit of the input.")
+    travel: Number = parameter(1.0, unit="any", doc="How far it goes, in the unit of the input.")
+    largest_rate: Number = parameter(1.0, unit="any", above=0.0, doc="Largest rate.")
+    largest_acceleration: Number = parameter(1.0, unit="any", above=0.0, doc="Largest second rate.")
+    start_time: Number = parameter(0.0, unit="s", doc="When it begins.")
+    offset: Number = parameter(0.0, unit="any", doc="Where it begins, in the unit of the input.")
 
     def times(self) -> tuple[Scalar, Scalar]:
         """Return for how long it speeds up, and when it begins to slow down."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, floor, observable, parameter, select
+from atwood import Component, Number, Scalar, floor, observable, parameter, select
 
 
 class Pulse(Component):
@@ -13,11 +13,11 @@ class Pulse(Component):
 
     synonyms = ("Sources.Pulse", "Rectangular wave", "Square wave", "BooleanPulse")
 
-    amplitude: float = parameter(1.0, unit="any", doc="How much more it is while on, in the unit of the input.")
-    offset: float = parameter(0.0, unit="any", doc="Value while off, in the unit of the input.")
-    period: float = parameter(1.0, unit="s", above=0.0, doc="Time from one pulse to the next.")
-    width: float = parameter(0.5, minimum=0.0, maximum=1.0, doc="Share of the period for which it is on.")
-    start_time: float = parameter(0.0, unit="s", doc="When the first pulse begins.")
+    amplitude: Number = parameter(1.0, unit="any", doc="How much more it is while on, in the unit of the input.")
+    offset: Number = parameter(0.0, unit="any", doc="Value while off, in the unit of the input.")
+    period: Number = parameter(1.0, unit="s", above=0.0, doc="Time from one pulse to the next.")
+    width: Number = parameter(0.5, minimum=0.0, maximum=1.0, doc="Share of the period for which it is on.")
+    start_time: Number = parameter(0.0, unit="s", doc="When the first pulse begins.")
     count: int | None = parameter(None, integer=True, minimum=1, doc="Number of pulses; endless if none.")
 
     @observable(unit="any", doc="Value of the function, in the unit of the input.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, maximum, minimum, observable, parameter
+from atwood import Component, Number, Scalar, maximum, minimum, observable, parameter
 
 
 class Quintic(Component):
@@ -13,14 +13,14 @@ class Quintic(Component):
 
     synonyms = ("Quintic trajectory", "Fifth-degree polynomial", "Hermite interpolation")
 
-    start_time: float = parameter(0.0, unit="s", doc="When it begins.")
-    duration: float = parameter(1.0, unit="s", above=0.0, doc="How long it takes.")
-    start_value: float = parameter(0.0, unit="any", doc="Value at its start, in the unit of the input.")
-    end_value: float = parameter(1.0, unit="any", doc="Value at its end.")
-    start_rate: float = parameter(0.0, unit="any", doc="Rate at its start.")
-    end_rate: float = parameter(0.0, unit="any", doc="Rate at its end.")
-    start_acceleration: float = parameter(0.0, unit="any", doc="Second rate at its start.")
-    end_acceleration: float = parameter(0.0, unit="any", doc="Second rate at its end.")
+    start_time: Number = parameter(0.0, unit="s", doc="When it begins.")
+    duration: Number = parameter(1.0, unit="s", above=0.0, doc="How long it takes.")
+    start_value: Number = parameter(0.0, unit="any", doc="Value at its start, in the unit of the input.")
+    end_value: Number = parameter(1.0, unit="any", doc="Value at its end.")
+    start_rate: Number = parameter(0.0, unit="any", doc="Rate at its start.")
+    end_rate: Number = parameter(0.0, unit="any", doc="Rate at its end.")
+    start_acceleration: Number = parameter(0.0, unit="any", doc="Second rate at its start.")
+    end_acceleration: Number = parameter(0.0, unit="any", doc="Second rate at its end.")
 
     @observable(unit="any", doc="Value of the function, in the unit of the input.")
     def value(self) -> Scalar:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, ParameterError, Scalar, maximum, minimum, observable, parameter
+from atwood import Component, Number, ParameterError, Scalar, maximum, minimum, observable, parameter
 
 
 class Ramp(Component):
@@ -13,10 +13,10 @@ class Ramp(Component):
 
     synonyms = ("ContinuousClock", "Linear function of time", "Sources.Ramp", "Sources.Clock")
 
-    slope: float = parameter(1.0, unit="any", doc="Rise in a second, in the unit of the input.")
-    offset: float = parameter(0.0, unit="any", doc="Value where it begins to rise, in the unit of the input.")
-    start_time: float | None = parameter(None, unit="s", doc="When it begins to rise; none if always.")
-    duration: float | None = parameter(None, unit="s", minimum=0.0, doc="For how long it rises; none if for ever.")
+    slope: Number = parameter(1.0, unit="any", doc="Rise in a second, in the unit of the input.")
+    offset: Number = parameter(0.0, unit="any", doc="Value where it begins to rise, in the unit of the input.")
+    start_time: Number | None = parameter(None, unit="s", doc="When it begins to rise; none if always.")
+    duration: Number | None = parameter(None, unit="s", minimum=0.0, doc="For how long it rises; none if for ever.")
 
     def check_values(self) -> None:
         """Refuse an end without a beginning."""

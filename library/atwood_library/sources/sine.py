@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, observable, parameter, sin
+from atwood import Component, Number, Scalar, observable, parameter, sin
 
 
 class Sine(Component):
@@ -13,10 +13,10 @@ class Sine(Component):
 
     synonyms = ("Sinusoid", "Cosine", "Sources.Sine")
 
-    amplitude: float = parameter(1.0, unit="any", doc="Amplitude, in the unit of the input.")
-    angular_frequency: float = parameter(1.0, unit="rad/s", doc="Angular frequency.")
-    phase: float = parameter(0.0, unit="rad", doc="Phase at time zero.")
-    offset: float = parameter(0.0, unit="any", doc="Mean value, in the unit of the input.")
+    amplitude: Number = parameter(1.0, unit="any", doc="Amplitude, in the unit of the input.")
+    angular_frequency: Number = parameter(1.0, unit="rad/s", doc="Angular frequency.")
+    phase: Number = parameter(0.0, unit="rad", doc="Phase at time zero.")
+    offset: Number = parameter(0.0, unit="any", doc="Mean value, in the unit of the input.")
 
     @observable(unit="any", doc="Value of the function, in the unit of the input.")
     def value(self) -> Scalar:

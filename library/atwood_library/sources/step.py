@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from atwood import Component, Scalar, observable, parameter, select
+from atwood import Component, Number, Scalar, observable, parameter, select
 
 
 class Step(Component):
@@ -13,9 +13,9 @@ class Step(Component):
 
     synonyms = ("Sources.Step", "Heaviside function", "BooleanStep")
 
-    height: float = parameter(1.0, unit="any", doc="By how much it jumps, in the unit of the input.")
-    offset: float = parameter(0.0, unit="any", doc="Value before, in the unit of the input.")
-    start_time: float = parameter(0.0, unit="s", doc="When it jumps.")
+    height: Number = parameter(1.0, unit="any", doc="By how much it jumps, in the unit of the input.")
+    offset: Number = parameter(0.0, unit="any", doc="Value before, in the unit of the input.")
+    start_time: Number = parameter(0.0, unit="s", doc="When it jumps.")
 
     @observable(unit="any", doc="Value of the function, in the unit of the input.")
     def value(self) -> Scalar:

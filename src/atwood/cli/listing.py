@@ -36,4 +36,4 @@ def list_scenes(as_json: bool) -> None:
 
 def _summary(kind: type) -> str:
     """Return the first line of what a class says about itself."""
-    return (kind.__doc__ or "").strip().split("\n")[0]
+    return (vars(kind)["__doc__"] or "").strip().split("\n")[0]

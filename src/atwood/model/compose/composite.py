@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from itertools import islice
 from types import MappingProxyType
-from typing import Any, ClassVar, Self, TypeVar, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, overload
 
 from atwood.arguments import NAME, Kind, check, takes_names
 from atwood.errors import DeclarationError, ParameterError, UsageError, suggestion
@@ -116,6 +116,10 @@ class Model(_State, Component):
             check_same_connectors(self._prototypes[name], part, f"{type(self).__name__}.{name}")
         object.__setattr__(self, "_given", {name: copy_parts(part) for name, part in given.items()})
         self._assemble()
+
+    if TYPE_CHECKING:  # parts that are added have a name in no class
+
+        def __getattr__(self, name: str) -> Any: ...
 
     def build(self) -> None:
         """Add parts and connections that depend on parameters; for subclasses, called when a model is made."""

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, MutableMapping
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 from atwood.errors import StartError
 from atwood.model.compose.composite import Model
 from atwood.model.compose.start_values import StartValues
-from atwood.model.declare.field_functions import parameter
+from atwood.model.declare.field_functions import Number, Triple, parameter
 from atwood.showing import listed
 
 __all__ = ["Scene"]
 
 
-class Scene(Model):
+class _Beginning:
+    """What a scene says about its start; a plain class, so that type checkers see no parameters in it."""
+
+    start: MutableMapping[str, Any] = {}  # noqa: RUF012 - each scene has a copy
+    guess: MutableMapping[str, Any] = {}  # noqa: RUF012
+
+
+class Scene(_Beginning, Model):
     """The model that is simulated: a model with its space, its gravity and its start.
 
     Axes: x right, y into the page, z up; a planar scene lives in the x-z plane, gravity is along -z
@@ -40,11 +47,11 @@ class Scene(Model):
     """
 
     space: str = parameter("plane", choices=("line", "plane", "space"), doc="What the scene lives in.")
-    line_axis: tuple[float, float, float] = parameter(
+    line_axis: Triple = parameter(
         (1.0, 0.0, 0.0), size=3, structural=True, doc="Direction of the line, for a scene on a line."
     )
-    gravity: float = parameter(9.81, unit="m/s^2", doc="Acceleration of free fall, along -z.")
-    gravity_direction: tuple[float, float, float] = parameter(
+    gravity: Number = parameter(9.81, unit="m/s^2", doc="Acceleration of free fall, along -z.")
+    gravity_direction: Triple = parameter(
         (0.0, 0.0, -1.0),
         direction=True,
         doc="Where gravity pulls; in a plane or on a line, only what lies there counts.",
@@ -55,11 +62,8 @@ class Scene(Model):
         function_of={"x": "m", "y": "m", "z": "m", "t": "s"},
         doc="Energy of a kilogram in a field of gravity that varies, besides: '-3.986e14/sqrt(x**2 + y**2 + z**2)'.",
     )
-    t_start: float = parameter(0.0, unit="s", doc="Time of the start.")
-    t_end: float = parameter(10.0, unit="s", doc="Time of the end, unless a run is given another.")
-
-    start: ClassVar[MutableMapping[str, Any]] = {}
-    guess: ClassVar[MutableMapping[str, Any]] = {}
+    t_start: Number = parameter(0.0, unit="s", doc="Time of the start.")
+    t_end: Number = parameter(10.0, unit="s", doc="Time of the end, unless a run is given another.")
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

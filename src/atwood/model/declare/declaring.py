@@ -41,7 +41,23 @@ def _is_declared(value: Any) -> bool:
 
 
 class ComponentType(type):
-    """The type of components: in their class bodies no name is declared twice."""
+    """The type of components: in their class bodies no name is declared twice, and their fields say how to call them.
+
+    What `inspect.signature` and `help` show is made of the fields when it is asked for.
+    """
+
+    @property
+    def __signature__(cls) -> Any:
+        from atwood.model.declare.signatures import signature_of
+
+        return signature_of(cls)
+
+    def _doc(cls) -> str | None:
+        from atwood.model.declare.signatures import docstring_of
+
+        return docstring_of(cls)
+
+    __doc__ = property(_doc)
 
     @classmethod
     def __prepare__(cls, name: str, bases: tuple[type, ...], /, **_: Any) -> _Body:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal, TypeAlias
 
 from atwood.arguments import (
     ANYTHING,
@@ -21,12 +21,17 @@ from atwood.arguments import (
     whole,
 )
 from atwood.errors import DeclarationError
-
-if TYPE_CHECKING:
-    pass
 from atwood.model.declare.fields import MISSING, ParameterSpec, SignalSpec
 
-__all__ = ["parameter", "signal"]
+__all__ = ["Number", "Triple", "parameter", "signal"]
+
+Number: TypeAlias = float | Any
+"""What a parameter or an input is annotated with: it is read as a number, and given as one, as text with a unit, as an
+expression of the parameters of the model around it, or, an input, as a function of time. Type checkers let anything be
+assigned, and see a float where it is read."""
+
+Triple: TypeAlias = tuple[float, float, float] | Any
+"""The same for three numbers: a place, or a direction, which may be given as ``"z"``."""
 
 
 _BOUND = optional(number())

@@ -59,6 +59,7 @@ __all__ = [
 ]
 
 _F = TypeVar("_F", bound=Callable[..., Any])
+_R = TypeVar("_R")
 
 
 def _acting(kind: Kind, function: _F | None, modes: Sequence[str]) -> _F | Callable[[_F], _F]:
@@ -250,7 +251,7 @@ def observable(
     periodic: bool = False,
     rate: str = "",
     spaces: Sequence[str] = ("line", "plane", "space"),
-) -> Callable[[_F], _F]:
+) -> Callable[[Callable[[Any], _R]], ObservableLaw[_R]]:
     """Mark a method that returns a quantity to report: a scalar or a `Vector`.
 
     Parameters
@@ -268,7 +269,7 @@ def observable(
     """
     parse_si_unit(unit)
 
-    def decorate(function: _F) -> _F:
+    def decorate(function: Callable[[Any], _R]) -> ObservableLaw[_R]:
         name = function.__name__
 
         @functools.wraps(function)
@@ -277,7 +278,7 @@ def observable(
             return function(self) if known is None else known
 
         law = Law("observable", name, ObservableOptions(unit, doc, periodic, rate, tuple(spaces)))
-        return ObservableLaw(read, law)  # type: ignore[return-value]
+        return ObservableLaw(read, law)
 
     return decorate
 

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, Self, overload
 
 from atwood.arguments import Kind, Refused, each, optional
 from atwood.errors import UsageError
 
 if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
     from atwood.model.declare.component import Component
     from atwood.model.declare.law import Law
+
+    _R = TypeVar("_R", default=Any)
+else:
+    from typing import TypeVar
+
+    _R = TypeVar("_R")
 
 __all__ = ["PATH", "PATHS", "ObservableLaw", "Quantity"]
 
 
-class Quantity:
+class Quantity(Generic[_R]):
     """A quantity of a component: a name to read it by, ``result[scene["bob2"].position.x]``.
 
     Parameters
@@ -38,7 +46,7 @@ class Quantity:
     def __repr__(self) -> str:
         return f"<{self.path} [{self.unit}]: {self.doc}>"
 
-    def __call__(self, *_: Any) -> Any:
+    def __call__(self, *_: Any) -> _R:
         """Refuse: outside a law a quantity has a name and no value."""
         raise UsageError(
             "it has a value only inside a law", where=self.path, advice=f"After a run, read result[{self.path!r}]."
@@ -66,7 +74,7 @@ class Quantity:
         return Quantity(self.component, f"{self.name}.z", self.unit, self.doc)
 
 
-class ObservableLaw:
+class ObservableLaw(Generic[_R]):
     """An observable in a class body: within a law it is a method, elsewhere it names its `Quantity`."""
 
     def __init__(self, read: Any, law: Law) -> None:
@@ -75,6 +83,10 @@ class ObservableLaw:
         self.__doc__ = read.__doc__
         self.__name__ = law.name
 
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, instance: Component, owner: type) -> Quantity[_R]: ...
     def __get__(self, instance: Component | None, owner: type) -> Any:
         if instance is None:
             return self
