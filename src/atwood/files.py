@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -25,13 +27,12 @@ def check_directory(target: Path) -> None:
     Raises
     ------
     UsageError
-        If its directory is missing or closed, or it is a directory itself.
+        If its directory is missing or closed, or it is a directory itself, a pipe or a device.
     """
     try:
         if not target.parent.is_dir():
             raise UsageError("there is no such directory", where=str(target.parent), advice="Make it first.")
-        if target.is_dir():
-            raise UsageError("this is a directory", where=str(target), advice="Give the name of a file.")
+        _refuse_others(target)
     except (OSError, ValueError) as error:  # too long a name, a directory that is closed
         raise UsageError(f"it cannot be written ({_reason(error)})", where=str(target), advice=_ANOTHER) from None
 
@@ -47,15 +48,21 @@ def check_readable(source: Path) -> None:
     Raises
     ------
     UsageError
-        If there is none, or it is a directory.
+        If there is none, or it is a directory, or a pipe or a device, which would be waited for.
     """
     try:
-        if source.is_dir():
-            raise UsageError("this is a directory", where=str(source), advice="Give the name of a file.")
+        _refuse_others(source)
         if not source.is_file():
             raise UsageError("there is no such file", where=str(source), advice="Look at its name and directory.")
     except (OSError, ValueError) as error:
         raise UsageError(f"it cannot be read ({_reason(error)})", where=str(source), advice=_ANOTHER) from None
+
+
+def _refuse_others(file: Path) -> None:
+    if file.is_dir():
+        raise UsageError("this is a directory", where=str(file), advice="Give the name of a file.")
+    if file.exists() and not file.is_file():
+        raise UsageError("this is a pipe or a device and no file", where=str(file), advice=_ANOTHER)
 
 
 def read_checked(source: Path, read: Callable[[Path], T], what: str, advice: str) -> T:
@@ -93,7 +100,9 @@ def read_checked(source: Path, read: Callable[[Path], T], what: str, advice: str
 def write_atomically(target: Path, write: Callable[[Path], object]) -> None:
     """Write a file next to its place and move it there once it is complete.
 
-    Whoever is stopped in between leaves what was there before.
+    Whoever is stopped in between leaves what was there before. It is written in a directory that nobody else can write
+    to, under a name that nobody can foresee; so of several who write one file at once the last one stays, whole. A file
+    that was there before gives it its permissions. A link is replaced by the file, and what it leads to stays.
 
     Parameters
     ----------
@@ -108,14 +117,15 @@ def write_atomically(target: Path, write: Callable[[Path], object]) -> None:
         If it cannot be written; nothing is left behind then.
     """
     check_directory(target)
-    part = target.with_name(f".{target.stem[:100]}.{os.getpid()}.part{target.suffix}")
     try:
-        write(part)
-        os.replace(part, target)
+        with tempfile.TemporaryDirectory(prefix=f".{target.stem[:50]}.", suffix=".part", dir=target.parent) as room:
+            part = Path(room, f"part{target.suffix}")
+            write(part)
+            if target.is_file() and not target.is_symlink():
+                shutil.copymode(target, part)
+            os.replace(part, target)
     except OSError as error:
         raise UsageError(f"it cannot be written ({_reason(error)})", where=str(target), advice=_ANOTHER) from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 _ANOTHER = "Give another name or directory."

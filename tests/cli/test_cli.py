@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from atwood.cli import main
-from atwood.cli.libraries import GROUP
+from atwood.model.compose.libraries import GROUP
 from atwood.cli.output import strict
 from atwood.cli.summary import sparkline
 from atwood.result.files import load_result

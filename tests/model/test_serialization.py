@@ -42,9 +42,13 @@ def _importable():
         del sys.modules[things.__name__]
 
 
+OWN = (things.__name__, __name__)
+"""Modules whose classes may be used."""
+
+
 def round_trip(scene: aw.Model) -> aw.Model:
     text = json.dumps(aw.to_data(scene), allow_nan=False)
-    read = aw.from_data(json.loads(text))
+    read = aw.from_data(json.loads(text), trust=OWN)
     assert json.dumps(aw.to_data(read), allow_nan=False) == text
     return read
 
@@ -146,7 +150,7 @@ def test_only_what_the_class_does_not_say_is_written():
 def test_files(tmp_path):
     scene, file = changed_class_scene(), tmp_path / "scene.json"
     aw.save_scene(scene, file)
-    assert data_of(aw.load_scene(str(file))) == data_of(scene)
+    assert data_of(aw.load_scene(str(file), trust=things.__name__)) == data_of(scene)
     scene.add("bad", Push(value=lambda t: aw.external(aw.ExternalFunction("wind", math.sin), t)))
     before = file.read_text()
     with pytest.raises(aw.ParameterError, match=r"bad\.value: .*cannot be stored"):
@@ -188,6 +192,62 @@ def test_a_class_must_be_found_again_by_its_name():
         aw.to_data(Local())
     with pytest.raises(aw.UsageError, match="scene cannot be"):
         aw.to_data(Bob())
+
+
+# -- whose code is run ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def stranger(tmp_path, monkeypatch):
+    """Return a module that writes a file when it is imported, or one of its classes is made."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "stranger.py").write_text(
+        "import atwood, pathlib\n"
+        "pathlib.Path('ran').touch()\n"
+        "class Own(atwood.Scene):\n"
+        "    def build(self):\n"
+        "        pathlib.Path('ran').touch()\n"
+    )
+    yield "stranger"
+    sys.modules.pop("stranger", None)
+
+
+@pytest.mark.parametrize("place", ["scene", "part", "list", "imported before"])
+def test_a_module_is_imported_only_if_it_is_trusted(stranger, tmp_path, place):
+    from pathlib import Path
+
+    own = {"class": f"{stranger}:Own"}
+    plain = {"class": "atwood:Scene", "changes": {"added": {"own": own if place != "list" else [own, own]}}}
+    data = {"format": "atwood scene", "version": 1, "scene": own if place == "scene" else plain}
+    file = tmp_path / "scene.json"
+    file.write_text(json.dumps(data))
+    if place == "imported before":
+        __import__(stranger)
+        Path("ran").unlink()
+    for read, given in ((aw.load_scene, file), (aw.from_data, data)):
+        for trust in ((), ("stranger.inner", "strange", "anything")):
+            with pytest.raises(aw.UsageError, match=r"'stranger:Own'.*not of an installed library.*trust='stranger'"):
+                read(given, trust=trust)
+            assert not Path("ran").exists()
+            assert place == "imported before" or stranger not in sys.modules
+    assert isinstance(aw.load_scene(file, trust=stranger), aw.Scene)
+    assert Path("ran").exists()
+
+
+@pytest.mark.parametrize("name", ["os:system", "subprocess:Popen", "atwood_library_:Rod", "", ".", "atwood.__main__:A"])
+def test_modules_of_nobody_are_refused(name):
+    before = set(sys.modules)
+    with pytest.raises(aw.UsageError):
+        aw.from_data({"format": "atwood scene", "version": 1, "scene": {"class": name}})
+    assert not {one for one in set(sys.modules) - before if not one.startswith("importlib")}
+
+
+def test_a_module_that_leaves_python_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "leaves_python.py").write_text("raise SystemExit(3)\n")
+    with pytest.raises(aw.UsageError, match="SystemExit"):
+        aw.from_data({"format": "atwood scene", "version": 1, "scene": {"class": "leaves_python:A"}}, "leaves_python")
 
 
 # -- what is refused when read ----------------------------------------------------------------------------------------
@@ -265,7 +325,7 @@ TAMPERED = {
 def test_tampered_data_are_refused(name):
     change, error, words = TAMPERED[name]
     with pytest.raises(error, match=words or None):
-        aw.from_data(tampered(change))
+        aw.from_data(tampered(change), trust=(*OWN, "__main__", "builtins", "not_there_at_all", ".."))
 
 
 SETTINGS = st.recursive(
@@ -291,7 +351,7 @@ SETTINGS = st.recursive(
 @example(("scene", "values", "gravity"), {"bound": [[]]})
 def test_whatever_is_written_there_the_answer_is_a_scene_or_an_error_of_ours(path, value):
     with contextlib.suppress(aw.AtwoodError):
-        aw.from_data(tampered(put(*path, value)))
+        aw.from_data(tampered(put(*path, value)), trust=OWN)
 
 
 # -- functions of time ------------------------------------------------------------------------------------------------

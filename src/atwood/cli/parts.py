@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from atwood.cli.libraries import all_libraries
+from atwood.model.compose.libraries import all_libraries
 from atwood.cli.output import console, print_json
 from atwood.errors import UsageError, near_matches, suggestion
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from atwood.cli.libraries import all_libraries, declared_libraries
+from atwood.model.compose.libraries import all_libraries, declared_libraries
 from atwood.cli.output import warn
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import stat
 import sys
 import tempfile
 from collections.abc import Iterable
@@ -81,8 +82,8 @@ class Cache:
         """Return the content of an entry, or None if there is none that is whole."""
         path = self._path(key)
         try:
-            with path.open("rb") as file:
-                if not _is_own(file.fileno()):
+            with open(path, "rb", opener=_without_waiting) as file:
+                if not _is_own(os.fstat(file.fileno())):
                     return None
                 data = file.read()
         except OSError:
@@ -145,8 +146,13 @@ def _checksum(key: str, content: bytes) -> bytes:
     return hashlib.sha256(key.encode() + content).digest()
 
 
-def _is_own(handle: int) -> bool:
-    """Return whether a file belongs to who runs this; the code in it is going to run."""
-    if sys.platform == "win32":
-        return True
-    return os.fstat(handle).st_uid in (os.getuid(), 0)
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe does not wait for who would write to it."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def _is_own(about: os.stat_result) -> bool:
+    """Return whether it is a file of usual size of who runs this; the code in it is going to run."""
+    if not stat.S_ISREG(about.st_mode) or about.st_size > _LARGEST:
+        return False
+    return sys.platform == "win32" or about.st_uid in (os.getuid(), 0)

@@ -22,6 +22,7 @@ from typing import Any
 from atwood.codegen.cache import default_cache, make_key
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, Graph
+from atwood.expr.core.operations import BINARY, UNARY
 
 __all__ = ["SOURCES", "derivation_key", "derive_once", "hash_of_sources"]
 
@@ -60,16 +61,29 @@ def derive_once(
         word, values = derive()
         return word, list(values)
     found = store.read(key)
-    if found is not None:
-        word, added, places = marshal.loads(found)
-        graph.replay(added)
-        return word, [graph.nodes[place] for place in places]
+    known = None if found is None else _replayed(graph, found)
+    if known is not None:
+        return known
     before, relations = len(graph), _relations(graph)
     word, values = derive()
     content = _written((word, graph.recorded(before), [value.index for value in values]))
     if content is not None and relations == _relations(graph):
         store.write(key, content)
     return word, list(values)
+
+
+def _replayed(graph: Graph, content: bytes) -> tuple[str, list[Expression]] | None:
+    """Return what an entry says, whose nodes are then in the graph; None if it says nothing that could be derived."""
+    try:
+        word, added, places = marshal.loads(content)
+        for number, (operation, arguments, _, _) in enumerate(added, start=len(graph)):
+            wanted = 1 if operation in UNARY else 2 if operation in BINARY else len(arguments)
+            if len(arguments) != wanted or not all(0 <= place < number for place in arguments):
+                return None
+        graph.replay(added)
+        return str(word), [graph.nodes[place] for place in places]
+    except (ValueError, TypeError, EOFError, IndexError, AttributeError):
+        return None
 
 
 def derivation_key(what: str, graph: Graph, read: object) -> str | None:

@@ -13,7 +13,8 @@ import numpy as np
 
 from atwood.arguments import FILE, takes
 from atwood.arrays import FloatArray
-from atwood.errors import ParameterError
+from atwood.errors import ParameterError, UsageError
+from atwood.files import check_readable
 
 __all__ = ["read_stl"]
 
@@ -47,7 +48,10 @@ def read_stl(path: str | Path) -> FloatArray:
     """
     where = str(path)
     try:
+        check_readable(Path(path))
         data = Path(path).read_bytes()
+    except UsageError as error:
+        raise ParameterError(f"the file cannot be read: {error.message}", where=where, advice=error.advice) from None
     except OSError as error:
         reason = error.strerror or str(error)
         raise ParameterError(f"the file cannot be read: {reason}", where=where, advice="Check its path.") from error

@@ -1,8 +1,9 @@
 """Scenes as plain data, and back: what is written to a file is what the class does not say by itself.
 
 A component is written as a reference to its class and the values it was given. A model adds what was changed on it
-afterwards (see `atwood.model.compose.differences`). Classes are not written: reading a scene imports the modules that
-they are in, so read only files that you would also run.
+afterwards (see `atwood.model.compose.differences`). Classes are not written but named, and reading a scene imports the
+modules that they are in. So that a file cannot have code run that its reader did not choose, only modules of Atwood, of
+installed component libraries, and of whom the reader trusts are imported.
 """
 
 from __future__ import annotations
@@ -10,16 +11,17 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from atwood.arguments import FILE, MAPPING, instance, takes
+from atwood.arguments import FILE, MAPPING, NAME, each, instance, takes
 from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.files import check_readable, write_atomically
 from atwood.model.compose.composite import Model
 from atwood.model.compose.connection_rules import find_end
 from atwood.model.compose.differences import REMOVED
+from atwood.model.compose.libraries import installed_libraries, is_within
 from atwood.model.compose.written import CHANGES, find_class, join_path, write_component
 from atwood.model.declare.component import Component
 from atwood.model.declare.fields import FieldReference
@@ -31,6 +33,8 @@ __all__ = ["FORMAT", "VERSION", "find_class", "from_data", "load_scene", "save_s
 
 FORMAT = "atwood scene"
 VERSION = 1
+
+_MODULES = each(NAME, "names of modules, such as ['my_parts']")
 
 
 @takes(scene=instance("a Scene or a Model", Model))
@@ -57,19 +61,26 @@ def _checksum(data: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-@takes(data=MAPPING)
-def from_data(data: Mapping[str, Any]) -> Model:
+@takes(data=MAPPING, trust=_MODULES)
+def from_data(data: Mapping[str, Any], trust: Iterable[str] = ()) -> Model:
     """Return the scene that plain data stand for; every value is checked as when it is given by hand.
+
+    Classes are looked for in Atwood itself and in installed libraries, those that a package declares in its entry
+    points ``atwood.libraries``. Any other module is imported only if it is listed in `trust`: importing it, and making
+    its components, runs its code.
 
     Parameters
     ----------
     data
         As returned by `to_data`.
+    trust
+        Names of other modules or packages whose classes may be used, such as ``"my_parts"``, with all modules in them.
 
     Raises
     ------
     UsageError
-        If the data are no scene, of an unknown version, or name a class that cannot be found.
+        If the data are no scene, of an unknown version, or name a class that cannot be found, or a module that is
+        neither of an installed library nor trusted.
     ParameterError
         If a value is not admissible.
     """
@@ -87,6 +98,7 @@ def from_data(data: Mapping[str, Any]) -> Model:
             where="checksum",
             advice="Save it again; if it was changed by hand, take the entry 'checksum' away.",
         )
+    _refuse_strangers(data.get("scene"), tuple(trust))
     try:
         scene = _read(data.get("scene"), "scene")
     except RecursionError:
@@ -112,19 +124,21 @@ def save_scene(scene: Model, path: str | Path) -> None:
     write_atomically(Path(path), lambda part: part.write_text(text + "\n", encoding="utf-8"))
 
 
-@takes(path=FILE)
-def load_scene(path: str | Path) -> Model:
+@takes(path=FILE, trust=_MODULES)
+def load_scene(path: str | Path, trust: Iterable[str] = ()) -> Model:
     """Read a scene from a file that `save_scene` wrote.
 
     Parameters
     ----------
     path
         The file.
+    trust
+        Names of modules with parts of one's own, which may be imported; see `from_data`.
 
     Raises
     ------
     UsageError
-        If the file cannot be read, or holds no scene.
+        If the file cannot be read, holds no scene, or names a module that is not trusted.
     """
     check_readable(Path(path))
     try:
@@ -134,16 +148,36 @@ def load_scene(path: str | Path) -> Model:
     except (ValueError, RecursionError) as error:
         raise UsageError(f"the file is no JSON ({error})", where=str(path)) from None
     try:
-        return from_data(data)
+        return from_data(data, trust)
     except AtwoodError as error:
         where = f"{path}: {error.where}" if error.where else str(path)
         raise type(error)(error.message, where=where, advice=error.advice) from error
 
 
-# -- writing -----------------------------------------------------------------------------------------------------
-
-
 # -- reading -----------------------------------------------------------------------------------------------------
+
+
+def _refuse_strangers(scene: Any, trust: tuple[str, ...]) -> None:
+    """Refuse data that name a module which is neither of an installed library nor trusted; nothing is imported yet."""
+    stack, libraries = [("scene", scene)], None
+    while stack:
+        where, one = stack.pop()
+        if isinstance(one, (list, tuple)):
+            stack += [(f"{where}[{index}]", inner) for index, inner in enumerate(one)]
+        if not isinstance(one, Mapping):
+            continue
+        stack += [(join_path(where, str(name)), inner) for name, inner in one.items()]
+        name = one.get("class")
+        module = name.partition(":")[0] if isinstance(name, str) else ""
+        if not module or is_within(module, ("atwood", *trust)):
+            continue
+        libraries = installed_libraries() if libraries is None else libraries
+        if not is_within(module, libraries):
+            raise UsageError(
+                f"the file names {name!r}, and its module {module!r} is not of an installed library",
+                where=where,
+                advice=f"If you trust that code, have it imported: load_scene(..., trust={module!r}).",
+            )
 
 
 def _read(data: Any, where: str) -> Component:

@@ -134,7 +134,7 @@ def find_class(name: Any, where: str) -> type[Component]:
         advice = "It was declared in a script that was run; put the class into a module of its own and save it again."
     try:
         found: Any = sys.modules.get(module_name) or importlib.import_module(module_name)
-    except Exception as error:  # importing runs code of others
+    except (Exception, SystemExit) as error:  # importing runs code of others
         raise UsageError(
             f"the module {module_name!r} cannot be imported ({type(error).__name__}: {error})",
             where=where,

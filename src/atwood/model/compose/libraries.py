@@ -1,4 +1,4 @@
-"""Which component libraries are installed, read where packages declare it.
+"""Which component libraries are installed, read where packages declare it, and what belongs to them.
 
 `importlib.metadata` knows every way in which packages can be installed, but to import it and to have it look through
 all of them takes longer than a short run. So the files that nearly every installation has are read directly first.
@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-__all__ = ["GROUP", "all_libraries", "declared_libraries"]
+__all__ = ["GROUP", "all_libraries", "declared_libraries", "installed_libraries", "is_within"]
 
 GROUP = "atwood.libraries"
 """The entry point group in which component libraries make themselves known."""
@@ -50,3 +50,14 @@ def all_libraries() -> list[str]:
     from importlib.metadata import entry_points
 
     return [entry.value for entry in entry_points(group=GROUP)]
+
+
+def installed_libraries() -> tuple[str, ...]:
+    """Return the modules of all libraries, however they are declared."""
+    return *declared_libraries(), *all_libraries()
+
+
+def is_within(module: str, packages: Iterable[str]) -> bool:
+    """Return whether a module is one of some packages, or in one of them and no command of it."""
+    is_command = module.endswith(".__main__")
+    return any(module == one or (module.startswith(f"{one}.") and not is_command) for one in packages)
