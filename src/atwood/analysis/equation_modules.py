@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from atwood.analysis.formulas import code
-from atwood.analysis.formulas.tree import Call, Node, Sum, names_in
+from atwood.analysis.formulas.tree import Call, Name, Node, Sum, names_in
 from atwood.errors import UnsupportedError
 from atwood.expr import substitute
+from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.analysis.equations import EquationsOfMotion
@@ -40,6 +41,14 @@ def module_of(eq: EquationsOfMotion) -> str:
     head = [f'"""Equations of motion of {eq.name}, {eq.form} form: {_statement(eq)}', "", *_listing(eq), '"""', ""]
     head += [f"from math import {', '.join(used)}", ""] if used else []
     head += ["import numpy as np", "from numpy.linalg import solve", ""]
+    head += (
+        [
+            f"RANK = {tolerances.CLEAR!r}  # singular values of constraints below are none: redundancy, and drift of scipy",
+            "",
+        ]
+        if found.constraints
+        else []
+    )
     head += [
         f"{code.identifier(one)} = {one.value!r}  # {one.path}" + (f", {one.unit}" if one.unit else "")
         for one in eq.legend
@@ -84,9 +93,20 @@ def _unpacked(names: Sequence[str], source: str) -> list[str]:
 
 
 def _check(eq: EquationsOfMotion, formulas: Sequence[Sum]) -> None:
-    stack: list[Node] = [*formulas, *(value for _, value in eq.book.shared)]
+    """Refuse what a module cannot compute by itself: functions of somebody's own, and values that are no state."""
+    found, shared = eq.expressions, {name.symbol: value for name, value in eq.book.shared}
+    known = {eq.notation.symbols[one] for one in found.coordinates} | set(shared)
+    known |= {eq.notation.velocities[one][0] for one in found.velocities} | set(eq.legend)
+    stack: list[Node] = [*formulas]
     while stack:
         node = stack.pop()
+        if isinstance(node, Name) and node.symbol not in known and node.symbol.kind != "time":
+            raise UnsupportedError(
+                f"it reads {node.symbol.path or node.symbol.name}, which is not among its coordinates and velocities: it "
+                "is held, as from sample to sample",
+                where=eq.name,
+                advice="Run the scene with atwood.simulate, or export it without the part that holds values.",
+            )
         if isinstance(node, Call):
             if node.function not in code.KNOWN:
                 raise UnsupportedError(
@@ -97,6 +117,8 @@ def _check(eq: EquationsOfMotion, formulas: Sequence[Sum]) -> None:
             stack += node.arguments
         elif isinstance(node, Sum):
             stack += [inner for term in node.terms for inner, _ in term.factors]
+        elif node.symbol in shared:
+            stack.append(shared.pop(node.symbol))
 
 
 _SOLVED = '''def accelerations(t, q, u):
@@ -111,12 +133,22 @@ def derivative(t, y):
 '''
 
 _SOLVED_WITH = '''def accelerations(t, q, u):
-    """Return the accelerations and the multipliers."""
+    """Return the accelerations and the multipliers; of those that redundant constraints leave open, the smallest.
+
+    Gauss's principle of least constraint, in coordinates in which masses and rows of G are of size one. Where bodies
+    have no mass, M + G^T G takes the place of M: with G a = -gamma it has the same accelerations.
+    """
     M, G = mass_matrix(t, q), constraint_jacobian(t, q)
-    n, m = len(M), len(G)
-    left = np.block([[M, -G.T], [G, np.zeros((m, m))]])
-    found = solve(left, -np.concatenate([bias(t, q, u), constraint_bias(t, q, u)]))
-    return found[:n], found[n:]
+    h, gamma = bias(t, q, u), constraint_bias(t, q, u)
+    size = np.where(np.diag(M) > 0.0, np.diag(M), np.sum(G * G, axis=0)) ** -0.5
+    rows = np.linalg.norm(G * size, axis=1)
+    rows = np.where(rows > 0.0, rows, 1.0)
+    G, gamma = G * size / rows[:, None], gamma / rows
+    L = np.linalg.cholesky(M * np.outer(size, size) + G.T @ G)
+    free = -solve(L, h * size + G.T @ gamma)
+    Y = solve(L, G.T)
+    forced = np.linalg.lstsq(Y.T, -gamma - Y.T @ free, RANK)[0]
+    return solve(L.T, free + forced) * size, np.linalg.lstsq(Y, forced, RANK)[0] / rows
 
 
 def derivative(t, y):

@@ -23,7 +23,7 @@ __all__ = ["TurnCounter"]
 _CHANGE = 1.0
 """rad: rates may change so much times the distance of samples, or an angle is not continued by them."""
 
-_UNSEEN = {"ida": 100.0, "ida-sundae": 100.0, "explicit": 5.0, "taylor": 1.5, "gauss": 10.0}
+_UNSEEN = {"ida": 100.0, "ida-sundae": 100.0, "explicit": 5.0, "taylor": 1.5, "gauss": 10.0, "composition": 10.0}
 """With more steps from sample to sample, rates at samples say little of those in between."""
 
 _FIRST = 4

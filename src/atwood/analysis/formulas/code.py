@@ -41,7 +41,7 @@ KNOWN = frozenset({*MATH, *_BINARY, *_NAMES, "select", "logical_not", "sign", "c
 
 RESERVED = frozenset(
     {"t", "y", "q", "u", "a", "np", "solve", "rates", "mass_matrix", "bias", "constraints", "constraint_jacobian"}
-    | {"constraint_bias", "accelerations", "derivative", "M", "G", *MATH, *_NAMES.values()}
+    | {"constraint_bias", "accelerations", "derivative", "M", "G", "RANK", *MATH, *_NAMES.values()}
 )
 """Names that mean something else in a module; a symbol that is called so has a line after its name."""
 
