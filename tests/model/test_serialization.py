@@ -225,10 +225,10 @@ def test_a_module_is_imported_only_if_it_is_trusted(stranger, tmp_path, place):
     if place == "imported before":
         __import__(stranger)
         Path("ran").unlink()
-    for read, given in ((aw.load_scene, file), (aw.from_data, data)):
+    for read, written in ((aw.load_scene, file), (aw.from_data, data)):
         for trust in ((), ("stranger.inner", "strange", "anything")):
             with pytest.raises(aw.UsageError, match=r"'stranger:Own'.*not of an installed library.*trust='stranger'"):
-                read(given, trust=trust)
+                read(written, trust=trust)
             assert not Path("ran").exists()
             assert place == "imported before" or stranger not in sys.modules
     assert isinstance(aw.load_scene(file, trust=stranger), aw.Scene)

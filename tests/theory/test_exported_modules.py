@@ -1,4 +1,4 @@
-"""Exported modules of Python: scipy integrates each to the motion that Atwood finds, or the export is refused by name."""
+"""Exported modules of Python: scipy finds the same motion, or the export is refused by name."""
 
 import types
 import warnings
@@ -39,7 +39,7 @@ def check(scene: Scene, form: str, share: float = 0.02) -> None:
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", [name for name in SCENES if name not in REFUSED])
-def test_a_module_gives_the_motion(name: str, form: str) -> None:
+def test_a_module_is_what_runs(name: str, form: str) -> None:
     check(SCENES[name](), form)
 
 

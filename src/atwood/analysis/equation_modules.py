@@ -41,14 +41,8 @@ def module_of(eq: EquationsOfMotion) -> str:
     head = [f'"""Equations of motion of {eq.name}, {eq.form} form: {_statement(eq)}', "", *_listing(eq), '"""', ""]
     head += [f"from math import {', '.join(used)}", ""] if used else []
     head += ["import numpy as np", "from numpy.linalg import solve", ""]
-    head += (
-        [
-            f"RANK = {tolerances.CLEAR!r}  # singular values of constraints below are none: redundancy, and drift of scipy",
-            "",
-        ]
-        if found.constraints
-        else []
-    )
+    if found.constraints:
+        head += [f"RANK = {tolerances.CLEAR!r}  # smaller singular values of constraints are rounding and drift", ""]
     head += [
         f"{code.identifier(one)} = {one.value!r}  # {one.path}" + (f", {one.unit}" if one.unit else "")
         for one in eq.legend
@@ -102,8 +96,8 @@ def _check(eq: EquationsOfMotion, formulas: Sequence[Sum]) -> None:
         node = stack.pop()
         if isinstance(node, Name) and node.symbol not in known and node.symbol.kind != "time":
             raise UnsupportedError(
-                f"it reads {node.symbol.path or node.symbol.name}, which is not among its coordinates and velocities: it "
-                "is held, as from sample to sample",
+                f"it reads {node.symbol.path or node.symbol.name}, which is no coordinate and no velocity: it is held, "
+                "as from sample to sample",
                 where=eq.name,
                 advice="Run the scene with atwood.simulate, or export it without the part that holds values.",
             )

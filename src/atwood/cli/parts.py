@@ -7,9 +7,9 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from atwood.model.compose.libraries import all_libraries
 from atwood.cli.output import console, print_json
 from atwood.errors import UsageError, near_matches, suggestion
+from atwood.model.compose.libraries import all_libraries
 
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component

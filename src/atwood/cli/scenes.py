@@ -14,9 +14,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from atwood.model.compose.libraries import all_libraries, declared_libraries
 from atwood.cli.output import warn
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
+from atwood.model.compose.libraries import all_libraries, declared_libraries
 
 if TYPE_CHECKING:
     from atwood.model.compose.composite import Model
