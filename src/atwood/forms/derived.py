@@ -76,6 +76,8 @@ def _replayed(graph: Graph, content: bytes) -> tuple[str, list[Expression]] | No
     """Return what an entry says, whose nodes are then in the graph; None if it says nothing that could be derived."""
     try:
         word, added, places = marshal.loads(content)
+        if not all(0 <= place < len(graph) + len(added) for place in places):
+            return None
         for number, (operation, arguments, _, _) in enumerate(added, start=len(graph)):
             wanted = 1 if operation in UNARY else 2 if operation in BINARY else len(arguments)
             if len(arguments) != wanted or not all(0 <= place < number for place in arguments):
