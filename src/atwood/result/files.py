@@ -77,17 +77,22 @@ class SavedResult(Trajectories):
         """How the run ended; empty if the file does not say."""
         return str(self.metadata.get("status", ""))
 
-    def scene(self) -> Model:
+    def scene(self, trust: Iterable[str] = ()) -> Model:
         """Return the scene that was run, as `load_scene` reads it: ``simulate(saved.scene(), **saved.settings())``.
+
+        Parameters
+        ----------
+        trust
+            Names of modules with parts of one's own, which may be imported; see `from_data`.
 
         Raises
         ------
         UsageError
-            If the file does not hold it, or a class in it cannot be found.
+            If the file does not hold it, or a class in it cannot be found, or is in a module that is not trusted.
         """
         from atwood.model.compose.serialization import from_data
 
-        return from_data(self._held("source"))
+        return from_data(self._held("source"), trust)
 
     def settings(self, **others: Any) -> dict[str, Any]:
         """Return what `simulate` was asked for, to run the scene again.

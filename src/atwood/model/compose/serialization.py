@@ -176,7 +176,7 @@ def _refuse_strangers(scene: Any, trust: tuple[str, ...]) -> None:
             raise UsageError(
                 f"the file names {name!r}, and its module {module!r} is not of an installed library",
                 where=where,
-                advice=f"If you trust that code, have it imported: load_scene(..., trust={module!r}).",
+                advice=f"If you trust that code, have it imported with trust={module!r}.",
             )
 
 
