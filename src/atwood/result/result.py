@@ -37,12 +37,10 @@ from atwood.simulation.run.made import Run
 from atwood.simulation.run.record import SegmentRecord
 
 if TYPE_CHECKING:
-    from atwood.simulation.singular.crossing import SingularCrossing
-
-if TYPE_CHECKING:
     from atwood.result.accuracy import Accuracy
     from atwood.result.conserved import ConservedLedger
     from atwood.result.turns import TurnCounter
+    from atwood.simulation.singular.crossing import SingularCrossing
 
 __all__ = ["Result"]
 
@@ -349,11 +347,10 @@ class Result(Trajectories):
         """
         found = {"position": 0.0, "velocity": 0.0, "held_position": 0.0, "held_velocity": 0.0}
         for segment in self._segments:
-            plan = segment.plan
+            plan, shown = segment.plan, segment.shown
             if not plan.balance.constraints:
                 continue
             speed = 1.0 / plan.scales.time
-            shown = segment.shown
             missed = misses_of(plan, segment.time[shown], segment.coordinates[:, shown], segment.speeds[:, shown])
             position, velocity = np.max(missed, axis=1, initial=0.0)
             found["position"] = max(found["position"], float(position))
@@ -392,8 +389,7 @@ class Result(Trajectories):
         yield "status", self.status.replace("_", " ") + (f": {self.message}" if self.message else "")
         if not self.run.segments:
             return
-        times = self.time
-        yield "time", f"{times[0]:g} to {times[-1]:g} s, {count_of(len(times), 'output time')}"
+        yield "time", f"{self.time[0]:g} to {self.time[-1]:g} s, {count_of(len(self.time), 'output time')}"
         yield "solver", f"{self.solver} ({count_of(self.statistics.steps, 'step')})"
         yield "coordinates", listed(one.name for one in self.assembly.own_equations.names)
         if self.conserved is not None:
