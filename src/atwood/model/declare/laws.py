@@ -1,8 +1,7 @@
 """Laws: what a component contributes to mechanics.
 
 A law is a method of a component, marked by one of the decorators here. It is written in plain arithmetic with Atwood's
-functions, and never sees the graph or the solver. Newton's equations are nobody's law: they are put together from
-inertia, energy, forces and constraints.
+functions, and never sees the graph or the solver. Newton's equations are put together from all laws.
 """
 
 from __future__ import annotations
