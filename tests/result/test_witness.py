@@ -135,3 +135,11 @@ def test_a_second_solution_takes_other_steps() -> None:
     result = simulate(hill(), solver="taylor", rtol=1e-10)
     assert result.statistics.steps < 5
     assert result.second.statistics.steps > 90
+
+
+def test_a_second_solution_differs_where_steps_are_bounded() -> None:
+    """With the same longest step both would take the same steps, and their errors be the same."""
+    scene = SimplePendulum()
+    result = simulate(scene, rtol=1e-3, max_step=0.3)
+    error = np.max(np.abs(result["rod.angle"] - scene.closed_form(result.time)["rod.angle"]))
+    assert 0.3 * error < np.max(result.error("rod.angle")) < 3.0 * error

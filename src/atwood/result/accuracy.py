@@ -65,6 +65,11 @@ class Accuracy:
     how: str
 
     @property
+    def is_known(self) -> bool:
+        """Whether there is a second solution that is to be believed."""
+        return math.isfinite(self.reached)
+
+    @property
     def is_met(self) -> bool:
         """Whether the error is within what was asked."""
         return self.asked is None or self.reached <= self.asked
@@ -72,13 +77,13 @@ class Accuracy:
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, for JSON."""
         events = [None if np.isnan(one) else float(one) for one in self.events]
-        reached = self.reached if math.isfinite(self.reached) else None
+        reached = self.reached if self.is_known else None
         own = {"asked": self.asked, "reached": reached, "path": self.path, "until": self.until}
         return {**own, "events": events, "how": self.how}
 
     def describe(self) -> str:
         """Return it in a sentence."""
-        if not math.isfinite(self.reached):
+        if not self.is_known:
             return f"the error is not known (compared with {self.how})"
         found = f"error {self.reached:.1e} at most, of {self.path}" if self.path else "nothing has an error"
         if self.asked is not None and not self.is_met:

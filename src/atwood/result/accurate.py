@@ -69,9 +69,10 @@ def accurate_run(
             return run, result.second.run, ""
         if rtol <= _LEAST:
             break
-        # What was missed was stepped over, perhaps: from here on steps are no longer than those that saw it.
-        options = replace(options, max_step=longest_step(run))
-        rtol *= min(0.1, max(_MOST, _SHARE * accuracy / result.accuracy.reached))
+        factor = _SHARE * accuracy / result.accuracy.reached
+        if factor < _MOST:  # something was stepped over, perhaps: from here on as by what saw it
+            options = replace(options, max_step=longest_step(run))
+        rtol *= min(0.1, max(_MOST, factor))
     assert best is not None
     said = f" (with smaller tolerances: {failure})" if failure else ""
     return best.run, best.second.run, f"{best.accuracy.describe()}{said}"

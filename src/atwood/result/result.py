@@ -193,11 +193,7 @@ class Result(Trajectories):
         from atwood.result.second_run import second_run
 
         if self._second_run is None:
-
-            def is_known(other: Run) -> bool:
-                return bool(np.isfinite(Result(self.run, second=other).accuracy.reached))
-
-            self._second_run = second_run(self.run, np.unique(self.time), is_known)
+            self._second_run = second_run(self.run, np.unique(self.time), lambda o: Result(self.run, None, o).accuracy)
         return Result(self._second_run)
 
     def error(self, path: str) -> FloatArray:

@@ -8,6 +8,7 @@ solved by other methods, and mostly at a fraction of the cost.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +18,12 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.late import replace
 from atwood.simulation.events.sampling import refuse_updates
-from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.problem.options import LEAST, RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.run import run
-from atwood.simulation.run.tolerances import LEAST
+
+if TYPE_CHECKING:
+    from atwood.result.accuracy import Accuracy
 
 __all__ = ["TIGHTER", "longest_step", "second_run"]
 
@@ -33,6 +36,9 @@ _LEAST = {"ida": 1e-13, "ida-sundae": 1e-13}
 _STEPS = 97.0
 """The least number of steps of a second solution; it divides no usual number of outputs."""
 
+_OTHER = 0.6
+"""Where the longest step of the run was given, that of the second solution is this share, so that both differ."""
+
 _SHORTER = (1.0, 8.0, 64.0)
 """So many times shorter are the longest steps of one second solution after the other, until one is to be believed."""
 
@@ -40,7 +46,7 @@ _PATIENCE, _SECONDS = 20.0, 30.0
 """The second run may take so many times as long as the first, and so many seconds at least."""
 
 
-def second_run(first: Run, times: FloatArray, is_known: Callable[[Run], bool]) -> Run:
+def second_run(first: Run, times: FloatArray, accuracy: Callable[[Run], Accuracy]) -> Run:
     """Solve a scene once more, more accurately, and with other steps.
 
     Parameters
@@ -49,8 +55,8 @@ def second_run(first: Run, times: FloatArray, is_known: Callable[[Run], bool]) -
         The run.
     times
         Output times, s.
-    is_known
-        Whether the error of the first run is known by a second one. Where it is not, steps are shortened.
+    accuracy
+        What a second run tells of the first one. Where that is nothing to be believed, steps are shortened.
 
     Raises
     ------
@@ -73,7 +79,7 @@ def second_run(first: Run, times: FloatArray, is_known: Callable[[Run], bool]) -
                 failure = found.message
                 break
             last = found
-            if is_known(found):
+            if accuracy(found).is_known:
                 return found
     if last is not None:
         return last
@@ -118,8 +124,9 @@ def longest_step(first: Run, shorter: float = 1.0) -> float:
         So many times shorter, where steps were too long before.
     """
     assert first.start is not None
-    step = (first.options.t_end - first.start.time) / (_STEPS * shorter)
-    return min(step, first.options.max_step or step)
+    step = (first.options.t_end - first.start.time) / _STEPS
+    own = first.options.max_step
+    return (step if own is None else min(step, _OTHER * own)) / shorter
 
 
 def _reduced(assembly: Assembly) -> Assembly:

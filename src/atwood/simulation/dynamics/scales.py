@@ -15,6 +15,7 @@ from atwood.mechanics.build import extent
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable
 from atwood.model.values.units import parse_unit
+from atwood.simulation.dynamics.floating import FAR, spread
 
 __all__ = [
     "Scales",
@@ -76,14 +77,20 @@ def size_of(unit: str, length: Sizes, time: Sizes, mass: Sizes) -> Sizes:
 def scene_length(assembly: Assembly) -> float:
     """Return the extent of a scene, from its parameters and start values that are lengths; 1 m if it has none.
 
-    Positions of a mechanism far from the world's origin count from where all others do.
+    Positions of a mechanism far from the world's origin count from where all others do, those of bodies that float far
+    from it from each other.
     """
-    sizes = [extent(assembly.mechanism)]
+    given = []
     for path, value in assembly.flat.start.items():
         observable = assembly.start_observables.get(path)
         if observable is not None and observable.unit == "m":
-            sizes.append(abs(value - origin_part(assembly, observable)))
-    return max(sizes) or 1.0
+            given.append((observable.value, value - origin_part(assembly, observable)))
+    own, farthest = extent(assembly.mechanism), max((abs(at) for _, at in given), default=0.0)
+    if farthest > FAR * own:
+        near = max(own, spread(assembly, given))
+        if farthest > FAR * near > 0.0:
+            return near
+    return max(own, farthest) or 1.0
 
 
 def origin_part(assembly: Assembly, observable: Observable) -> float:

@@ -14,7 +14,7 @@ from atwood.late import dataclass
 from atwood.simulation.problem.conditions import Condition
 from atwood.tolerances import tolerances
 
-__all__ = ["FIXED_STEPS", "SOLVERS", "RunOptions", "Samples", "how_solved", "sample_times"]
+__all__ = ["FIXED_STEPS", "LEAST", "SOLVERS", "RunOptions", "Samples", "how_solved", "sample_times"]
 
 
 SOLVERS = {
@@ -48,6 +48,9 @@ def how_solved(form: str, level: str, solvers: Iterable[str]) -> str:
         found.append(f"{form} ({level}), {one}" if level and one == "IDA" else f"{form}, {one}")
     return ", then ".join(found) or form
 
+
+LEAST = 1e-15
+"""The least relative tolerance: a few times the relative error of one operation."""
 
 FIXED_STEPS = ("gauss", "composition")
 """Those whose steps are equal, which take an order and a step."""

@@ -14,6 +14,7 @@ from atwood.late import replace
 from atwood.linalg.matrices import to_array
 from atwood.simulation.dynamics.balance import balance_of, solve_balance
 from atwood.simulation.dynamics.determined_reactions import check_read_reactions
+from atwood.simulation.dynamics.floating import seen_from_afar
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
 from atwood.simulation.dynamics.scales import coordinate_scales, find_scales, motion_scales
 from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START
@@ -80,11 +81,11 @@ def _make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, lengt
     program = assembly.form_program(kept_rows(finding), *dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = solve_balance(now, kept, t)
-    scales = find_scales(assembly, length, u, accelerations, sizes, span)
+    share, moving = seen_from_afar(assembly, q, u, length, span)
+    scales = find_scales(assembly, length, moving, accelerations, sizes, span)
     not_compilable = find_not_compilable(assembly, program.residual)
-    return Plan(
-        assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent, not_compilable=not_compilable
-    )
+    parts = assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent
+    return Plan(*parts, not_compilable=not_compilable, relative_share=share)
 
 
 def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:

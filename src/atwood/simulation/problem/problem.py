@@ -73,6 +73,8 @@ class Plan:
         How often they changed.
     not_compilable
         What keeps the scene from being compiled, in words; empty if nothing does.
+    relative_share
+        Where bodies float far away, tolerances relative to unknowns are this share of those relative to their sizes.
     compiles_columns
         Whether programs for many states are compiled; asked for once many evaluations of few states are needed.
     """
@@ -88,6 +90,7 @@ class Plan:
     dependent_speeds: tuple[int, ...]
     switches: int = 0
     not_compilable: str = ""
+    relative_share: float = 1.0
     compiles_columns: bool = False
     _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
     _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
@@ -95,7 +98,7 @@ class Plan:
 
     def __reduce__(self) -> tuple[Any, ...]:
         sizes = self.scales, self.sizes, self.coordinate_sizes
-        state = self.dependent, self.dependent_speeds, self.switches, self.not_compilable
+        state = self.dependent, self.dependent_speeds, self.switches, self.not_compilable, self.relative_share
         return _restored, (self.assembly, self.finding, *sizes, *state)
 
     @property
@@ -355,11 +358,12 @@ def _restored(
     dependent_speeds: tuple[int, ...],
     switches: int,
     not_compilable: str,
+    relative_share: float = 1.0,
 ) -> Plan:
     """Return a plan from what a pickle has of it."""
     program = assembly.form_program(kept_rows(finding), dependent, dependent_speeds)
     parts = assembly, balance_of(assembly, assembly.form), finding, scales, sizes, coordinate_sizes, program
-    return Plan(*parts, dependent, dependent_speeds, switches, not_compilable)
+    return Plan(*parts, dependent, dependent_speeds, switches, not_compilable, relative_share)
 
 
 def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceProgram:

@@ -16,7 +16,7 @@ from atwood.integrators.protocol import Budget, FloatArray, ImplicitProblem, Lin
 from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
-from atwood.simulation.problem.options import FIXED_STEPS, SOLVERS, RunOptions
+from atwood.simulation.problem.options import FIXED_STEPS, LEAST, SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class SolverRequest:
         options = self.options
         relative = min(options.relative_tolerance, loosest)
         return SolverOptions(
-            relative_tolerance=relative,
+            relative_tolerance=max(relative * self.plan.relative_share, LEAST),
             absolute_tolerances=self.plan.tolerances(
                 min(options.absolute_tolerance or relative, loosest), options.nominal
             ),

@@ -10,14 +10,11 @@ from atwood.forms.assembly import Assembly
 from atwood.integrators.protocol import Budget, Status, StepResult
 from atwood.late import replace
 from atwood.simulation.events.sampling import remembering
-from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.problem.options import LEAST, RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.session import SolverRequest, open_implicit_session
 
 __all__ = ["allowed", "raised_where_too_tight", "too_tight"]
-
-LEAST = 1e-15
-"""The least relative tolerance: a few times the relative error of one operation."""
 
 _TIGHT = 1e-9
 """Failures at larger tolerances have other causes than rounding."""

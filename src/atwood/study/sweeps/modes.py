@@ -208,6 +208,8 @@ def find_mode(
     except AtwoodError:
         return None, "the first run cannot start"
     functions = probe.event_functions
+    if plan.relative_share < 1.0:
+        return None, "bodies float far from the origin"
     if chosen != "explicit":
         return None, f"the solver is {chosen!r}, and events are watched"
     if any(one.target == COORDINATE_SWITCH for one in functions):

@@ -232,6 +232,8 @@ def find_way(request: SweepRequest) -> tuple[Way | None, str]:
         chosen = choose(plan, options, start.time, q, u).solver
     except AtwoodError:
         return None, "the first run cannot start"
+    if plan.relative_share < 1.0:
+        return None, "bodies float far from the origin"
     if chosen not in METHODS:
         is_closed = bool(plan.balance.constraints)
         return None, "no formulas solve its closed loops" if is_closed else f"the solver is {chosen!r}"
