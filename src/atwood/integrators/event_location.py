@@ -6,8 +6,9 @@ from the integrator but the interpolant, so that a root beyond the next output t
 
 The rules, which decide the cases on the edge:
 
-- arriving at zero exactly is an event; leaving zero is not;
-- what has just happened at a restart does not happen again there: its sign is read a little later;
+- arriving at zero exactly is an event; leaving zero is not, nor is touching it;
+- at zero, and up to the rounding of its value, an event has no sign: after a restart there, and after it has happened,
+  the sign is the first that is larger than rounding, at times that move away from there by more and more;
 - a change within rounding of a restart belongs to the restart;
 - events within rounding of each other happen together;
 - a function that passes zero and comes back within a step has passed it: see `atwood.integrators.dips`;
@@ -33,8 +34,11 @@ State = tuple[float, FloatArray, FloatArray]
 Interpolant = Callable[[float], State]
 
 ROUNDING = float(np.finfo(np.float64).eps)
-SETTLING = 0.1
-"""The share of the first step after which the sign of an event that starts at zero is read."""
+_FARTHER = 4.0
+"""Signs near zero are read at times of which each is so many times as far from there as the one before."""
+
+_NOISE = 16.0
+"""A value has a sign from so many times its change on, when the state changes by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +74,9 @@ class EventLocator:
         self._fired_at = -inf
         self._start = -inf
         self._settling = True
+        self._unsure = [False] * problem.event_count  # whether it has been zero, and has had no sign since
+        self._origin = [0.0] * problem.event_count  # what its value was then
+        self._blind = [-inf] * problem.event_count  # until when its value is not looked at
         self._last: Point | None = None
         self.evaluations = 0
 
@@ -80,16 +87,18 @@ class EventLocator:
 
     @property
     def is_settling(self) -> bool:
-        """Whether signs are still to be read a little after a restart."""
+        """Whether nothing is known yet of the first step after a restart."""
         return self._settling
 
     def restart(self, state: State) -> None:
         """Take the signs from a new start of the solution."""
         t = state[0]
-        signs = [_sign(value) for value in self._values(state)]
-        if t == self._fired_at:
-            signs = [0 if fired else sign for sign, fired in zip(signs, self._fired, strict=True)]
-        self._signs = signs
+        values, noise = self._values(state), self._noise(state, 0.0)
+        again = self._fired if t == self._fired_at else [False] * len(values)
+        self._unsure = [one or abs(v) <= least for one, v, least in zip(again, values, noise, strict=True)]
+        self._origin = [v if one else 0.0 for one, v in zip(again, values, strict=True)]
+        self._signs = [0 if one else _sign(v) for one, v in zip(self._unsure, values, strict=True)]
+        self._blind = [-inf] * len(values)
         self._start = t
         self._settling = True
         self._last = None
@@ -99,13 +108,46 @@ class EventLocator:
 
         After a root the search can go on from the root's time.
         """
-        if self._settling:
-            settled = begin + SETTLING * (end - begin)
-            root = self._first_root(begin, settled, at)
-            if root is not None:
-                return root
-            begin, self._settling = settled, False
+        self._settling, self._end = False, end
+        if any(self._unsure):
+            self._settle(begin, at)
+        clear = min(max(self._blind), end)
+        if begin < clear < end:
+            return self._first_root(begin, clear, at) or self._first_root(clear, end, at)
         return self._first_root(begin, end, at)
+
+    def _settle(self, begin: float, at: Interpolant) -> None:
+        """Read the signs of what is or has just been zero where they are larger than rounding.
+
+        Until then nobody looks at them.  An event whose sign is that of before has only touched zero.
+        """
+        noise = self._noise(at(begin), self._end - begin)
+        for i, unsure in enumerate(self._unsure):
+            self._blind[i] = inf if unsure else self._blind[i]
+        past = self._moment
+        while any(self._unsure) and begin < self._end:
+            time = min(begin + past, self._end)
+            for i, value in enumerate(self._values(at(time))):
+                if self._unsure[i] and abs(value) > noise[i] and abs(value - self._origin[i]) > noise[i]:
+                    self._signs[i], self._blind[i], self._unsure[i] = _sign(value), time, False
+            if time >= self._end:
+                break
+            past *= _FARTHER
+
+    def _noise(self, state: State, width: float) -> list[float]:
+        """Return how large values can be that are zero but for rounding, in a step of some width."""
+        t, y, yp = state
+        values = self._values(state)
+        least = [0.0] * len(values)
+        size = ROUNDING * (np.abs(y) + width * np.abs(yp))
+        for turn in (np.cos, np.sin):  # so that no two unknowns change by the same share
+            try:
+                others = _listed(self._function(t, y + size * turn(1.0 + 2.4 * np.arange(len(y))), yp))
+            except ArithmeticError:
+                continue
+            self.evaluations += 1
+            least = [max(m, _NOISE * abs(b - a)) for m, a, b in zip(least, values, others, strict=True)]
+        return least
 
     def _values(self, state: State) -> list[float]:
         self.evaluations += 1
@@ -128,20 +170,19 @@ class EventLocator:
         # A product is positive only for two signs that are equal and known.
         return all(value * sign > 0.0 for value, sign in zip(values, self._signs, strict=True))
 
-    def _crossings(self, values: Sequence[float]) -> list[bool]:
-        """Return which values have passed zero in a direction that counts."""
+    def _crossings(self, values: Sequence[float], t: float) -> list[bool]:
+        """Return which values have passed zero at a time in a direction that counts."""
         return [
-            known != 0 and _sign(value) != known and direction in (0, -known)
-            for value, known, direction in zip(values, self._signs, self._directions, strict=True)
+            known != 0 and _sign(value) != known and direction in (0, -known) and t > blind
+            for value, known, direction, blind in zip(values, self._signs, self._directions, self._blind, strict=True)
         ]
 
-    def _learn(self, values: Sequence[float], which: Sequence[bool] | None = None) -> None:
-        """Take the signs of values; of all that are not zero, or of those that are named."""
-        pairs = enumerate(zip(values, self._signs, strict=True))
-        if which is None:
-            self._signs = [_sign(value) or known for _, (value, known) in pairs]
-        else:
-            self._signs = [_sign(value) if which[i] else known for i, (value, known) in pairs]
+    def _learn(self, values: Sequence[float], t: float) -> None:
+        """Take the signs of all values that have one."""
+        self._signs = [
+            known if t <= blind else _sign(value) or known
+            for value, known, blind in zip(values, self._signs, self._blind, strict=True)
+        ]
 
     def _first_root(self, begin: float, end: float, at: Interpolant) -> Root | None:
         dip = self._dip(begin, end, at)
@@ -153,35 +194,40 @@ class EventLocator:
         moment = max(self._moment, 25 * tolerance)
         while True:
             values = self._values(at(end))
-            crossed = self._crossings(values)
+            crossed = self._crossings(values, end)
             if not any(crossed):
                 # A zero that is not an event keeps the sign it came with.
-                self._learn(values)
+                self._learn(values, end)
                 return None
             if all(rough for one, rough in zip(crossed, self._rough, strict=True) if one):
-                self._learn(values)
+                self._learn(values, end)
                 return Root(at(end), tuple(_sign(v) if one else 0 for v, one in zip(values, crossed, strict=True)))
             before, time = self._narrow(begin, end, values, at, tolerance)
             dip = self._dip(begin, before, at)
             if dip is not None:
                 return self._first_root(begin, dip, at) or self._first_root(dip, end, at)
             # What follows within rounding belongs to the same moment.
-            after = min(time + moment, end)
-            later, state = self._values(at(after)), at(time)
-            here = self._crossings(self._values(state))
-            together = [one or other for one, other in zip(self._crossings(later), here, strict=True)]
-            events = tuple(-sign if one else 0 for one, sign in zip(together, self._signs, strict=True))
-            self._learn(later, together)
-            if time - self._start > moment:
-                self._fired, self._fired_at = together, time
-                return Root(state, events)
+            after, state = min(time + moment, end), at(time)
+            here, later = self._crossings(self._values(state), time), self._crossings(self._values(at(after)), after)
+            together, known = [one or other for one, other in zip(here, later, strict=True)], self._signs
+            self._signs = [-sign if one else sign for one, sign in zip(together, known, strict=True)]
+            self._unsure = [one or other for one, other in zip(together, self._unsure, strict=True)]
+            self._origin = [0.0 if one else value for one, value in zip(together, self._origin, strict=True)]
+            self._settle(time, at)
+            passed = [one and sign != old for one, sign, old in zip(together, self._signs, known, strict=True)]
+            if any(passed) and time - self._start > moment:
+                self._fired, self._fired_at = passed, time
+                return Root(state, tuple(-sign if one else 0 for one, sign in zip(passed, known, strict=True)))
             if after >= end:
                 return None
             begin = after
 
     def _dip(self, begin: float, end: float, at: Interpolant) -> float | None:
         """Return a time between two others at which an event has the other sign, where both have the known one."""
-        signs = [0 if rough else sign for rough, sign in zip(self._rough, self._signs, strict=True)]
+        signs = [
+            0 if rough or begin < blind else sign
+            for rough, sign, blind in zip(self._rough, self._signs, self._blind, strict=True)
+        ]
         if not (any(signs) and begin < end):
             return None
         last = self._last
@@ -225,7 +271,7 @@ class EventLocator:
                 break
             guesses += 1
             middle_values = self._values(at(middle))
-            if any(self._crossings(middle_values)):
+            if any(self._crossings(middle_values, middle)):
                 end, end_values = middle, middle_values
             else:
                 begin, values = middle, middle_values
@@ -234,7 +280,7 @@ class EventLocator:
     def _guess(self, begin: float, end: float, values: Sequence[float], end_values: Sequence[float]) -> float:
         """Return the earliest zero of the chords of the event functions that have passed zero at the end."""
         least = 1.0
-        for first, last, chosen in zip(values, end_values, self._crossings(end_values), strict=True):
+        for first, last, chosen in zip(values, end_values, self._crossings(end_values, end), strict=True):
             if chosen:
                 share = first / (first - last) if first != last else 0.5
                 least = min(least, 0.5 if isnan(share) else max(share, 0.0))
