@@ -33,13 +33,14 @@ class NativeCallbacks:
         ``1 / (relative[i] * |y[i]| + absolute[i])``.
     events
         An ``IDARootFn``: ``int (double t, N_Vector y, N_Vector yp, double *values, void *data)``; 0 for none.  It
-        writes the values of the problem's event functions and returns 0, or 1 where one is not finite.  It tells
-        in which steps something happens; what and when is then found out with the problem's own functions.
+        writes values that are never zero and returns 0, 1 where an event function is not finite, or -2 where one may
+        have passed zero.  So it tells in which steps something happens; what and when is then found out with the
+        problem's own functions.
     restart_events
         ``restart_events(t)``: called before IDA starts at a time.
     has_noticed
-        Asked where `events` did not return 0: whether that was to say that a value may have passed zero and come back
-        since they were called before, in which case they return 0 when they are called again.
+        Asked where `events` did not return 0: whether that was to say that a value may have passed zero since they
+        were called before, in which case they return 0 when they are called again.
     undefined_values
         How often residual and Jacobian had no finite value so far, if somebody counts it.
     attend

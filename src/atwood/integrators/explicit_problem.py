@@ -88,7 +88,7 @@ class CompiledEvents:
     ----------
     function
         ``int (double t, const double *y, const double *yp, double *values, void *data)``, called after every step. It
-        returns 0, or another number where a value is not finite or may have passed zero and come back.
+        returns 0, or another number where a value is not finite or may have passed zero.
     data
         Its last argument.
     count

@@ -2,7 +2,8 @@
 
 They tell in which steps something may happen, so that no Python runs in all the others: where a sign has changed, and
 where the tangents at the ends of a step leave room for a value that passes zero and comes back
-(`atwood.integrators.dips`).
+(`atwood.integrators.dips`). IDA itself locates no roots: it gives up where a value is zero up to its own rounding of
+time, as beside an extreme.
 """
 
 from __future__ import annotations
@@ -64,9 +65,10 @@ class EventData:
     plain
         Address of ``int (double t, const double *y, const double *yp, double *values, void *data)``.
     explicit
-        The same for use after every step: it returns -2 where a value may have passed zero and come back since then.
+        The same for use after every step: it returns -2 where a value may have passed zero since then.
     ida
-        Address of an ``IDARootFn`` that does so too, whose user data hold `address` at `EVENTS_PLACE`.
+        Address of an ``IDARootFn`` that does so too, and else says that nothing is zero; its user data hold `address` at
+        `EVENTS_PLACE`.
     address
         The last argument of the first.
     count
@@ -94,7 +96,7 @@ class EventData:
         self.memory[0] = t
 
     def has_noticed(self) -> bool:
-        """Return, once, whether a value may have passed zero and come back."""
+        """Return, once, whether a value may have passed zero."""
         said = self.memory[2] != 0.0
         self.memory[2] = 0.0
         return bool(said)
@@ -202,12 +204,12 @@ def compile_events(program: Program, for_ida: bool) -> EventCode:
     text = _TEXT.format(count=groups[1]) + _look_text(groups[1] + groups[2], groups[3])
     exports = ["events", "look"]
     if for_ida:
-        text, exports = text + _ida_text(), [*exports, "ida_events"]
+        text, exports = text + _ida_text(groups[3]), [*exports, "ida_events"]
     return EventCode(program, build_code([part], default_options([part]), more=text, exports=exports), for_ida)
 
 
 def _look_text(size: int, count: int) -> str:
-    """Write the function that remembers the last point, and compares tangents; -2 where they leave room for a dip.
+    """Write the function that remembers the last point, and compares signs and tangents; -2 where zero may be passed.
 
     Its memory: the time of the last point, the length over which slopes are taken, whether it has said so, and then
     values and slopes at the last point, and room for two rows of values.
@@ -318,7 +320,8 @@ def _compare_text(count: int) -> str:
   %same = and i1 %a.same, %b.same
   %turns = or i1 %falls, %rises
   %doubtful = or i1 %turns, %steep
-  %this = and i1 %same, %doubtful
+  %one.side = xor i1 %same, true
+  %this = or i1 %one.side, %doubtful
   %found.next = or i1 %found, %this
   %k.next = add i64 %k, 1
   %k.more = icmp slt i64 %k.next, {count}
@@ -326,14 +329,17 @@ def _compare_text(count: int) -> str:
 """
 
 
-def _ida_text() -> str:
+def _ida_text(count: int) -> str:
     """Write the function that IDA calls."""
     layout = sundials_layout()
     vectors = array_of("y", "yy", layout.vector_data) + array_of("yp", "yyp", layout.vector_data)
+    calm = "".join(
+        f"  %at.{i} = getelementptr double, ptr %values, i64 {i}\n  store double 1.0, ptr %at.{i}\n" for i in range(count)
+    )
     return f"""define i32 @ida_events(double %t, ptr %yy, ptr %yyp, ptr %values, ptr %user) #0 {{
 {vectors}  %data.at = getelementptr ptr, ptr %user, i64 {EVENTS_PLACE}
   %data = load ptr, ptr %data.at
   %code = call i32 @look(double %t, ptr %y, ptr %yp, ptr %values, ptr %data)
-  ret i32 %code
+{calm}  ret i32 %code
 }}
 """
