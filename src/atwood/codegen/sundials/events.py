@@ -67,8 +67,8 @@ class EventData:
     explicit
         The same for use after every step: it returns -2 where a value may have passed zero since then.
     ida
-        Address of an ``IDARootFn`` that does so too, and else says that nothing is zero; its user data hold `address` at
-        `EVENTS_PLACE`.
+        Address of an ``IDARootFn`` that does so too, and else says that nothing is zero; its user data hold `address`
+        at `EVENTS_PLACE`.
     address
         The last argument of the first.
     count
@@ -333,9 +333,8 @@ def _ida_text(count: int) -> str:
     """Write the function that IDA calls."""
     layout = sundials_layout()
     vectors = array_of("y", "yy", layout.vector_data) + array_of("yp", "yyp", layout.vector_data)
-    calm = "".join(
-        f"  %at.{i} = getelementptr double, ptr %values, i64 {i}\n  store double 1.0, ptr %at.{i}\n" for i in range(count)
-    )
+    places = [f"  %at.{i} = getelementptr double, ptr %values, i64 {i}\n" for i in range(count)]
+    calm = "".join(f"{place}  store double 1.0, ptr %at.{i}\n" for i, place in enumerate(places))
     return f"""define i32 @ida_events(double %t, ptr %yy, ptr %yyp, ptr %values, ptr %user) #0 {{
 {vectors}  %data.at = getelementptr ptr, ptr %user, i64 {EVENTS_PLACE}
   %data = load ptr, ptr %data.at
