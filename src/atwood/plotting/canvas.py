@@ -26,6 +26,8 @@ __all__ = [
     "new_figure",
     "polish",
     "save_figure",
+    "titled",
+    "with_unit",
 ]
 
 COLOURS = ("#2a6fbb", "#d1495b", "#2e9e6b", "#c98a1b", "#7b5ea7", "#3aa6b9", "#8a6d5a", "#d46ba3")
@@ -109,6 +111,29 @@ def polish(axes: Axes, x_label: str = "", y_label: str = "") -> None:
     axes.set_axisbelow(True)
     axes.set_xlabel(x_label, color=INK, fontsize=10)
     axes.set_ylabel(y_label, color=INK, fontsize=10)
+
+
+def with_unit(label: str, unit: str) -> str:
+    """Return a label with its unit; without one where it is a plain number, or may be anything."""
+    return label if unit in ("", "1", "any") else f"{label}, {unit}"
+
+
+def titled(figure: Figure, text: str, **style: Any) -> None:
+    """Put a title over a figure, which is made as wide as the title is.
+
+    Parameters
+    ----------
+    figure
+        The figure; a title that it has is replaced.
+    text
+        The title.
+    **style
+        Of the text, as matplotlib takes it.
+    """
+    made = figure.suptitle(text, x=0.01, ha="left", fontsize=11, color=INK, **style)
+    needed = made.get_window_extent().width / figure.dpi + 0.02 * figure.get_figwidth() + 0.1
+    if needed > figure.get_figwidth():
+        figure.set_figwidth(needed)
 
 
 def save_figure(figure: Figure, file: str | os.PathLike[str]) -> Path:

@@ -15,7 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.files import write_atomically
 from atwood.plotting.camera import View, as_camera, check_view
-from atwood.plotting.canvas import ANIMATED, COLOURS, INK, check_picture, finished, need_matplotlib, new_figure
+from atwood.plotting.canvas import ANIMATED, COLOURS, INK, check_picture, finished, need_matplotlib, new_figure, titled
 from atwood.plotting.planar.geometry import Picture, find_connectors, make_picture
 from atwood.plotting.planar.strokes import Pen, draw_trace
 from atwood.plotting.scene3d.drawing import draw_space, frame_space, space_panels
@@ -109,6 +109,7 @@ def _draw_space(result: Result, picture: SpacePicture, moments: Sequence[int]) -
     alone = len(moments) == 1
     figure, panels = space_panels(picture, [f"{name}, {titles[0]}"] if alone else titles, "" if alone else name)
     for axes, moment in zip(panels, moments, strict=True):
+        frame_space(axes, picture, moment)
         draw_space(axes, picture, moment)
     return figure
 
@@ -122,7 +123,7 @@ def _draw_together(result: Result, picture: Picture, moments: Sequence[int], tra
         share = 1.0 if len(moments) == 1 else rank / (len(moments) - 1)
         pen.draw(axes, moment, alpha=0.16 + 0.84 * share**1.5, depth=3 + rank)
     times = ", ".join(f"{result.time[i]:.3g}" for i in moments)
-    axes.set_title(f"{_name(result)}, t = {times} s", loc="left", fontsize=11, color=INK)
+    titled(figure, f"{_name(result)}, t = {times} s")
     return figure
 
 
@@ -159,7 +160,7 @@ def _draw_apart(result: Result, picture: Picture, moments: Sequence[int], traced
         _frame(axes, lows, highs)
         pen.draw(axes, moment, alpha=1.0, depth=3)
         axes.set_title(f"t = {result.time[moment]:.3g} s", fontsize=10, color=INK)
-    figure.suptitle(_name(result), x=0.01, ha="left", fontsize=11, color=INK)
+    titled(figure, _name(result))
     return figure
 
 
@@ -193,7 +194,7 @@ def animate(
     file
         Where to save it (``.gif``).
     seconds
-        How long it plays; as long as the run took in its own time when not given, but at most twenty seconds.
+        How long it plays; as long as the run took in its own time when not given, but two to twenty seconds.
     frames_per_second
         Frames in a second.
     view, trace
@@ -216,7 +217,9 @@ def animate(
 
     from atwood.plotting.figure import Animation
 
-    lasting = min(float(result.time[-1] - result.time[0]), 20.0) if seconds is None else seconds
+    span = float(result.time[-1] - result.time[0])
+    lasting = min(max(span, 2.0), 20.0) if seconds is None else seconds
+    digits = int(np.clip(2.0 - np.floor(np.log10(span or 1.0)), 2, 9))
     count = max(2, round(lasting * frames_per_second))
     wanted = np.linspace(result.time[0], result.time[-1], count)
     moments = [int(np.argmin(np.abs(result.time - time))) for time in wanted]
@@ -233,14 +236,14 @@ def animate(
     def show(number: int) -> list[object]:
         axes.clear()
         if result.assembly.mechanism.space.is_spatial:
-            frame_space(axes, seen)
+            frame_space(axes, seen, moments[number])
             draw_space(axes, seen, moments[number])
         else:
             _frame(axes, lows, highs)
             if not picture.direction:
                 _draw_traces(axes, picture, pen, slice(0, moments[number] + 1), list(traced.values()))
             pen.draw(axes, moments[number], alpha=1.0, depth=3)
-        axes.set_title(f"{_name(result)}, t = {wanted[number]:.2f} s", loc="left", fontsize=11, color=INK)
+        titled(figure, f"{_name(result)}, t = {wanted[number]:.{digits}f} s")
         return []
 
     figure.set_layout_engine("none")

@@ -6,7 +6,7 @@ import os
 from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, instance, optional, takes, whole
-from atwood.plotting.canvas import INK, finished
+from atwood.plotting.canvas import finished, titled
 from atwood.plotting.drawing import plot_mechanism
 from atwood.theory.linearization import NormalModes
 
@@ -42,13 +42,7 @@ def plot_mode(modes: NormalModes, mode: int = 0, file: str | os.PathLike[str] | 
     last = float(motion.time[-1] - motion.time[0])
     times = [float(motion.time[0]) + share * last for share in (0.5, 0.25, 0.0)]
     figure = plot_mechanism(motion, times=sorted(times))
-    if len(figure.axes) == 1:
-        figure.axes[0].set_title("", loc="left")
     omega, growth = modes.angular_frequencies[mode], modes.growth_rates[mode]
-    figure.suptitle(
-        f"{modes.scene}, mode {mode}: {omega:.5g} rad/s" + (f", growth {growth:.4g} 1/s" if growth else ""),
-        fontsize=11,
-        fontweight="bold",
-        color=INK,
-    )
+    said = f"{modes.scene}, mode {mode}: {omega:.5g} rad/s" + (f", growth {growth:.4g} 1/s" if growth else "")
+    titled(figure, said, fontweight="bold")
     return finished(figure, file)

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
@@ -22,6 +23,7 @@ from atwood.model.declare.connectors import Groove
 from atwood.model.local.laws import LocalPart
 from atwood.model.values.outline import Outline
 from atwood.plotting.planar.columns import spread_columns
+from atwood.plotting.planar.slack import pulling
 from atwood.plotting.shapes.curves import joint_curve, numbers
 from atwood.plotting.shapes.meshes import Mesh
 from atwood.plotting.shapes.outlines import outline_mesh, outline_of
@@ -60,7 +62,7 @@ class Shape:
     nodes
         Between which nodes, in order.
     size
-        Mass of a mass, kg; zero otherwise.
+        Mass of a mass, kg; radius of a disc that stands for an inertia, m; zero otherwise.
     surface
         Of a solid its surface, in the axes of its node.
     line
@@ -102,6 +104,8 @@ class Picture:
         On a vertical line: radius of each pulley by its groove's node.
     angles
         Of the nodes of solids and curves: how they are turned, counter-clockwise, rad, shape (times,).
+    pulls
+        For the path of each rope, when it holds its ends together, shape (times,).
     """
 
     time: FloatArray
@@ -110,6 +114,15 @@ class Picture:
     direction: str
     radii: Mapping[int, float]
     angles: Mapping[int, FloatArray] = field(default_factory=dict)
+    pulls: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+
+    def spare(self, shape: Shape, moment: int) -> float:
+        """Return how much longer a rope is than the way along its nodes, m; below zero for one that was let go."""
+        if self.pulls[shape.part][moment] or not np.any(self.pulls[shape.part]):
+            return 0.0
+        stops = np.array([self.points[node] for node in shape.nodes])
+        way = np.linalg.norm(np.diff(stops, axis=0), axis=2).sum(axis=0)
+        return float(np.max(way[self.pulls[shape.part]]) - way[moment])
 
     @cached_property
     def extent(self) -> float:
@@ -189,8 +202,23 @@ def make_picture(result: Result, also: Iterable[int] = ()) -> Picture:
             _place_grounds(mechanism, shapes, points, columns)
     turned = [shape.nodes[0] for shape in shapes if shape.surface is not None or shape.kind in ("curve", "path")]
     angles = _node_angles(result, turned)
+    pulls = {one.part: pulling(result, one.part) for one in shapes if one.kind == "rope"}
     drawn = [_followed(shape, points, angles) if shape.kind == "path" else shape for shape in shapes]
-    return Picture(result.time, points, tuple(drawn), direction, radii, angles)
+    spans: dict[int, float] = {}
+    for one in (shape for shape in shapes if shape.kind == "link"):
+        first, last = (points[node][0] for node in one.nodes)
+        body = mechanism.bodies.body_of[one.nodes[0]]
+        spans[body] = max(spans.get(body, 0.0), float(np.linalg.norm(last - first)))
+    drawn = [_beside_links(one, spans.get(mechanism.bodies.body_of[one.nodes[0]], 0.0)) for one in drawn]
+    return Picture(result.time, points, tuple(drawn), direction, radii, angles, pulls)
+
+
+def _beside_links(shape: Shape, span: float) -> Shape:
+    """Return the disc of a body that links belong to so small that these, as long as `span`, are seen beside it."""
+    if shape.kind != "solid" or not 0.0 < 0.15 * span < shape.size or shape.surface is None:
+        return shape
+    share, middle = 0.15 * span / shape.size, shape.surface.vertices.mean(axis=0)
+    return replace(shape, surface=shape.surface.placed((1.0 - share) * middle, share * np.eye(3)))
 
 
 def _followed(shape: Shape, points: Mapping[int, FloatArray], angles: Mapping[int, FloatArray]) -> Shape:
@@ -330,7 +358,7 @@ def _bodies(mechanism: Mechanism, path: str, local: LocalPart, node: int) -> lis
             radius = float(np.sqrt(2.0 * moment / mass))
             profile = [(0.0, -0.1 * radius), (radius, -0.1 * radius), (radius, 0.1 * radius), (0.0, 0.1 * radius)]
             disc = outline_mesh(Outline.revolved(profile, "y"), around=120)
-            found.append(Shape(path, "solid", (node,), surface=disc.placed(center, np.eye(3))))
+            found.append(Shape(path, "solid", (node,), radius, disc.placed(center, np.eye(3))))
         elif mass > 0.0 and not np.any(center):
             found.append(Shape(path, "mass", (node,), mass))
     return found

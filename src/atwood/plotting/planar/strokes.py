@@ -9,6 +9,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.plotting.canvas import COLOURS, GREY, INK
 from atwood.plotting.planar.geometry import Picture, Shape
+from atwood.plotting.planar.slack import hanging
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,14 +99,14 @@ class Pen:
         return [s.nodes[0] for s in self.picture.shapes if s.kind == "pulley" and s.nodes[-1] in shape.nodes]
 
     def _rail_ends(self, shape: Shape) -> FloatArray | None:
-        """Return the ends of the straight line along which something slides in the world; None if it moves itself."""
+        """Return the ends of the straight line along which something slides in the world; None if the line moves."""
         base, rider = (self.picture.points[node] for node in shape.nodes)
         if np.max(np.ptp(base, axis=0)) > 1e-6 * self.picture.extent:
             return None
         middle = rider.mean(axis=0)
         _, _, axes = np.linalg.svd(rider - middle, full_matrices=False)
-        along = (rider - middle) @ axes[0]
-        if np.ptp(along) < 1e-9 * self.picture.extent:
+        along, aside = ((rider - middle) @ axis for axis in axes)
+        if np.ptp(along) < 1e-9 * self.picture.extent or np.ptp(aside) > 1e-3 * self.picture.extent:
             return None
         reach = np.array([along.min(), along.max()]) + np.array([-6.0, 6.0]) * self.unit
         if shape.size:  # it rolls on a line through the base
@@ -117,7 +118,9 @@ class Pen:
 
     def _rail(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         ends = self.rails[shape.part]
-        if ends is not None:
+        if ends is None and not shape.size:  # a line that moves goes from the base to what slides on it
+            axes.plot(points[:, 0], points[:, 1], color=self._tone(GREY), linewidth=1.2, **look)
+        elif ends is not None:
             axes.plot(ends[:, 0], ends[:, 1], color=GREY, linewidth=1.2, zorder=1.5, solid_capstyle="round")
 
     # -- what moves ------------------------------------------------------------------------------------------------
@@ -191,6 +194,13 @@ class Pen:
             axes.plot(path[:, 0], path[:, 1], color=self._tone(INK), linewidth=1.3, **look)
 
     def _rope(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        spare = self.picture.spare(shape, moment)
+        if spare < -1e-6 * self.picture.extent:
+            return  # it was let go, and its ends are farther apart than it is long
+        if len(points) == 2 and spare > 0.0 and not self.picture.direction:
+            points = hanging(points, spare)
+            axes.plot(points[:, 0], points[:, 1], color=self._tone("#a8642a"), linewidth=1.6, **look)
+            return
         line = _rope_line(points, [self.picture.radii.get(node, 0.0) for node in shape.nodes])
         axes.plot(line[:, 0], line[:, 1], color=self._tone("#a8642a"), linewidth=1.6, solid_joinstyle="round", **look)
 

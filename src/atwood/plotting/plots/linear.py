@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arguments import FILE, TEXT, each as several, instance, number, optional, takes
 from atwood.arrays import FloatArray
@@ -81,13 +82,25 @@ def plot_bode(
     for (i, j, label), colour in zip(pairs, _colours(len(pairs)), strict=True):
         own = response[:, i, j]
         above.plot(omega, 20.0 * np.log10(np.maximum(np.abs(own), 1e-300)), color=colour, linewidth=1.6, label=label)
-        below.plot(omega, np.degrees(np.unwrap(np.angle(own))), color=colour, linewidth=1.6)
+        below.plot(*_phase(omega, own), color=colour, linewidth=1.6)
     above.set_xscale("log")
     polish(above, "", "gain, dB of SI units")
     polish(below, "angular frequency, rad/s", "phase, deg")
+    below.set_yticks(np.arange(-180.0, 181.0, 90.0))
     above.legend(frameon=False, fontsize=9, labelcolor=INK)
     above.set_title(f"{model.scene}: frequency response", loc="left", fontsize=11, fontweight="bold", color=INK)
     return finished(figure, file)
+
+
+def _phase(omega: FloatArray, response: NDArray[np.complex128]) -> tuple[FloatArray, FloatArray]:
+    """Return the phase within a turn, from -180 up to 180 degrees, over the frequency, with gaps where it goes round.
+
+    Over many poles of little damping it would run to thousands of degrees, by jumps of half a turn whose way rounding
+    chooses; so a real response below zero is at -180.
+    """
+    degrees = (np.degrees(np.angle(response)) + 180.0 + 1e-6) % 360.0 - 180.0 - 1e-6
+    gaps = np.flatnonzero(np.abs(np.diff(degrees)) > 180.0 + 1e-3) + 1
+    return np.insert(omega, gaps, omega[gaps]), np.insert(degrees, gaps, np.nan)
 
 
 @takes(model=_MODEL, file=optional(FILE), angular_frequencies=_FREQUENCIES)

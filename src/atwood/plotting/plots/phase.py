@@ -10,7 +10,7 @@ import numpy as np
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish, with_unit
 from atwood.theory.flow import PhasePortrait, PoincareSection
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def plot_phase_portrait(portrait: PhasePortrait, file: str | os.PathLike[str] | 
     axes.set_xlim(*portrait.window.across)
     axes.set_ylim(*portrait.window.up)
     axes.grid(False)
-    polish(axes, f"{portrait.coordinate}, {portrait.units[0]}", f"{portrait.speed}, {portrait.units[1]}")
+    polish(axes, *map(with_unit, (portrait.coordinate, portrait.speed), portrait.units))
     if portrait.units[0] == "rad":
         low, high = (int(np.trunc(end / (0.5 * np.pi))) for end in portrait.window.across)
         if all(k in _HALF_TURNS for k in (low, high)) and high - low >= 2:
@@ -124,6 +124,6 @@ def plot_section(section: PoincareSection, file: str | os.PathLike[str] | None =
         axes.plot(
             x, y, color=COLOURS[k % len(COLOURS)], marker="o", markersize=2.6, linestyle="none", label=f"start {k}"
         )
-    polish(axes, *(f"{path}, {section.units[path]}" for path in paths[:2]))
+    polish(axes, *(with_unit(path, section.units[path]) for path in paths[:2]))
     axes.set_title(f"{section.scene}: {section.surface}", loc="left", fontsize=11, fontweight="bold", color=INK)
     return finished(figure, file)

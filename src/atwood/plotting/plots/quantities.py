@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.errors import ResultError
 from atwood.model.declare.quantities import PATHS
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish, with_unit
 from atwood.result.files import SavedResult
 from atwood.result.result import Result
 
@@ -128,7 +128,7 @@ def _draw(axes: Axes, result: Result | SavedResult, paths: list[str], unit: str)
     kinds = {path.rpartition(".")[2] for path in paths}
     label = kinds.pop().replace("_", " ") if len(kinds) == 1 else _QUANTITIES.get(unit, "")
     label = label if len(label) > 1 else _QUANTITIES.get(unit, "")
-    polish(axes, y_label=f"{label}, {unit}" if unit != "1" else label)
+    polish(axes, y_label=with_unit(label, unit))
     picked = paths if len(paths) <= _CURVES else [paths[i] for i in _spread(len(paths), _CURVES)]
     for colour, path in zip(COLOURS, picked, strict=False):
         axes.plot(result.time, result.array(path), color=colour, linewidth=1.6, label=_without_ending(path, paths))

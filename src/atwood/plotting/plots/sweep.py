@@ -11,7 +11,7 @@ import numpy as np
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.errors import UsageError
 from atwood.model.declare.quantities import PATHS
-from atwood.plotting.canvas import COLOURS, INK, finished, new_figure, polish
+from atwood.plotting.canvas import COLOURS, INK, finished, new_figure, polish, with_unit
 from atwood.study.sweeps.result import Sweep
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def plot_sweep(sweep: Sweep, paths: Iterable[str] | None = None, file: str | os.
 
 def _label(sweep: Sweep, path: str) -> str:
     unit = sweep.units.get(path, "")
-    return f"{path}, {unit}" if unit else path
+    return with_unit(path, unit)
 
 
 def _draw_map(figure: Figure, axes: Axes, sweep: Sweep, path: str) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.plotting.canvas import INK, new_figure
+from atwood.plotting.canvas import INK, new_figure, titled
 from atwood.plotting.scene3d.model import SpaceModel
 from atwood.plotting.scene3d.painter import Stage, to_rgb
 from atwood.plotting.scene3d.picture import SpacePicture, Trail
@@ -47,7 +47,8 @@ def draw_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
         pose = model.reading.poses[piece.body]
         origin, turn = pose.origin[moment], pose.axes[moment]
         if piece.mesh is not None:
-            stage.mesh(piece.mesh.placed(origin, turn), piece.colour)
+            below = piece.up is not None and float(picture.camera.depth(turn @ piece.up)) >= 0.0
+            stage.mesh(piece.mesh.placed(origin, turn), piece.colour, below=below)
             continue
         assert piece.points is not None
         points = origin + piece.points @ turn.T
@@ -59,7 +60,7 @@ def draw_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
     for trail in picture.trails:
         _draw_trail(stage, trail, moment)
     stage.paint(axes, 3.0)
-    draw_corner_axes(axes, picture.camera, picture.bounds)
+    draw_corner_axes(axes, picture.camera, picture.bounds_at(moment))
 
 
 def _draw_trail(stage: Stage, trail: Trail, moment: int) -> None:
@@ -136,7 +137,7 @@ _TIES: dict[str, Callable[[Stage, FloatArray, FloatArray], None]] = {
 # -- panels ---------------------------------------------------------------------------------------------------------
 
 
-def frame_space(axes: Axes, picture: SpacePicture) -> None:
+def frame_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
     """Give axes the bounds of a picture, and nothing else.
 
     Parameters
@@ -145,8 +146,10 @@ def frame_space(axes: Axes, picture: SpacePicture) -> None:
         The axes.
     picture
         The scene.
+    moment
+        Number of the output time.
     """
-    lows, highs = picture.bounds
+    lows, highs = picture.bounds_at(moment)
     axes.set_xlim(float(lows[0]), float(highs[0]))
     axes.set_ylim(float(lows[1]), float(highs[1]))
     axes.set_aspect("equal")
@@ -165,7 +168,7 @@ def space_panels(picture: SpacePicture, titles: Sequence[str], name: str = "") -
     name
         What stands above them all.
     """
-    lows, highs = picture.bounds
+    lows, highs = picture.bounds_at(0)
     width, height = highs - lows
     count = len(titles)
     columns = count if height > 1.6 * width or count <= 3 else 2 if count == 4 else 3
@@ -176,8 +179,8 @@ def space_panels(picture: SpacePicture, titles: Sequence[str], name: str = "") -
     for axes in panels[count:]:
         axes.set_visible(False)
     for axes, title in zip(panels, titles, strict=False):
-        frame_space(axes, picture)
+        frame_space(axes, picture, 0)
         axes.set_title(title, fontsize=10, color=INK)
     if name:
-        figure.suptitle(name, x=0.01, ha="left", fontsize=11, color=INK)
+        titled(figure, name)
     return figure, panels[:count]

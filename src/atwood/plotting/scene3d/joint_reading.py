@@ -48,7 +48,8 @@ def read_joint(
             return _sheet(mechanism, path, joint, (a, b), turn)
         first, second = (joint_step(mechanism, joint, shift, one, 1.0) for one in moving)
         normal = turn @ np.cross(first, second)
-        return [Joining(path, "plane", (a, b), (normal / np.linalg.norm(normal),), reach=_touched(mechanism, path))]
+        normal /= np.linalg.norm(normal)
+        return [Joining(path, "plane", (a, b), (normal,), reach=_heights(reading, (a, b), normal))]
     if len(moving) > 2:
         return []
     if len(moving) == 1:
@@ -102,10 +103,10 @@ def _sheet(
     return found
 
 
-def _touched(mechanism: Mechanism, path: str) -> tuple[float, float]:
-    """Return how far from below what moves on a plane it can touch it: by the radius of what rolls."""
-    radius = mechanism.locals_[path].part.values.get("radius", 0.0)
-    return 0.0, float(radius) if isinstance(radius, (int, float)) else 0.0
+def _heights(reading: Reading, nodes: tuple[int, int], normal: FloatArray) -> tuple[float, float]:
+    """Return the lowest and the highest place over a plane of what moves on it, as the centre of what rolls, m."""
+    heights = seen_from(reading, *nodes) @ normal
+    return float(heights.min()), float(heights.max())
 
 
 def _turning_axes(mechanism: Mechanism, rotation: object) -> list[FloatArray]:

@@ -43,6 +43,8 @@ class SpaceModel:
         Points whose paths are drawn.
     heavy
         Point masses: node and colour.
+    travels
+        Whether it goes far beyond its own size, so that each time is framed by itself.
     """
 
     reading: Reading
@@ -51,6 +53,7 @@ class SpaceModel:
     ties: tuple[Tie, ...]
     tips: tuple[Tip, ...]
     heavy: tuple[tuple[int, str], ...]
+    travels: bool = False
 
 
 def build_model(reading: Reading) -> SpaceModel:
@@ -63,11 +66,12 @@ def build_model(reading: Reading) -> SpaceModel:
     """
     shapes = tuple(shape_of(lump) for lump in reading.lumps)
     # Rings and shafts have sizes of their own, so that the extent is known only when they are there.
-    rough = _put_together(reading, shapes, 0.01 * _extent(reading, shapes, []))
-    return _put_together(reading, shapes, 0.01 * _extent(reading, shapes, rough.pieces))
+    rough = _put_together(reading, shapes, *_extent(reading, shapes, []))
+    return _put_together(reading, shapes, *_extent(reading, shapes, rough.pieces))
 
 
-def _put_together(reading: Reading, shapes: tuple[BodyShape, ...], unit: float) -> SpaceModel:
+def _put_together(reading: Reading, shapes: tuple[BodyShape, ...], extent: float, travels: bool) -> SpaceModel:
+    unit = 0.01 * extent
     drawn = tuple(shape if shape.kind == "point" else shape.drawn(1.2 * unit, 4.4 * unit) for shape in shapes)
     bench = Bench(reading, drawn, unit, _depths(reading))
     for node in reading.grounds:
@@ -83,19 +87,30 @@ def _put_together(reading: Reading, shapes: tuple[BodyShape, ...], unit: float) 
     heavy = _add_masses(bench)
     _add_feet(bench)
     _add_tips(bench)
-    return SpaceModel(reading, unit, tuple(bench.pieces), reading.ties, tuple(bench.tips), heavy)
+    return SpaceModel(reading, unit, tuple(bench.pieces), reading.ties, tuple(bench.tips), heavy, travels)
 
 
-def _extent(reading: Reading, shapes: tuple[BodyShape, ...], pieces: Sequence[Piece]) -> float:
-    """Return the larger side of what the nodes, shapes and pieces of a scene ever take up, m."""
-    points = [reading.place(node) for node in reading.used]
+def _extent(reading: Reading, shapes: tuple[BodyShape, ...], pieces: Sequence[Piece]) -> tuple[float, bool]:
+    """Return the larger side of what a scene takes up, m: ever, or at one time where it travels far beyond that.
+
+    What moves on a plane of the world is not held to the place where this begins.
+    """
+    loose = {one.nodes[0] for one in reading.joinings if one.kind == "plane" and reading.body_of[one.nodes[0]] == 0}
+    held = {one for each in reading.joinings if each.kind != "plane" for one in each.nodes} | {*reading.grounds} - loose
+    held |= {node for tie in reading.ties for node in tie.nodes}
+    points = [reading.place(node) for node in reading.used if reading.body_of[node] != 0 or node in held or not loose]
     corners = [(shape.lump.body, shape.corners) for shape in shapes]
     corners += [(piece.body, piece.corners) for piece in pieces if piece.body != 0]
     for body, some in corners:
         pose = reading.poses[body]
         low, high = some.min(axis=0), some.max(axis=0)
         points += [pose.place(np.where(pick, high, low)) for pick in np.ndindex(2, 2, 2)]
-    return float(np.max(np.ptp(np.concatenate(points), axis=0), initial=0.0)) or 1.0
+    if not points:
+        return 1.0, False
+    whole = float(np.max(np.ptp(np.concatenate(points), axis=0)))
+    at_once = float(np.max(np.ptp(np.array(points), axis=0)))
+    travels = bool(loose) and whole > 3.0 * at_once > 0.0
+    return (at_once if travels else whole) or 1.0, travels
 
 
 def _pairs(reading: Reading) -> list[tuple[int, int]]:
@@ -147,7 +162,9 @@ def _add_bodies(bench: Bench) -> None:
             number = bars.index(shape) % len(COLOURS)
             bench.surface(body, made, pale(COLOURS[number]) if 1 < len(bars) <= _FEW else STEEL)
             continue
-        bench.surface(body, made, pale(COLOURS[compact.index(shape) % len(COLOURS)], 0.25))
+        colour = pale(COLOURS[compact.index(shape) % len(COLOURS)], 0.25)
+        hollow = any(bench.is_within(one, shape) for one in bench.shapes if one.lump.body != body)
+        (bench.edges if hollow else bench.surface)(body, made, colour)
         if all(one.kind in ("ball", "cross") for one in bench.joinings(body)):
             _add_triad(bench, shape)
 
@@ -260,16 +277,20 @@ def _add_plane(bench: Bench, joining: Joining) -> None:
     lows, highs = [], []
     for one in shared:
         spread = np.einsum("tji,tj->ti", pose.axes, reading.place(one.nodes[1]) - reading.place(node)) @ frame[:, :2]
-        margin = 8.0 * unit + one.reach[1]
+        margin = max(8.0 * unit, 1.1 * bench.radius_about(one.nodes[1]))
         lows.append(spread.min(axis=0) - margin)
         highs.append(spread.max(axis=0) + margin)
     low, high = np.min(lows, axis=0), np.max(highs, axis=0)
-    middle = reading.offsets[node] + frame[:, :2] @ (0.5 * (low + high)) - 0.3 * unit * frame[:, 2]
+    lower = (
+        0.3 if any(np.ptp([0.0, *one.reach]) > 0.1 * unit for one in shared) else 3.7
+    )  # what slides within it is seen
+    middle = reading.offsets[node] + frame[:, :2] @ (0.5 * (low + high)) - lower * unit * frame[:, 2]
     sides = (float(high[0] - low[0]), float(high[1] - low[1]), 0.5 * unit)
     bench.surface(
         reading.body_of[node],
         box(sides, cells=24 if any(one.reach[1] for one in shared) else 8).placed(middle, frame),
         "#eef1f4",
+        None if reading.body_of[node] else frame[:, 2] * np.sign(np.round(sum(joining.reach) / unit, 1)),
     )
 
 
@@ -317,7 +338,10 @@ def _add_masses(bench: Bench) -> tuple[tuple[int, str], ...]:
 def _add_feet(bench: Bench) -> None:
     """Draw what is fixed in the world: a foot below it, or a bracket above it where the mechanism hangs down."""
     reading, unit = bench.reading, bench.unit
+    planes = {one.nodes[0] for one in reading.joinings if one.kind == "plane"}
     for node, places in bench.feet.items():
+        if node in planes:
+            continue  # the plane is what is fixed
         middle = _held_height(bench, node)
         for place in places or [reading.offsets[node]]:
             hangs = reading.is_heavy and middle is not None and place[2] > middle + unit

@@ -26,6 +26,9 @@ _LIGHT = np.array([-0.45, 0.75, 0.5]) / np.linalg.norm([-0.45, 0.75, 0.5])
 _CLEAR = 0.35
 """In units: how far a face must be before a line to hide it; so no line is hidden by the faces that it lies on."""
 
+_FAR = 1e4
+"""In units: farther away than anything is from anything."""
+
 _CIRCLE = np.stack([np.cos(np.linspace(0.0, 2.0 * np.pi, 37)), np.sin(np.linspace(0.0, 2.0 * np.pi, 37))], axis=-1)
 
 
@@ -97,7 +100,7 @@ class Stage:
         self._balls: list[_Ball] = []
         self._lines: list[_Lines] = []
 
-    def mesh(self, mesh: Mesh, colour: ArrayLike | str, line: float = 0.8) -> None:
+    def mesh(self, mesh: Mesh, colour: ArrayLike | str, line: float = 0.8, *, below: bool = False) -> None:
         """Add a surface, shaded, with its outline.
 
         Parameters
@@ -108,8 +111,11 @@ class Stage:
             Its colour in full light.
         line
             Width of its lines, points.
+        below
+            Whether all else stands on it, before it as the eye sees it, so that it hides nothing.
         """
-        page, depth = self.camera.project(mesh.vertices), self.camera.depth(mesh.vertices)
+        away = _FAR * self.unit if below else 0.0
+        page, depth = self.camera.project(mesh.vertices), self.camera.depth(mesh.vertices) - away
         seen = mesh.normals @ self.camera.axes.T
         visible = seen[:, 2] > 1e-9
         brightness = 0.74 + 0.28 * np.clip(seen @ _LIGHT, -0.4, 1.0)
@@ -120,7 +126,7 @@ class Stage:
         ends, sides, sharp = mesh.edges
         first, second = visible[sides[:, 0]], visible[sides[:, 1]]
         drawn = ends[np.where(sharp, first | second, first ^ second)]
-        self._cut(mesh.vertices[drawn[:, 0]], mesh.vertices[drawn[:, 1]], to_rgb(INK)[None], line)
+        self._cut(mesh.vertices[drawn[:, 0]], mesh.vertices[drawn[:, 1]], to_rgb(INK)[None], line, away)
 
     def line(self, points: FloatArray, colour: ArrayLike | str, width: float) -> None:
         """Add a line.
@@ -136,7 +142,7 @@ class Stage:
         """
         self._cut(points[:-1], points[1:], np.atleast_2d(to_rgb(colour)), width)
 
-    def _cut(self, starts: FloatArray, ends: FloatArray, tones: FloatArray, width: float) -> None:
+    def _cut(self, starts: FloatArray, ends: FloatArray, tones: FloatArray, width: float, away: float = 0.0) -> None:
         """Cut straight lines into short pieces and add them."""
         lengths = np.linalg.norm(ends - starts, axis=1)
         counts = np.clip(np.ceil(lengths / (1.5 * self.unit)), 1, 200).astype(int)
@@ -148,7 +154,7 @@ class Stage:
         way = (ends - starts)[whose]
         a, b = starts[whose] + low[:, None] * way, starts[whose] + high[:, None] * way
         page = np.stack([self.camera.project(a), self.camera.project(b)], axis=1)
-        depths = self.camera.depth(0.5 * (a + b))
+        depths = self.camera.depth(0.5 * (a + b)) - away
         self._lines.append(_Lines(page, depths, np.broadcast_to(tones, (len(counts), 3))[whose], width))
 
     def ball(self, center: FloatArray, radius: float, colour: ArrayLike | str) -> None:

@@ -125,6 +125,22 @@ class SpacePicture:
         power = 10.0 ** np.floor(np.log10(wanted))
         return float(power * next(one for one in (1.0, 2.0, 5.0, 10.0) if one * power >= 0.999 * wanted))
 
+    def bounds_at(self, moment: int) -> tuple[FloatArray, FloatArray]:
+        """Return corners of the page at one time, m: of the whole run, or around what travels far beyond its size."""
+        if not self.model.travels:
+            return self.bounds
+        reading, boxes = self.model.reading, []
+        moving = [piece for piece in self.model.pieces if piece.body != 0]
+        for piece in moving:
+            pose = reading.poses[piece.body]
+            placed = pose.origin[:, None] + np.einsum("tij,kj->tki", pose.axes, _outermost(piece.corners))
+            page = self.camera.project(placed)
+            boxes.append((page.min(axis=1), page.max(axis=1)))
+        lows, highs = np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+        half = 0.6 * np.max(highs - lows, axis=0) + 6.0 * self.model.unit
+        middle = 0.5 * (lows + highs)[moment]
+        return middle - half, middle + half
+
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Corners of the page that holds everything, m."""

@@ -31,6 +31,8 @@ class Piece:
         Corners of a line, or the centre of a ball, m, shape (points, 3).
     size
         Width of a line, points; radius of a ball, m.
+    up
+        Of a plane that others stand on, its normal; None for everything else.
     """
 
     body: int
@@ -38,6 +40,7 @@ class Piece:
     mesh: Mesh | None = None
     points: FloatArray | None = None
     size: float = 0.0
+    up: FloatArray | None = None
 
     @property
     def corners(self) -> FloatArray:
@@ -165,6 +168,26 @@ class Bench:
         ends = [{of[node] for node in one.nodes} - {body} for one in self.joinings(body)]
         return [other for one in ends for other in one if self.depth.get(other, 0) > self.depth.get(body, 0)]
 
+    def radius_about(self, node: int) -> float:
+        """Return how far the shapes of a node's body reach from it, m."""
+        shapes, place = self.of_body(self.reading.body_of[node]), self.reading.offsets[node]
+        return max((float(np.max(np.linalg.norm(one.corners - place, axis=1))) for one in shapes), default=0.0)
+
+    def is_within(self, inner: BodyShape, outer: BodyShape) -> bool:
+        """Return whether the shape of one body lies within a larger one of another where the run begins."""
+        own, other = (self.reading.poses[one.lump.body] for one in (inner, outer))
+        if np.prod(inner.sides) > 0.5 * np.prod(outer.sides):
+            return False
+        corners = inner.center[None] if inner.kind == "point" else inner.corners
+        seen = (own.origin[0] + corners @ own.axes[0].T - other.origin[0]) @ other.axes[0]
+        return all(float(np.linalg.norm(outer.nearest(one) - one)) < 1e-3 * self.unit for one in seen)
+
+    def edges(self, body: int, mesh: Mesh, colour: str) -> None:
+        """Put the edges of a surface on a body, so that what is within is seen."""
+        ends, _, sharp = mesh.edges
+        for pair in mesh.vertices[ends[sharp]]:
+            self.line(body, pair, 1.4, colour)
+
     def tube(self, body: int, a: FloatArray, b: FloatArray, radius: float, colour: str) -> None:
         """Put a round bar between two points of a body."""
         length = float(np.linalg.norm(b - a))
@@ -180,6 +203,6 @@ class Bench:
         """Put a line on a body."""
         self.pieces.append(Piece(body, colour, points=np.asarray(points, dtype=float), size=width))
 
-    def surface(self, body: int, mesh: Mesh, colour: str) -> None:
-        """Put a surface on a body."""
-        self.pieces.append(Piece(body, colour, mesh))
+    def surface(self, body: int, mesh: Mesh, colour: str, up: FloatArray | None = None) -> None:
+        """Put a surface on a body; with its normal a plane that others stand on."""
+        self.pieces.append(Piece(body, colour, mesh, up=up))

@@ -57,8 +57,8 @@ class Joining:
     turns
         Whether a ``slide`` turns about its axis too.
     reach
-        Of a ``slide``, how far it goes along its axis in the run, m; of a ``plane``, how far from below node b it is
-        touched.
+        Of a ``slide``, how far it goes along its axis in the run, m; of a ``plane``, between which heights
+        over it node b is, m.
     curve
         Of a ``curve``, its points from node a in the axes of body a, m, shape (points, 3).
     """
