@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from atwood.integrators.dop853.ends_code import begin_code, project_code, watch_code
 from atwood.integrators.dop853.layout import COUNTS, NUMBERS, POINTERS, prologue
-from atwood.integrators.dop853.reference import GROWTH, RETREAT, SAFETY, SHRINKAGE
+from atwood.integrators.dop853.reference import APART, GROWTH, RETREAT, SAFETY, SHRINKAGE
 from atwood.integrators.dop853.stepping_code import ROWS, loop_code
 from atwood.integrators.dop853.tableau import NODES
 from atwood.integrators.explicit_problem import CALM, EDGE, STIFF
@@ -86,6 +86,7 @@ set_out:
   call void @shift(ptr %arrays, i64 %m)
   store i64 0, ptr %is_dense.at
   %first = load double, ptr %next.at
+  %likeness = load double, ptr %likeness.at
   %size = call double @llvm.fabs.f64(double %t)
   %least = fmul double %size, {exact(10.0 * 2.0**-52)}
   br label %attempt
@@ -156,8 +157,16 @@ def _attempt() -> str:
 stages:
 {_evaluations(tuple(range(1, 12)), "retreat")}
   call void @stage12(ptr %arrays, i64 %m, double %h)
-  %fifth = call double @squares5(ptr %arrays, i64 %m, double %relative)
+  %fifth.own = call double @squares5(ptr %arrays, i64 %m, double %relative)
   %third = call double @squares3(ptr %arrays, i64 %m, double %relative)
+  %h2 = fmul double %h, %h
+  %h4 = fmul double %h2, %h2
+  %alike = fmul double %h4, %likeness
+  %is_apart = fcmp olt double %alike, {exact(APART)}
+  %likely = select i1 %is_apart, double %alike, double {exact(APART)}
+  %fifth.before = fmul double %third, %likely
+  %is_small = fcmp olt double %fifth.own, %fifth.before
+  %fifth = select i1 %is_small, double %fifth.before, double %fifth.own
   %less = fmul double %third, {exact(0.01)}
   %both = fadd double %fifth, %less
   %product = fmul double %both, %count
@@ -218,6 +227,11 @@ def _acceptance() -> str:
   %next = select i1 %hold, double %h, double %grown
   store double %next, ptr %next.at
   store double %h, ptr %h.at
+  %spread = fmul double %h4, %third
+  %is_known = fcmp ogt double %spread, 0.0
+  %likeness.known = fdiv double %fifth.own, %spread
+  %likeness.new = select i1 %is_known, double %likeness.known, double 0.0
+  store double %likeness.new, ptr %likeness.at
   store double %t, ptr %t_old.at
   store double %t_new, ptr %t.at
   %stepped = add i64 %steps, 1

@@ -6,7 +6,7 @@ from atwood.integrators.machine_text import unpack
 
 __all__ = ["COUNTS", "NUMBERS", "POINTERS", "prologue"]
 
-NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked")
+NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked", "likeness")
 COUNTS = (
     "size",
     "padded",

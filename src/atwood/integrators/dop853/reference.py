@@ -28,12 +28,21 @@ from atwood.integrators.explicit_problem import (
 )
 from atwood.integrators.protocol import FloatArray, SolverOptions
 
-__all__ = ["GROWTH", "ORDER", "RETREAT", "SAFETY", "SHRINKAGE", "ReferenceStepper", "estimate"]
+__all__ = ["APART", "GROWTH", "ORDER", "RETREAT", "SAFETY", "SHRINKAGE", "ReferenceStepper", "estimate"]
 
 ORDER = 8
 SAFETY = 0.9
 GROWTH, SHRINKAGE = 6.0, 3.0
 """A step is at most so many times longer or shorter than the one before."""
+
+APART = 0.01
+"""The square of the estimate of fifth order is not taken to be larger by its likeness than this times the third's.
+
+The error is the product of two embedded estimates. Each has its zeros along a motion: where that of fifth order comes
+near to one, a step that errs by ten tolerances looks good, above all with few unknowns and where steps are tried again
+until one looks good. But the ratio of both, which grows as the square of the step, changes slowly from step to step. So
+the estimate is taken to be no smaller than the ratio in the step before makes it.
+"""
 
 RETREAT = 0.25
 """The share of a step that is tried where a step had no finite value."""
@@ -88,6 +97,7 @@ class ReferenceStepper:
         self._polynomial: FloatArray | None = None
         self._last = self._y
         self._edgy = self._calm = 0
+        self._likeness = self._tried = 0.0
         self._heeds = False
 
     @property
@@ -106,7 +116,7 @@ class ReferenceStepper:
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
         self._t = self._t_old = t
-        self._h = 0.0
+        self._h = self._likeness = 0.0
         self._y = self._y_old = y.copy()
         slope = self._slope(t, self._y)
         self._slopes[12] = slope
@@ -185,7 +195,7 @@ class ReferenceStepper:
             h *= 1.0 / min(SHRINKAGE, _root(error) / SAFETY) if isfinite(error) else RETREAT
             rejected = True
             self._counts.failures += 1
-        k[12] = slope
+        k[12], self._likeness = slope, self._tried
         self._watch_stability(h, new)
         following = h / min(max(_root(error) / SAFETY, 1.0 / GROWTH), SHRINKAGE)
         self._next = min(h, following) if rejected else following
@@ -214,7 +224,9 @@ class ReferenceStepper:
         new = y + h * (_WEIGHTS[12, :12] @ k[:12])
         scale = self._absolute + self._options.relative_tolerance * np.maximum(np.abs(y), np.abs(new))
         fifth, third = np.sum((_ERRORS @ k[:12] / scale) ** 2, axis=1)
-        return estimate(h, float(fifth), float(third), self._size), new
+        likely = max(fifth, third * min(h**4 * self._likeness, APART))
+        self._tried = fifth / (third * h**4) if third * h**4 > 0.0 else 0.0
+        return estimate(h, float(likely), float(third), self._size), new
 
     def _watch_stability(self, h: float, new: FloatArray) -> None:
         """Estimate the fastest decay from two slopes at the end of a step, and count steps at the edge of stability."""
