@@ -96,10 +96,9 @@ def plot(
 
 def _title(result: Result | SavedResult) -> str:
     if isinstance(result, Result):
-        name, form, level = result.assembly.flat.name, result.form, result.level
+        name, kind = result.assembly.flat.name, result.method
     else:
-        name, form, level = (str(result.metadata.get(key, "")) for key in ("scene", "form", "level"))
-    kind = f"{form} form" + (f" ({level})" if level else "") if form else ""
+        name, kind = (str(result.metadata.get(key, "")) for key in ("scene", "method"))
     return ", ".join(text for text in (name, kind) if text)
 
 
