@@ -27,7 +27,7 @@ from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIG
 from atwood.integrators.ida.pace import FIRST_CHUNK, Pace, first_chunk
 from atwood.integrators.ida.setup import IdaTuning, prepare
 from atwood.integrators.ida.states import checked_state, copied, is_finite
-from atwood.integrators.ida.sundae import REASONS
+from atwood.integrators.ida.sundae import REASONS, SHORTER, TOO_LONG
 from atwood.integrators.protocol import (
     Budget,
     FloatArray,
@@ -95,6 +95,7 @@ class NativeSession:
         self._opened = 0.0  # when it first went on
         self._problem = problem
         self._horizon = options.horizon
+        self._given_step = options.first_step or 0.0
         self._record = Record()
         state = checked_state(problem.size, t, y, yp)
         linear_solver = choose_linear_solver(problem, options, has_fixed=library().has_fixed_solvers)
@@ -375,7 +376,7 @@ class NativeSession:
     def _step(self) -> StepResult | None:
         """Take one internal step, and return an answer only if that failed."""
         before = self._reached
-        flag, t = self._solve(before + self._horizon, ONE_STEP)
+        flag, t = self._first_step() if self._is_first else self._solve(before + self._horizon, ONE_STEP)
         while self._behind and flag >= 0 and t <= before:
             # IDA first hands out what it has not yet handed out of the step that it has already taken.
             self._behind = flag == ROOT_RETURN
@@ -386,6 +387,19 @@ class NativeSession:
             self._reached = self._memory.time() if self._behind else t
             self._newest = None if self._behind else (t, self._memory.y.copy(), self._memory.yp.copy())
         return failure
+
+    def _first_step(self) -> tuple[int, float]:
+        """Take the first step; a shorter one where IDA, which makes it shorter by 4 ten times at most, gives up."""
+        state = self._here
+        for share in (1.0, *SHORTER):
+            if share < 1.0:
+                self._memory.call("IDASetInitStep", share * self._horizon)
+                self._restart(state)
+            flag, t = self._solve(state[0] + self._horizon, ONE_STEP)
+            if flag not in TOO_LONG:
+                break
+        self._memory.call("IDASetInitStep", self._given_step)
+        return flag, t
 
     def _stride(self, t_out: float) -> StepResult | None:
         """Take steps until a time is passed or a moment is over, and return an answer only if that failed."""

@@ -38,7 +38,7 @@ from atwood.integrators.protocol import (
     StepResult,
     choose_linear_solver,
 )
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 
 __all__ = ["SundaeSession", "open_session"]
 
@@ -47,6 +47,12 @@ NO_VALUE = (KernelEvaluationError, ArithmeticError)
 
 STALLED_STEPS = 50
 """So many steps in a row that do not move the time beyond rounding are a failure."""
+
+TOO_LONG = (-3, -4)
+"""Flags of IDA that at the start may mean that the first step was far too long."""
+
+SHORTER = (1e-9, 1e-15)
+"""Shares of the run that are then tried for it: IDA itself tries a thousandth and, from there, a millionth of that."""
 
 REASONS = {
     -2: "the tolerances ask for more accuracy than the arithmetic has",
@@ -113,6 +119,9 @@ class SundaeSession:
         self._size = problem.size
         self._horizon = options.horizon
         self._record = _Record()
+        self._create: Callable[[float], Any] = lambda share: _create_solver(
+            problem, replace(options, first_step=share * options.horizon), self._record
+        )
         self._solver = _create_solver(problem, options, self._record)
         self._locator = EventLocator(problem, options.horizon) if problem.events is not None else None
         self._no_events = (0,) * problem.event_count
@@ -189,7 +198,7 @@ class SundaeSession:
         self._root: Root | None = None
         self._searched = state[0]
         self._stalled = 0
-        self._stale = False
+        self._stale, self._is_first = False, True
         self._starts += 1
 
     def _run(self, t_out: float) -> StepResult:
@@ -246,6 +255,11 @@ class SundaeSession:
         """Take one internal step, and return an answer only if that failed."""
         t_before = self._newest[0]
         result = self._solver.step(t_before + self._horizon, "onestep", None)
+        for share in SHORTER if self._is_first else ():
+            if result.status in TOO_LONG:
+                self._solver = self._create(share)
+                self._solver.init_step(*self._newest)
+                result = self._solver.step(t_before + self._horizon, "onestep", None)
         if self._behind and result.t <= t_before:
             # After an interpolation IDA first hands out the step that it has already taken.
             result = self._solver.step(t_before + self._horizon, "onestep", None)
@@ -256,6 +270,7 @@ class SundaeSession:
             self._stale = True
             return self._stopped(Status.FAILED, "the solution is no longer finite")
         self._newest, self._behind = (result.t, result.y, result.yp), False
+        self._is_first = False
         self._steps += 1
         if result.t - t_before > 4 * ROUNDING * abs(result.t):
             self._stalled = 0
