@@ -62,7 +62,7 @@ from atwood.simulation.problem.arguments import (
     refuse_two_accuracies,
 )
 from atwood.simulation.problem.conditions import conditions_of
-from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.problem.options import RunOptions, sizes_of
 from atwood.simulation.run.made import Run, run_out_of_time
 from atwood.simulation.run.run import choice_at_start, run
 from atwood.simulation.run.tolerances import raised_where_too_tight
@@ -187,6 +187,7 @@ def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str |
     atol=ATOL,
     outputs=OUTPUTS,
     max_step=optional(number("a number of seconds above 0", above=0.0)),
+    first_step=optional(number("a number of seconds above 0", above=0.0)),
     solver=SOLVER,
     order=ORDER,
     step=optional(number("a number of seconds above 0", above=0.0)),
@@ -224,6 +225,7 @@ def simulate(
     accuracy: float | None = None,
     monitor: Any = None,
     nominal: Mapping[str, Any] | None = None,
+    first_step: float | None = None,
 ) -> Result:
     """Simulate a scene from its start to its end.
 
@@ -249,8 +251,9 @@ def simulate(
         Limits; a run that meets one returns what it has, and says so in its status. The time counts from this call
         on; a result may have no samples where it does not last to find the start. What is left of it holds for
         `Result.energy`, which makes some runs again.
-    max_step
-        The largest step, s.
+    max_step, first_step
+        The largest step, and the first one at the start and after each event, s, which is worked out if not given: a
+        shorter one helps where forces set in far faster than they act at the start.
     solver
         ``"ida"``: SUNDIALS IDA with the equations as machine code. ``"ida-sundae"``: the same method through
         scikit-sundae with the equations as Python, the reference. ``"explicit"``: a Runge-Kutta method of order 8(5,3),
@@ -305,12 +308,10 @@ def simulate(
         If the solver fails.
     """
     clock = Clock(max_seconds)
-    refuse_idle_settings(solver, order, step)
+    refuse_idle_settings(solver, order, step, first_step)
     refuse_two_accuracies(accuracy, rtol, atol, step)
     with watching() as stopwatch:
         assembly = assembly_of(scene, form=form, level=level, orientation=orientation)
-        if nominal:
-            from atwood.simulation.problem.nominal import read_nominal
         flat = assembly.flat
         end = flat.t_end if t_end is None else float(t_end)
         with told(progress, flat.name, partial(_share, flat.t_start, end)) as watch:
@@ -323,13 +324,14 @@ def simulate(
                 max_seconds=max_seconds,
                 progress=watch,
                 max_step=max_step,
+                first_step=first_step,
                 solver=solver,
                 order=order,
                 step=step,
                 samples=samples,
                 structure=structure,
                 conditions=conditions_of(until, record),
-                nominal=read_nominal(assembly, nominal) if nominal else {},
+                nominal=sizes_of(assembly, nominal),
             )
             made, second, said = _solve_to(accuracy, assembly, options, clock)
     if said:

@@ -90,6 +90,7 @@ def _runs() -> Iterator[Call]:
             "orientation": "optional word",
             "outputs": "times",
             "max_step": "optional positive",
+            "first_step": "optional positive",
             "samples": "whole",
             "structure": "flag",
             "atol": "optional positive",

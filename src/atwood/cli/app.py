@@ -163,6 +163,7 @@ def info_command(
 @click.option("--max-steps", type=click.IntRange(min=1), help="Stop after so many steps.")
 @click.option("--max-seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after so many seconds.")
 @click.option("--max-step", type=click.FloatRange(min=0.0, min_open=True), help="The largest step, s.")
+@click.option("--first-step", type=click.FloatRange(min=0.0, min_open=True), help="The first step, s.")
 @click.option("--order", type=click.Choice(["2", "4", "6", "8", "10", "12"]), help="Order of gauss and composition.")
 @click.option("--step", type=click.FloatRange(min=0.0, min_open=True), help="Step of gauss and composition, s.")
 @click.option("--structure", is_flag=True, help="Nothing needs to move: it is a truss.")

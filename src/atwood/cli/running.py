@@ -43,6 +43,7 @@ class RunRequest:
     max_steps: int | None = None
     max_seconds: float | None = None
     max_step: float | None = None
+    first_step: float | None = None
     order: str | None = None
     step: float | None = None
     structure: bool = False
@@ -112,6 +113,7 @@ def _run(request: RunRequest) -> Result:
                 max_steps=request.max_steps,
                 max_seconds=request.max_seconds,
                 max_step=request.max_step,
+                first_step=request.first_step,
                 structure=request.structure,
                 until=request.until or None,
                 record=request.record or None,

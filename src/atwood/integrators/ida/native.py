@@ -395,6 +395,7 @@ class NativeSession:
             if share < 1.0:
                 self._memory.call("IDASetInitStep", share * self._horizon)
                 self._restart(state)
+                self._starts -= 1  # which nobody asked for
             flag, t = self._solve(state[0] + self._horizon, ONE_STEP)
             if flag not in TOO_LONG:
                 break

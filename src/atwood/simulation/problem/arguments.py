@@ -145,12 +145,12 @@ _ONE = either(Kind(_WATCHED, _condition), CALLBACK)
 CONDITIONS = optional(Kind(_WATCHED, lambda value: either(CALLBACK, each(_ONE, _WATCHED)).read(value)))
 
 
-def refuse_idle_settings(solver: str, order: int | None, step: float | None) -> None:
-    """Refuse an order or a step for a solver that chooses these itself.
+def refuse_idle_settings(solver: str, order: int | None, step: float | None, first_step: float | None = None) -> None:
+    """Refuse an order or a step for a solver that chooses these itself, and a first step for one that does not.
 
     Parameters
     ----------
-    solver, order, step
+    solver, order, step, first_step
         What was asked for.
 
     Raises
@@ -164,6 +164,8 @@ def refuse_idle_settings(solver: str, order: int | None, step: float | None) -> 
                 f"{name}={value!r} is for the solvers 'gauss' and 'composition'; {solver!r} chooses its own",
                 advice="Give solver='gauss', or rtol for the accuracy.",
             )
+    if first_step is not None and solver in FIXED_STEPS:
+        raise UsageError(f"all steps of {solver!r} are equal", where="first_step", advice="Give step.")
 
 
 def refuse_two_accuracies(accuracy: float | None, rtol: float, atol: float | None, step: float | None) -> None:
@@ -188,7 +190,13 @@ def refuse_two_accuracies(accuracy: float | None, rtol: float, atol: float | Non
             )
 
 
-def check_span(begin: float, end: float, max_step: float | None = None, step: float | None = None) -> None:
+def check_span(
+    begin: float,
+    end: float,
+    max_step: float | None = None,
+    step: float | None = None,
+    first_step: float | None = None,
+) -> None:
     """Refuse a run that does not go forwards, that takes no time, or that would take too many steps.
 
     Parameters
@@ -197,8 +205,8 @@ def check_span(begin: float, end: float, max_step: float | None = None, step: fl
         Times of its start and of its end, s.
     max_step
         The largest step, s.
-    step
-        The step, where all are equal, s.
+    step, first_step
+        The step, where all are equal, and else the first one, s.
 
     Raises
     ------
@@ -212,6 +220,12 @@ def check_span(begin: float, end: float, max_step: float | None = None, step: fl
         raise UsageError(
             f"from the start, t = {begin:g}, to the end, t = {end!r}, is too short a time for floating-point numbers",
             advice="Give a later t_end.",
+        )
+    least = 16.0 * sys.float_info.epsilon * max(abs(begin), abs(end))
+    if first_step is not None and not least <= first_step <= span:
+        raise UsageError(
+            f"first_step cannot be {show(first_step)} in a run from t = {begin:g} to {end:g}",
+            advice=f"Give a time between {least:.0e} and {span:.0e} s.",
         )
     for name, longest in (("max_step", max_step), ("step", step)):
         if longest is None or span / longest <= _TOO_MANY_STEPS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,10 @@ from atwood.late import dataclass
 from atwood.simulation.problem.conditions import Condition
 from atwood.tolerances import tolerances
 
-__all__ = ["FIXED_STEPS", "LEAST", "SOLVERS", "RunOptions", "Samples", "how_solved", "sample_times"]
+if TYPE_CHECKING:
+    from atwood.forms.assembly import Assembly
+
+__all__ = ["FIXED_STEPS", "LEAST", "SOLVERS", "RunOptions", "Samples", "how_solved", "sample_times", "sizes_of"]
 
 
 SOLVERS = {
@@ -76,6 +80,8 @@ class RunOptions:
         Called with the time reached.
     max_order, max_step
         Limits for the method.
+    first_step
+        Its first step after each start, s; None where it works that out.
     samples
         A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it.
     solver
@@ -112,6 +118,7 @@ class RunOptions:
     step: float | None = None
     accuracy: float | None = None
     nominal: Mapping[str, float] = field(default_factory=dict)
+    first_step: float | None = None
 
     def out_of_time(self, t: float) -> str:
         """Return what is said of a run that its limit of time ended, at a time of its own."""
@@ -212,3 +219,12 @@ def sample_times(t: float, options: RunOptions) -> Samples:
     shown = np.concatenate([np.ones(len(asked), dtype=bool), np.zeros(len(filling), dtype=bool)])
     order = np.argsort(times)
     return Samples(times[order], shown[order], np.zeros(len(times), dtype=bool))
+
+
+def sizes_of(assembly: Assembly, nominal: Mapping[str, Any] | None) -> Mapping[str, float]:
+    """Return what `atwood.simulation.problem.nominal.read_nominal` makes of sizes, if any were given."""
+    if not nominal:
+        return {}
+    from atwood.simulation.problem.nominal import read_nominal
+
+    return read_nominal(assembly, nominal)

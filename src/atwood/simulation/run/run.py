@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.clock import GRACE, Clock, TimeIsUp
-from atwood.errors import AtwoodError, SolveError, StartError, UnsupportedError
+from atwood.errors import AtwoodError, StartError, UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
@@ -38,6 +38,7 @@ from atwood.simulation.run.outcome import Outcome, Segment, shortest_mode
 from atwood.simulation.run.record import Recorder, SegmentRecord
 from atwood.simulation.run.segment import run_segment
 from atwood.simulation.run.session import KeptSession
+from atwood.simulation.run.stuck import failed
 from atwood.simulation.run.tolerances import allowed
 from atwood.stages import stage
 from atwood.topology.orientation_coordinates import Orientation
@@ -74,7 +75,7 @@ def run(
     SolveError
         If the solver fails; what came before is in its `run` attribute.
     """
-    check_span(start.time, options.t_end, options.max_step, options.step)
+    check_span(start.time, options.t_end, options.max_step, options.step, options.first_step)
     check_solver(options.solver)
     options = allowed(options)
     clock = Clock(options.max_seconds) if clock is None else clock
@@ -387,9 +388,7 @@ class _Walk:
             message = outcome.error.message
         made = self._run_so_far(status, message)
         if status == "failed":
-            error = outcome.error or SolveError(
-                message, where=self.assembly.flat.name, advice="Look at what came before: the error's `run`."
-            )
+            error = outcome.error or failed(message, self.assembly.flat.name, self.t > self.start.time)
             error.run = made  # type: ignore[attr-defined]
             raise error
         return made

@@ -65,6 +65,7 @@ class SolverRequest:
             absolute_tolerances=self.plan.tolerances(
                 min(options.absolute_tolerance or relative, loosest), options.nominal
             ),
+            first_step=options.first_step,
             max_step=options.max_step,
             max_order=options.max_order,
             horizon=self.horizon(t),

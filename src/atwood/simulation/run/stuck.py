@@ -9,7 +9,18 @@ from atwood.integrators.protocol import StepResult
 from atwood.simulation.dynamics.scales import motion_names, motion_scales
 from atwood.simulation.problem.problem import Plan
 
-__all__ = ["explain_stuck"]
+__all__ = ["explain_stuck", "failed"]
+
+
+_LATER, _AT_START = (
+    "Look at what came before: the error's `run`.",
+    "Nothing came before: look at what acts at the start, or try a first_step far shorter than it takes to set in.",
+)
+
+
+def failed(message: str, scene: str, has_moved: bool) -> SolveError:
+    """Return the error of a solver that failed, at the start of a run or later."""
+    return SolveError(message, where=scene, advice=_LATER if has_moved else _AT_START)
 
 
 def explain_stuck(plan: Plan, failed: StepResult) -> SolveError | None:

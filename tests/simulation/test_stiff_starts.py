@@ -1,0 +1,98 @@
+"""Stiff scenes that are sound from their start on, against exact solutions of linear systems."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from atwood import Scene, UsageError, simulate, sin
+from atwood_library import Damper, Force, Ground, PointMass, Spring
+
+
+def chain(
+    stiffness: tuple[float, ...], damping: tuple[float, ...], rate: float, at: float = 0.0, pace: float = 1.0
+) -> Scene:
+    """Return masses of 1 kg, each tied to the one before by k and c; the last is pushed by the least k sin(rate t)."""
+    scene = Scene(space="line", line_axis=(1.0, 0.0, 0.0))
+    before: Any = scene.add("ground", Ground()).frame
+    for i, (k, c) in enumerate(zip(stiffness, damping, strict=True)):
+        mass = scene.add(f"m{i}", PointMass(mass=1.0))
+        spring, damper = Spring(stiffness=k * pace**2, natural_length=1.0), Damper(damping=c * pace)
+        for name, tie in ((f"s{i}", spring), (f"d{i}", damper)):
+            scene.add(name, tie)
+            scene.connect(before, tie.a)
+            scene.connect(tie.b, mass.point)
+        scene.start.update({f"m{i}.position.x": i + 1.0 + at, f"m{i}.velocity.x": 0.0})
+        before = mass.point
+    size = min(stiffness) * pace**2
+    push = scene.add("push", Force(value=lambda t: size * sin(rate * pace * t)))
+    scene.connect(push.point, before)
+    return scene
+
+
+def exact(stiffness: tuple[float, ...], damping: tuple[float, ...], rate: float, at: float, t: float) -> Any:
+    """Return displacements of the masses from balance by the exponential of the matrix with the push as two states."""
+    n = len(stiffness)
+    matrix = np.zeros((2 * n + 2, 2 * n + 2))
+    matrix[:n, n : 2 * n] = np.eye(n)
+    for rows, values in ((0, stiffness), (n, damping)):
+        for i, value in enumerate(values):
+            ends = [i] if i == 0 else [i - 1, i]
+            for a in ends:
+                for b in ends:
+                    matrix[n + a, rows + b] -= value * (1.0 if a == b else -1.0)
+    matrix[2 * n - 1, 2 * n] = min(stiffness)
+    matrix[2 * n, 2 * n + 1], matrix[2 * n + 1, 2 * n] = rate, -rate
+    start = np.zeros(2 * n + 2)
+    start[:n], start[-1] = at, 1.0
+    return (expm(matrix * t) @ start)[:n]
+
+
+CASES = {
+    "critical": ((1e8,), (2e4,), 3.0, 0.0),
+    "overdamped": ((1e6,), (1e6,), 3.0, 0.0),
+    "stiffer": ((1e10,), (2e5,), 2.0, 0.0),
+    "faster push": ((1e8,), (2e4,), 100.0, 0.0),
+    "chain": ((1e4, 1e8), (200.0, 2e4), 1.0, 0.0),
+    "off balance": ((1e8,), (1e6,), 3.0, 1e-3),
+}
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("case", CASES)
+def test_a_sound_start_runs_at_the_default_tolerance(case: str, form: str) -> None:
+    stiffness, damping, rate, at = CASES[case]
+    run = simulate(chain(stiffness, damping, rate, at), form=form, t_end=0.1, outputs=11)
+    found = [run[f"m{i}.position.x"][-1] - i - 1.0 for i in range(len(stiffness))]
+    assert found == pytest.approx(exact(stiffness, damping, rate, at, 0.1), abs=1e-7)
+
+
+@pytest.mark.parametrize("solver", ["ida", "ida-sundae"])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8])
+def test_both_ways_to_ida_find_their_first_step(solver: str, rtol: float) -> None:
+    stiffness, damping, rate, at = (1e10,), (2e5,), 3.0, 0.0
+    run = simulate(chain(stiffness, damping, rate), solver=solver, rtol=rtol, t_end=1e-3, outputs=3)
+    assert run["m0.position.x"][-1] - 1.0 == pytest.approx(
+        exact(stiffness, damping, rate, at, 1e-3)[0], abs=10.0 * rtol
+    )
+
+
+@pytest.mark.parametrize("solver", ["explicit", "taylor", "ida", "ida-sundae"])
+def test_a_first_step_is_taken(solver: str) -> None:
+    scene = chain((100.0,), (1.0,), 3.0)
+    runs = [simulate(scene, solver=solver, t_end=1.0, outputs=3, first_step=one) for one in (1e-12, None)]
+    assert runs[0].statistics.steps != runs[1].statistics.steps
+    if solver != "ida":  # which is not asked for single steps
+        one = simulate(scene, solver=solver, t_end=1.0, outputs=3, max_steps=1, first_step=1e-7)
+        assert one.time[-1] == pytest.approx(1e-7)
+    run = simulate(scene, solver=solver, t_end=1.0, outputs=3, first_step=0.5)
+    assert run["m0.position.x"][-1] - 1.0 == pytest.approx(exact((100.0,), (1.0,), 3.0, 0.0, 1.0)[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("given", [0.0, -1.0, 1e-40, 3.0, "soon"])
+def test_first_steps_that_are_none_are_refused(given: Any) -> None:
+    with pytest.raises(UsageError, match="first_step"):
+        simulate(chain((100.0,), (1.0,), 3.0), t_end=1.0, first_step=given)
+    with pytest.raises(UsageError, match="first_step"):
+        simulate(chain((100.0,), (1.0,), 3.0), t_end=1.0, first_step=0.1, solver="gauss")
