@@ -126,10 +126,19 @@ class LinearScene:
         self.assembly, self.form, self.inputs = assembly, form, tuple(inputs)
         self.equations: Equations = assembly.regular if form == "reduced" else assembly.maximal
         self.tangents: Tangents = find_tangents(self.equations)
-        self.length = scene_length(assembly)
-        self.sizes = motion_scales(self.equations, self.length)
-        self.displacement_sizes = np.array([self.length if unit == "m" else 1.0 for unit in self.tangents.units])
+        self._measure(scene_length(assembly))
         self._bound: BoundKernel | None = None
+
+    def _measure(self, length: float) -> None:
+        self.length = length
+        self.sizes = motion_scales(self.equations, length)
+        self.displacement_sizes = np.array([length if unit == "m" else 1.0 for unit in self.tangents.units])
+
+    def sized(self, length: float) -> LinearScene:
+        """Return the same with another size of the scene, m."""
+        found = copy(self)
+        found._measure(length)
+        return found
 
     # -- programs -------------------------------------------------------------------------------------------------
 

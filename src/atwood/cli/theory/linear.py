@@ -177,7 +177,8 @@ def show_equilibria(
         return
     out = writer()
     out.line((name, "bold"), (f": {len(found)} equilibri{'um' if len(found) == 1 else 'a'}", ""))
-    rows = [["stable" if one.stable else "unstable", f"{one.growth_rate:.6g}", _values(one.values)] for one in found]
+    kinds = [one.stability + (f", family of {one.family}" if one.family else "") for one in found]
+    rows = [[kind, f"{one.growth_rate:.6g}", _values(one.values)] for kind, one in zip(kinds, found, strict=True)]
     out.table(["", "growth, 1/s>", "where"], rows)
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
 import numpy as np
 
-from atwood.analysis.linear.rest import Rest, is_at_rest, same_rest, seek_rest
+from atwood.analysis.linear.degenerate import Degenerate, follow_null_space
+from atwood.analysis.linear.rest import Rest, RestSearch, difference, wrapped
 from atwood.arguments import BY_PATH, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, ParameterError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
+from atwood.mechanics.build import extent
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE
@@ -35,6 +37,17 @@ _LEAST = 48
 _IDLE = 24
 """For each independent coordinate, so many starts one after another that lead to nothing new end the search."""
 
+_ALONE = 5.0
+
+_NEARBY = 4
+"""Of so many starts one is ten to a thousand times nearer to the scene's own start, where a well may be narrow."""
+
+_MEASURED = 9
+"""At so many places of the region it is looked how large accelerations are."""
+
+_IMAGED = 24
+"""Of so many states images are looked at as well."""
+
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
@@ -45,14 +58,22 @@ class Equilibrium:
     values
         Coordinates by path, m or rad; angles within half a turn of zero unless the region asks for others.
     stable
-        Whether no small deviation grows: of the linear model, which says nothing of deviations that keep their size.
+        Whether no small deviation grows: by the linear model, which says nothing of deviations that keep their size.
+        Where that has no stiffness along some direction, by the first higher derivative that is not zero.
     modes
         Its normal modes; where equations depend on time though the state keeps still, those at the scene's start.
+    stability
+        ``"stable"``, ``"unstable"``, or ``"undecided"`` where no derivative that is looked at decides.
+    family
+        Along so many directions rest goes on: 0 of one that stands alone; 1 of a cart that may stand anywhere, or of a
+        ball in a circular groove. One state stands for all of a family.
     """
 
     values: Mapping[str, float]
     stable: bool
     modes: NormalModes = field(repr=False)
+    stability: str = ""
+    family: int = 0
 
     @property
     def growth_rate(self) -> float:
@@ -61,7 +82,8 @@ class Equilibrium:
 
     def __str__(self) -> str:
         named = ", ".join(f"{path} = {value:.6g}" for path, value in list(self.values.items())[:6])
-        return f"{'stable  ' if self.stable else 'unstable'}  {named}"
+        more = f"   (one of a family in {self.family} direction{'s' * (self.family > 1)})" if self.family else ""
+        return f"{self.stability:<9} {named}{more}"
 
 
 class Equilibria(list[Equilibrium]):
@@ -73,7 +95,16 @@ class Equilibria(list[Equilibrium]):
 
     def to_data(self) -> list[dict[str, Any]]:
         """Return them as plain data, for JSON."""
-        return [{"values": dict(one.values), "stable": one.stable, "modes": one.modes.to_data()} for one in self]
+        return [
+            {
+                "values": dict(one.values),
+                "stable": one.stable,
+                "stability": one.stability,
+                "family": one.family,
+                "modes": one.modes.to_data(),
+            }
+            for one in self
+        ]
 
     def __str__(self) -> str:
         shown = [str(one) for one in self[:8]]
@@ -115,17 +146,31 @@ def equilibria(scene: Model | Assembly, *, region: Mapping[str, Any] | None = No
         If the region names no coordinate.
     """
     point = find_operating_point(scene, {}, ())
+    point = replace(point, scene=point.scene.sized(_length(point)))
     bounds = _bounds(point, region or {})
-    found, seen_moving = _search(point, bounds)
-    inside = [one for one in found if _is_inside(point, one, bounds)]
+    lengths = [k for _, k in point.scene.tangents.plain if point.scene.tangents.names[k] in (region or {})]
+    widths = [float(np.ptp(bounds[k])) / 4.0 for k in lengths if point.scene.tangents.units[k] == "m"]
+    point = replace(point, scene=point.scene.sized(max(widths, default=point.scene.length)))
+    search = RestSearch(point.scene, balance_of(point.assembly, "reduced"), point.t, point.kept)
+    found, seen_moving = _found(point, search, bounds)
+    settled = [(one, _settled(point, search, one, bounds)) for one in found]
+    inside = [(one, q) for one, q in settled if _is_inside(point, q, bounds)]
     if not inside:
-        raise _none_found(point, found, bool(region), seen_moving)
-    made = [_equilibrium(point, one, bounds) for one in inside]
+        raise _none_found(point, len(found), bool(region), seen_moving)
+    made = [_equilibrium(point, search, one, q) for one, q in inside]
     made.sort(key=lambda one: tuple(round(value, 9) for value in one.values.values()))
     return Equilibria(made, point.assembly.flat.name)
 
 
-def _none_found(point: OperatingPoint, found: list[Rest], given: bool, seen_moving: bool) -> AtwoodError:
+def _length(point: OperatingPoint) -> float:
+    """Return the size of a scene; of a body alone in a field some times as far as from the origin to its start."""
+    away = [abs(float(point.q[i])) for i, k in point.scene.tangents.plain if point.scene.tangents.units[k] == "m"]
+    if extent(point.assembly.mechanism) or point.scene.length != 1.0:
+        return point.scene.length
+    return _ALONE * max(away, default=0.0) or point.scene.length
+
+
+def _none_found(point: OperatingPoint, found: int, given: bool, seen_moving: bool) -> AtwoodError:
     name = point.assembly.flat.name
     if seen_moving:
         return UsageError(
@@ -133,7 +178,7 @@ def _none_found(point: OperatingPoint, found: list[Rest], given: bool, seen_movi
             where=name,
             advice="Equilibria belong to scenes whose drives and sources keep still or turn evenly.",
         )
-    more = f"; {len(found)} lie outside of it" if found and given else ""
+    more = f"; {found} lie outside of it" if found and given else ""
     advice = "Give a larger region." if found and given else "Look for a steady motion instead, with `trim`."
     return UsageError(f"there is no equilibrium in the region{more}", where=name, advice=advice)
 
@@ -168,26 +213,60 @@ def _in_si(value: Any, unit: str, path: str) -> float:
     return float(parse_quantity(value, parse_unit(unit), path)) if isinstance(value, str) else float(value)
 
 
-def _search(point: OperatingPoint, bounds: FloatArray) -> tuple[list[Rest], bool]:
-    """Return the states of rest that Newton's method finds from places all over the region."""
-    scene, balance = point.scene, balance_of(point.assembly, "reduced")
-    free = max(1, len(scene.tangents) - len(point.kept))
-    starts = min(_MOST_STARTS, _STARTS * free)
-    found: list[Rest] = []
-    seen_moving, idle = False, 0
-    for q in [point.q, *_places(point, bounds, starts)]:
-        rest = seek_rest(scene, balance, point.t, q, point.kept)
-        idle += 1
-        if idle > max(_LEAST, _IDLE * free):
-            break
-        if rest is None or any(same_rest(scene, one, rest, point.t, point.kept, balance) for one in found):
+def _found(point: OperatingPoint, search: RestSearch, bounds: FloatArray) -> tuple[list[Degenerate], bool]:
+    """Return the states of rest that Newton's method finds from places all over the region, and their images."""
+    free = max(1, len(point.scene.tangents) - len(point.kept))
+    places = [point.q, *_places(point, bounds, min(_MOST_STARTS, _STARTS * free))]
+    search.measure(places[:_MEASURED])
+    found: list[Degenerate] = []
+    images: list[FloatArray] = []
+    seen_moving, idle, taken = False, 0, 0
+    while (taken < len(places) and idle <= max(_LEAST, _IDLE * free)) or images:
+        is_image = bool(images)
+        q = images.pop() if is_image else places[taken]
+        taken += not is_image
+        rest = search.seek(q, falls=not is_image and taken % 3 == 1)
+        idle += not is_image
+        if rest is None or any(search.same(one.rest, rest) for one in found):
             continue
         idle = 0
-        if not is_at_rest(scene, rest, point.t, point.kept, _LATER):
+        if not search.stays(rest, _LATER):
             seen_moving = True
             continue
-        found.append(rest)
+        made = follow_null_space(search, rest, lambda: _has_gyroscopic(search, rest))
+        if made.rest is not rest and any(search.same(one.rest, made.rest) for one in found):
+            continue
+        if len(found) < _IMAGED:
+            images += _images(point, made.rest, [one.rest for one in found])
+        images += made.beside
+        found.append(made)
     return found, seen_moving
+
+
+def _images(point: OperatingPoint, rest: Rest, others: Sequence[Rest]) -> list[FloatArray]:
+    """Return places where a symmetric scene has more: mirrored, half a turn away, and halfway to the others."""
+    made = []
+    for i, k in point.scene.tangents.plain:
+        for value in (-rest.q[i], rest.q[i] + np.pi) if point.scene.tangents.units[k] == "rad" else (-rest.q[i],):
+            made.append(rest.q.copy())
+            made[-1][i] = value
+    for one in others:
+        apart = wrapped(point.scene, difference(point.scene, rest.q, one.q))
+        turned = np.array([unit == "rad" for unit in point.scene.tangents.units]) * 2.0 * np.pi
+        made += [point.scene.tangents.moved(rest.q, 0.5 * (apart - turn * np.sign(apart))) for turn in (0.0, turned)]
+    return made
+
+
+def _has_gyroscopic(search: RestSearch, rest: Rest) -> bool:
+    """Return whether velocity terms act at rest that take no energy: an antisymmetric part beside rounding."""
+    count, own = len(search.scene.tangents), list(rest.minimal.speeds)
+    n = len(rest.minimal.displacements)
+    sizes = search.scene.sizes
+    mass, _ = search.stiffness(rest)
+    by = rest.flow.acceleration[:, count : count + len(sizes)] @ rest.minimal.speed[:, n : n + len(own)]
+    by = mass @ (by[own] / sizes[own][:, None] * sizes[own])
+    unit = float(np.max(np.abs(mass), initial=0.0)) * np.sqrt(search.slope)
+    return bool(np.max(np.abs(by - by.T), initial=0.0) > 1e-9 * unit)
 
 
 _LATER = (0.3819660112501051, 1.2360679774997896)
@@ -203,11 +282,12 @@ def _places(point: OperatingPoint, bounds: FloatArray, count: int) -> list[Float
 
     spread = qmc.Halton(size, seed=7).random(count)
     made = []
-    for row in spread:
+    for number, row in enumerate(spread):
         values = bounds[:, 0] + row * (bounds[:, 1] - bounds[:, 0])
+        near = 10.0 ** -(1 + number // _NEARBY % 3) if number % _NEARBY == _NEARBY - 1 else 1.0
         q = point.q.copy()
         for i, k in scene.tangents.plain:
-            q[i] = values[k]
+            q[i] = values[k] if near == 1.0 else q[i] + near * (values[k] - q[i])
         moved = np.zeros(size)
         for _, numbers in scene.tangents.orientation_coordinates:
             moved[list(numbers)] = values[list(numbers)]
@@ -230,29 +310,63 @@ def _wrapped(point: OperatingPoint, rest: Rest, bounds: FloatArray) -> dict[int,
     return found
 
 
-def _is_inside(point: OperatingPoint, rest: Rest, bounds: FloatArray) -> bool:
-    values = _wrapped(point, rest, bounds)
-    flat = _flat_displacements(rest)
+def _settled(point: OperatingPoint, search: RestSearch, one: Degenerate, bounds: FloatArray) -> FloatArray:
+    """Return the coordinates of a state as they are told; each change of them is put into the balance.
+
+    Angles come into the region by whole turns, what is zero but for rounding is zero, and what means nothing, or may be
+    anywhere, stays where it starts.
+    """
+    q = one.rest.q
+
+    def is_one(there: FloatArray) -> bool:
+        rest = search.at(there)
+        return rest is not None and rest.push <= max(one.rest.push, 1e-12 * search.push)
+
+    wrapped_values = _wrapped(point, one.rest, bounds)
+    for i, k in point.scene.tangents.plain:
+        size, start = point.scene.displacement_sizes[k], float(point.q[i])
+        near = 0.0 if abs(wrapped_values[i]) <= _TINY * size else wrapped_values[i]
+        # At a pole itself angles have no accelerations.
+        for value in (wrapped_values[i], wrapped_values[i] + 1e-4 * _TINY * size, near, start):
+            there = q.copy()
+            there[i] = value
+            if abs(value - q[i]) <= 1e-3 * _TINY * size * (value != 0.0) or not is_one(there):
+                continue
+            if value == start and not search.alike(there, q):
+                halfway = 0.5 * (there + q)
+                if not one.family or not is_one(halfway):
+                    continue
+            q = there
+    return q
+
+
+_TINY = 1e-9
+"""Relative to the scene's sizes: values below it are told as zero, if that is as much at rest."""
+
+
+def _is_inside(point: OperatingPoint, q: FloatArray, bounds: FloatArray) -> bool:
     for i, k in point.scene.tangents.plain:
         margin = 1e-9 * max(1.0, abs(bounds[k, 0]), abs(bounds[k, 1]))
-        if k not in flat and not bounds[k, 0] - margin <= values[i] <= bounds[k, 1] + margin:
+        if not bounds[k, 0] - margin <= q[i] <= bounds[k, 1] + margin:
             return False
     return True
 
 
-def _flat_displacements(rest: Rest) -> set[int]:
-    """Return the displacements along which nothing changes: their value means nothing."""
-    columns = np.max(np.abs(rest.slopes), axis=0, initial=0.0)
-    return {k for k, size in zip(rest.minimal.displacements, columns, strict=True) if size < 1e-9}
-
-
-def _equilibrium(point: OperatingPoint, rest: Rest, bounds: FloatArray) -> Equilibrium:
-    q = rest.q.copy()
-    flat = _flat_displacements(rest)
-    for (i, value), (_, k) in zip(_wrapped(point, rest, bounds).items(), point.scene.tangents.plain, strict=True):
-        q[i] = point.q[i] if k in flat else value  # what does not matter stays where it starts
+def _equilibrium(point: OperatingPoint, search: RestSearch, one: Degenerate, q: FloatArray) -> Equilibrium:
     there = moved_to(point, q, np.zeros_like(point.u))
     modes = modes_of(there, is_steady=True)
     speeds = set(list(values_at(there))[len(point.scene.tangents.plain) :])
     values = {path: value for path, value in values_at(there).items() if path not in speeds}
-    return Equilibrium(values, modes.is_stable, modes)
+    for i, k in point.scene.tangents.plain:
+        if abs(q[i]) <= 1e-3 * _TINY * point.scene.displacement_sizes[k]:
+            values[point.scene.tangents.names[k]] = 0.0
+    # Where there is no stiffness, eigenvalues are the root of what is left of it.
+    if one.verdict and float(np.max(modes.growth_rates, initial=0.0)) <= _CREEPS * np.sqrt(search.slope):
+        stability = one.verdict
+    else:
+        stability = "stable" if modes.is_stable else "unstable"
+    return Equilibrium(values, stability == "stable", modes, stability, one.family)
+
+
+_CREEPS = 2e-3
+"""Relative to the square root of slopes elsewhere: growth rates that are the root of a stiffness without digits."""
