@@ -1,8 +1,8 @@
 """Rest at which the linear model decides nothing: directions without stiffness, followed by higher derivatives.
 
 Along the null space of the stiffness, with all else in balance, the forces are a reduced field of as many components
-(Lyapunov and Schmidt; Golubitsky and Schaeffer, Singularities and Groups in Bifurcation Theory I, section 1.3). Where it
-is zero the state is one of a family. On a line it is a polynomial through samples: the first coefficient that is not
+(Lyapunov and Schmidt; Golubitsky and Schaeffer, Singularities and Groups in Bifurcation Theory I, section 1.3). Where
+it is zero the state is one of a family. On a line it is a polynomial through samples: the first coefficient that is not
 rounding is the order of the root, and the one before says where the root is. Rest is stable where the effective
 potential has a strict minimum (Lagrange and Dirichlet), whatever dampers and gyroscopic forces do; where it falls, only
 gyroscopic forces can help, and forces without a potential are not decided.
@@ -10,7 +10,6 @@ gyroscopic forces can help, and forces without a potential are not decided.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -70,19 +69,19 @@ class _Field:
         self.rises = bool(np.any(values[~soft] > 0.0))  # forces lead away
 
     def at(self, along: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        """Return the coordinates and the forces on the null space at a displacement in it; None where there are none."""
+        """Return the coordinates and the forces on the null space at a displacement in it; None for none."""
         place = self.null @ along
         for _ in range(30):
-            q = self.search.moved(self.rest, place)
-            now = self.search.at(q, self.rest.minimal)
+            now = self.search.at(self.search.moved(self.rest, place), self.rest.minimal)
             if now is None:
                 return None
+            q = now.q
             force = self.search.stiffness(now)[0] @ now.accelerations
             step = -self._held @ (self._inverse * (self._held.T @ force))
             if float(np.max(np.abs(step), initial=0.0)) <= 1e-14:
                 break
             place = place + step
-        return now.q, np.asarray(self.null.T @ force)
+        return q, np.asarray(self.null.T @ force)
 
     def line(self, axis: FloatArray) -> tuple[Polynomial, float] | None:
         """Return the force along an axis of the null space as a polynomial in shares of a reach, and the reach."""
@@ -100,15 +99,13 @@ class _Field:
         return None
 
 
-def follow_null_space(search: RestSearch, rest: Rest, has_gyroscopic: Callable[[], bool]) -> Degenerate:
+def follow_null_space(search: RestSearch, rest: Rest) -> Degenerate:
     """Return what higher derivatives say of a state of rest.
 
     Parameters
     ----------
     search, rest
         The scene, and the state.
-    has_gyroscopic
-        Says whether velocity terms act that take no energy, such as those of Coriolis.
     """
     n = len(rest.minimal.displacements)
     if not n or n != len(rest.minimal.speeds) or rest.slopes.shape != (n, n):
@@ -132,7 +129,7 @@ def follow_null_space(search: RestSearch, rest: Rest, has_gyroscopic: Callable[[
         family += aside is None or not search.alike(aside[0], rest.q)
     if not rank:
         return Degenerate(rest, family, "")
-    falls = "undecided" if has_gyroscopic() or not field.is_potential else "unstable"
+    falls = "undecided" if _has_gyroscopic(search, rest) or not field.is_potential else "unstable"
     if rank == 1:
         moved, order, sign, beside = _root(field, axes[0])
         if order <= 1:
@@ -147,6 +144,18 @@ def follow_null_space(search: RestSearch, rest: Rest, has_gyroscopic: Callable[[
     return Degenerate(moved, family, falls if field.rises and verdict != "undecided" else verdict)
 
 
+def _has_gyroscopic(search: RestSearch, rest: Rest) -> bool:
+    """Return whether velocity terms act at rest that take no energy: an antisymmetric part beside rounding."""
+    count, own = len(search.scene.tangents), list(rest.minimal.speeds)
+    n = len(rest.minimal.displacements)
+    sizes = search.scene.sizes
+    mass, _ = search.stiffness(rest)
+    by = rest.flow.acceleration[:, count : count + len(sizes)] @ rest.minimal.speed[:, n : n + len(own)]
+    by = mass @ (by[own] / sizes[own][:, None] * sizes[own])
+    unit = float(np.max(np.abs(mass), initial=0.0)) * np.sqrt(search.slope)
+    return bool(np.max(np.abs(by - by.T), initial=0.0) > 1e-9 * unit)
+
+
 def _signed(
     there: list[tuple[FloatArray, tuple[FloatArray, FloatArray] | None]],
 ) -> list[tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
@@ -154,9 +163,9 @@ def _signed(
 
 
 def _root(field: _Field, axis: FloatArray) -> tuple[Rest, int, float, tuple[FloatArray, ...]]:
-    """Return the state moved to the root on a line, its order, the sign of the force behind it, and other roots' places.
+    """Return the state moved to the root on a line, its order, the sign of the force behind it, and other roots.
 
-    The order is -1 where it is not known.
+    The order is -1 where it is not known. Of other roots these are the places.
     """
     found = field.line(axis)
     if found is None:
@@ -175,6 +184,8 @@ def _root(field: _Field, axis: FloatArray) -> tuple[Rest, int, float, tuple[Floa
         moved = None if there is None else field.search.at(there[0])
         better = moved is not None and moved.push <= max(field.rest.push, 1e-15 * field.search.push)
         return (moved if better and moved is not None else field.rest), order, float(second), ()
-    roots = [float(x.real) for x in curve.trim(_ROUND * largest).roots() if abs(x.imag) < 1e-6 * abs(x) and abs(x) < 1.0]
-    places = [field.at(x * reach * axis) for x in roots]
+    every = np.asarray(curve.trim(_ROUND * largest).roots(), dtype=complex)
+    inside = (np.abs(every.imag) < 1e-6 * np.abs(every)) & (np.abs(every) < 1.0)
+    roots: list[float] = every.real[inside].tolist()
+    places = [field.at(reach * x * axis) for x in roots]
     return field.rest, 1, 0.0, tuple(one[0] for one in places if one is not None)

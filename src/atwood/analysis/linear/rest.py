@@ -1,8 +1,8 @@
 """States of rest: Newton's method on the accelerations of a scene whose speeds are zero.
 
 At rest ``a(q) = 0`` on the constraints. With accelerations instead of forces every equation has the size of what would
-happen, and the derivative is that of the linear model (`LinearScene.flow`). What is left of them counts in the metric of
-the masses, ``a.M a``, which singular coordinates neither hide nor exaggerate, and beside what it is elsewhere in the
+happen, and the derivative is that of the linear model (`LinearScene.flow`). What is left of them counts in the metric
+of the masses, ``a.M a``, which singular coordinates neither hide nor exaggerate, and beside what it is elsewhere in the
 region; and a place counts only where the root is near by, so that the tail of a force that dies away is none.
 """
 
@@ -39,7 +39,7 @@ _NEAR = 1e-7
 """Relative to the scene's sizes: how near the root is by a last step of Newton's method."""
 
 _FLAT = 1e-9
-"""Relative: singular values of the stiffness below it belong to directions along which Newton's method does not step."""
+"""Relative: along directions with smaller singular values of the stiffness Newton's method does not step."""
 
 _EVEN, _SLOW = 0.05, (0.3, 0.95)
 """Steps that become shorter by the same share, to so much of it, are a root of higher order: the rest of them is taken
@@ -116,7 +116,7 @@ class RestSearch:
         self.push, self.slope = 0.0, 0.0
         self._still = np.zeros(len(scene.sizes))
         self._configurations: dict[bytes, FloatArray] = {}
-        self._heavy: FloatArray | None = None
+        self._heavy: set[int] | None = None
 
     def measure(self, places: Sequence[FloatArray]) -> None:
         """Note how large accelerations and their slopes are at places all over the region."""
@@ -174,26 +174,32 @@ class RestSearch:
             Whether steps go where forces lead, also where these become stronger on the way: to minima of potentials.
         """
         best, near, waiting, ratio = None, np.inf, 0, 0.0
-        last = np.zeros(0)
+        last: FloatArray = np.zeros(0)
         for _ in range(steps):
             now = self.at(q)
             if now is None:  # as in the singular place of angles that the search has come to
                 break
-            step = _falling(now) if falls else None
-            if step is None:
-                step = -np.linalg.lstsq(now.slopes, now.accelerations, rcond=_FLAT)[0]
+            down = _falling(now) if falls else None
+            if down is None:
+                down = np.asarray(-np.linalg.lstsq(now.slopes, now.accelerations, rcond=_FLAT)[0], dtype=float)
+            step = down
             length = float(np.max(np.abs(step), initial=0.0))
             waiting = 0 if best is None or now.push < 0.9 * best.push else waiting + 1
             if best is None or now.push <= best.push:
                 best, near = now, length
-            if not now.push or length <= 1e-15 or waiting > _PATIENCE or (waiting and self.is_met(now)):
+            if (
+                not now.push
+                or length <= 1e-15
+                or waiting > _PATIENCE
+                or (waiting and length <= _NEAR and self.is_met(now))
+            ):
                 break
             share = float(step @ last) / float(last @ last) if len(last) == len(step) and np.any(last) else 0.0
             even = _SLOW[0] < share < _SLOW[1] and abs(share - ratio) < _EVEN * share
             even = even and float(np.max(np.abs(step - share * last))) < _EVEN * length
-            last, ratio = (np.zeros(0), 0.0) if even else (step, share)
-            step = step / (1.0 - share) if even else step
-            step = step * min(1.0, _FAR / max(float(np.max(np.abs(step), initial=0.0)), 1e-300))
+            last, ratio = (step[:0], 0.0) if even else (step, share)
+            step = np.asarray(step / (1.0 - share) if even else step)
+            step = np.asarray(step * min(1.0, _FAR / max(float(np.max(np.abs(step), initial=0.0)), 1e-300)))
             q = self.moved(now, step, 2.0 * _FAR)
         if falls and best is not None:
             return self.seek(best.q, _BACK)
@@ -229,9 +235,9 @@ class RestSearch:
         places, speeds = (np.asarray(one, dtype=float) for one in kernel([self.t], q, self._still))
         if self._heavy is None:
             mass = to_array(balance_of(assembly, "dae").at(self.t, places, speeds).mass)
-            self._heavy = np.flatnonzero(np.any(mass != 0.0, axis=1))
+            self._heavy = {*map(int, np.flatnonzero(np.any(mass != 0.0, axis=1)))}
         # What has no mass, such as the marker of a place on a surface, may be anywhere.
-        heavy, names, parts = set(self._heavy), assembly.maximal.names, [np.zeros(0)]
+        heavy, names, parts = self._heavy, assembly.maximal.names, [np.zeros(0)]
         for one in assembly.maximal.forest.attachments:
             if len(one.orientation) == 4 and heavy & set(one.spin):
                 own = places[list(one.orientation)]

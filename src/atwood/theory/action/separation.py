@@ -28,13 +28,17 @@ _STATES, _TRIALS = 6, 200
 _SHORT = 150
 """Up to so many operations H in other coordinates is tidied up to be read."""
 
+_LONG = 10**6
+"""A fraction with a larger denominator is a decimal number, known to 16 digits."""
+
 _FEW = 3
 """Up to so many coordinates the old momenta are written over one determinant."""
 
-_DIGITS, _ZERO = 40, 1e-12
+_DIGITS, _ZERO, _UNKNOWN = 40, 1e-12, 30
 """Conditions are evaluated with so many digits, and hold where their terms cancel to the second.
 
-Parameters are known to 16 digits: a condition that holds by a relation between their values holds to these.
+Parameters are known to 16 digits: a condition holds too where what is left of it is at most so many times what other
+last digits, and more digits, make of it.
 """
 
 
@@ -247,13 +251,26 @@ def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, 
             advice=f"Write them in terms of {len(old)} others.",
         )
     momenta = tuple(sympy.Symbol(f"p_{one}") for one in new)
+    # Decimal numbers are symbols, so that it is seen what their last digits make of a condition.
+    numbers = {one: sympy.Dummy() for whole in (*places.values(), h.expression) for one in _decimals(whole)}
+    places = {path: one.xreplace(numbers) for path, one in places.items()}
     along = _old_momenta([[places[path].diff(one) for path in old] for one in new], momenta)
     by = {q: places[path] for path, (q, _) in old.items()}
     by |= {p: along[k] for k, (_, p) in enumerate(old.values())}
-    made = h.expression.xreplace(by)
+    made = h.expression.xreplace(numbers).xreplace(by)
     made = _tidied(made) if coordinates is not None and made.count_ops() < _SHORT else made
-    worst = _worst(made, new, momenta, h.values, h.name)
+    back = {symbol: one for one, symbol in numbers.items()}
+    worst = _worst(made, new, momenta, {**h.values, **back}, h.name)
+    made = made.xreplace(back)
     return Separation(h.name, new, momenta, made, h.values, worst[2] <= _ZERO, worst)
+
+
+def _decimals(value: Sympy) -> list[Sympy]:
+    """Return the numbers of an expression that are known to 16 digits."""
+    import sympy
+
+    every = value.atoms(sympy.Number)
+    return sorted((one for one in every if one.is_Float or (one.is_Rational and one.q > _LONG)), key=float)
 
 
 def _old_momenta(transposed: Sequence[Sequence[Sympy]], momenta: Sequence[Sympy]) -> list[Sympy]:
@@ -308,27 +325,47 @@ def _worst(
     """Return by how much Levi-Civita's conditions are missed at random states, relative to their terms."""
     import sympy
 
-    exact = h.subs({symbol: sympy.Float(value, _DIGITS) for symbol, value in values.items()})
-    by_q, by_p = [exact.diff(one) for one in q], [exact.diff(one) for one in p]
+    held = {symbol: float(value) for symbol, value in values.items()}
+    by_q, by_p = [h.diff(one) for one in q], [h.diff(one) for one in p]
     worst = (str(q[0]), str(q[0]), 0.0)
     if len(q) == 1:
         return worst
-    states = _states(sympy.lambdify((*q, *p), [exact, *by_q, *by_p], "mpmath"), len(q), where)
+    variables, variants = (*q, *p, *held), _variants([*held.values()])
+    slopes = sympy.lambdify(variables, [h, *by_q, *by_p], "mpmath", cse=True)
+    states = _states(lambda *state: slopes(*state, *variants[0][1]), len(q), where)
+    first = [[_evaluated(slopes, state, *variant) for variant in variants] for state, _ in states]
     for i in range(len(q)):
         for j in range(i):
             seconds = [by_q[i].diff(q[j]), by_q[i].diff(p[j]), by_p[i].diff(q[j]), by_p[i].diff(p[j])]
-            evaluate = sympy.lambdify((*q, *p), seconds, "mpmath")
-            for state, (_, *slopes) in states:
-                qq, qp, pq, pp = _evaluated(evaluate, state) or [0] * 4
-                hq, hp = slopes[: len(q)], slopes[len(q) :]
-                terms = (hp[i] * hp[j] * qq, -hp[i] * hq[j] * qp, -hq[i] * hp[j] * pq, hq[i] * hq[j] * pp)
-                size = sum(abs(one) for one in terms)
-                miss = float(abs(sum(terms)) / size) if size else 0.0
+            evaluate = sympy.lambdify(variables, seconds, "mpmath", cse=True)
+            for (state, _), known in zip(states, first, strict=True):
+                found = []
+                for variant, own in zip(variants, known, strict=True):
+                    qq, qp, pq, pp = _evaluated(evaluate, state, *variant) or [0] * 4
+                    _, *slope = own or [0] * (2 * len(q) + 1)
+                    hq, hp = slope[: len(q)], slope[len(q) :]
+                    found.append((hp[i] * hp[j] * qq, -hp[i] * hq[j] * qp, -hq[i] * hp[j] * pq, hq[i] * hq[j] * pp))
+                total, *others = [sum(one) for one in found]
+                size = sum(abs(one) for one in found[0])
+                # What other digits change is not known, however little there is beside it.
+                known_to = _UNKNOWN * max(abs(one - total) for one in others)
+                miss = float(abs(total) / size) if abs(total) > known_to else 0.0
                 if miss > worst[2]:
                     worst = (str(q[j]), str(q[i]), miss)
             if worst[2] > _ZERO:
                 return worst
     return worst
+
+
+def _variants(values: Sequence[float]) -> list[tuple[int, list[Any]]]:
+    """Return numbers of digits, and parameters as they are and off by rounding, to see what is known of a condition."""
+    import mpmath  # type: ignore[import-untyped]
+
+    random = np.random.default_rng(5)
+    exact = [mpmath.mpf(one) for one in values]
+    made = [(_DIGITS, exact), (_DIGITS + 20, exact)]
+    off = [random.uniform(-1.0, 1.0, len(values)) for _ in range(3)]
+    return made + [(_DIGITS, [x * (1 + mpmath.mpf(2.0**-52 * u)) for x, u in zip(exact, w, strict=True)]) for w in off]
 
 
 def _states(evaluate: Any, n: int, where: str) -> list[tuple[list[Sympy], list[Any]]]:
@@ -347,13 +384,15 @@ def _states(evaluate: Any, n: int, where: str) -> list[tuple[list[Sympy], list[A
     raise UnsupportedError("H is real at too few random states to be looked at", where=where)
 
 
-def _evaluated(evaluate: Any, state: Sequence[Sympy]) -> list[Any] | None:
+def _evaluated(
+    evaluate: Any, state: Sequence[Sympy], digits: int = _DIGITS, values: Sequence[Any] = ()
+) -> list[Any] | None:
     """Return real values with many digits, None where there are none."""
-    import mpmath  # type: ignore[import-untyped]
+    import mpmath
 
-    with mpmath.workdps(_DIGITS):
+    with mpmath.workdps(digits):
         try:
-            found = evaluate(*[mpmath.mpf(one.p) / one.q for one in state])
+            found = evaluate(*[mpmath.mpf(one.p) / one.q for one in state], *values)
         except (ZeroDivisionError, ValueError, TypeError, ArithmeticError):
             return None
         values = [one if isinstance(one, mpmath.mpf) else mpmath.mpmathify(one) for one in found]

@@ -233,7 +233,7 @@ def _found(point: OperatingPoint, search: RestSearch, bounds: FloatArray) -> tup
         if not search.stays(rest, _LATER):
             seen_moving = True
             continue
-        made = follow_null_space(search, rest, lambda: _has_gyroscopic(search, rest))
+        made = follow_null_space(search, rest)
         if made.rest is not rest and any(search.same(one.rest, made.rest) for one in found):
             continue
         if len(found) < _IMAGED:
@@ -255,18 +255,6 @@ def _images(point: OperatingPoint, rest: Rest, others: Sequence[Rest]) -> list[F
         turned = np.array([unit == "rad" for unit in point.scene.tangents.units]) * 2.0 * np.pi
         made += [point.scene.tangents.moved(rest.q, 0.5 * (apart - turn * np.sign(apart))) for turn in (0.0, turned)]
     return made
-
-
-def _has_gyroscopic(search: RestSearch, rest: Rest) -> bool:
-    """Return whether velocity terms act at rest that take no energy: an antisymmetric part beside rounding."""
-    count, own = len(search.scene.tangents), list(rest.minimal.speeds)
-    n = len(rest.minimal.displacements)
-    sizes = search.scene.sizes
-    mass, _ = search.stiffness(rest)
-    by = rest.flow.acceleration[:, count : count + len(sizes)] @ rest.minimal.speed[:, n : n + len(own)]
-    by = mass @ (by[own] / sizes[own][:, None] * sizes[own])
-    unit = float(np.max(np.abs(mass), initial=0.0)) * np.sqrt(search.slope)
-    return bool(np.max(np.abs(by - by.T), initial=0.0) > 1e-9 * unit)
 
 
 _LATER = (0.3819660112501051, 1.2360679774997896)
