@@ -7,6 +7,7 @@ import pytest
 from scipy.special import ellipe, ellipk
 
 from atwood import SolveError, UsageError, action_angle, hamiltonian, separation
+from atwood.theory.action import Separation
 from atwood_library.scenes import (
     DoublePendulum,
     DrivenPendulum,
@@ -163,3 +164,31 @@ def test_wrong_coordinates_are_named():
         separation(Kepler(), {"body.position.x": "a + b", "body.position.z": "a + b"})
     with pytest.raises(UsageError, match="none of the coordinates"):
         separation(Kepler(), POLAR).motion("x", [0.0, 1.0], [1.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        separation(Kepler(eccentricity=0.5), POLAR),
+        separation(Kepler(eccentricity=0.5), PARABOLIC),
+        separation(SphericalPendulum(coordinates="angles")),
+    ],
+    ids=["polar", "parabolic", "sphere"],
+)
+def test_the_square_of_a_momentum_is_a_function_of_its_own_coordinate_alone(scene: Separation) -> None:
+    """On the curve that ``motion`` goes along: with E, momenta that are kept, and one value at another place."""
+    q, p = np.array([1.1, 0.9]), np.array([0.3, 0.4])
+    values = {str(symbol): value for symbol, value in scene.values.items()}
+    for k, own in enumerate(scene.coordinates):
+        found = scene.momentum_squared(str(own))
+        other, its = scene.coordinates[1 - k], scene.momenta[1 - k]
+        assert not found.has(other)
+        kept = not scene.expression.has(other)
+        assert kept or not found.has(its)
+        energy = float(scene._function(*q, *p))
+        known = {"E": energy, f"alpha_{own}": p[k] ** 2, f"{own}_0": q[k], str(its): p[1 - k], **values}
+        curve = scene.motion(str(own), q, p, turn=2.0 * np.pi if not scene.expression.has(own) else None)
+        for place in q[k] + np.array([-0.05, 0.0, 0.05]):
+            value = found.subs({one: known[str(one)] for one in found.free_symbols if one != own}).subs(own, place)
+            along = float(curve.momentum(place))
+            assert float(value) == pytest.approx(along**2, rel=1e-9) if np.isfinite(along) else float(value) < 0.0

@@ -173,25 +173,47 @@ class Separation:
         return SeparatedMotion(coordinate, found.kind, found.ends, found.action, found)
 
     def momentum_squared(self, coordinate: str) -> Sympy:
-        """Return ``p_i^2`` of a coordinate as H = E gives it, where H has no term linear in that momentum.
+        """Return ``p_i^2`` of a coordinate as a function of it and of constants of the motion.
 
-        In it E is the energy; the other coordinates and momenta stand for constants of the motion.
+        Of these, E is the energy, and momenta of ignorable coordinates are themselves. Where H = E leaves another
+        coordinate, the constant ``alpha_NAME`` is the value of ``p_i^2`` at the place ``NAME_0`` of this one, which
+        takes its place: in polar coordinates ``p_phi^2 = alpha_phi``.
 
         Raises
         ------
+        UsageError
+            If there is no such coordinate, or H does not separate.
         UnsupportedError
-            If H is not of this kind.
+            If H has a term linear in that momentum, or two or more other coordinates are left.
         """
         import sympy
 
         names = [str(one) for one in self.coordinates]
         if coordinate not in names:
             raise UsageError("it is none of the coordinates", where=coordinate, advice=suggestion(coordinate, names))
-        p = self.momenta[names.index(coordinate)]
+        if not self.separates:
+            raise UsageError(self.sentence, where=self.name)
+        q, p = self.coordinates[names.index(coordinate)], self.momenta[names.index(coordinate)]
         second = self.expression.diff(p, 2)
         if second.has(p) or self.expression.diff(p).subs(p, 0).expand() != 0:
             raise UnsupportedError("H has more than its square in this momentum", where=coordinate)
-        return 2 * (sympy.Symbol("E") - self.expression.subs(p, 0)) / second
+        whole = 2 * (sympy.Symbol("E") - self.expression.subs(p, 0)) / second
+        left = [
+            (x, y) for x, y in zip(self.coordinates, self.momenta, strict=True) if x != q and self.expression.has(x)
+        ]
+        if not left:
+            return whole
+        (other, momentum), square = left[0], sympy.Dummy()
+        plain = sympy.expand(whole).subs(momentum**2, square)
+        slope = plain.diff(square)
+        if len(left) > 1 or slope == 0 or plain.has(momentum) or slope.has(square):
+            told = ", ".join(str(x) for x, _ in left)
+            raise UnsupportedError(f"H = E leaves {told} in it", where=coordinate, advice="Use `motion`, in numbers.")
+        there = {q: sympy.Symbol(f"{q}_0")}
+        held = (sympy.Symbol(f"alpha_{q}") - plain.subs(square, 0).subs(there)) / slope.subs(there)
+        # What separates is the same whatever the other coordinate is.
+        found = (plain.subs(square, 0) + slope * held).subs(other, 1)
+        return sympy.expand(found) if found.has(q) and not found.expand().has(q) else found
 
     @cached_property
     def _function(self) -> Any:
