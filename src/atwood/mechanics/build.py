@@ -9,6 +9,7 @@ from atwood.expr import Expression, Graph, depends_on, live, substitute
 from atwood.late import replace
 from atwood.mechanics.constraints.elimination import SOLVED, check_held, drop_closed, eliminate_linear
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
+from atwood.mechanics.constraints.knots import balance_knots, linear_knots
 from atwood.mechanics.constraints.read_multipliers import known_multipliers, with_known
 from atwood.mechanics.constraints.rolling import Taken, integrated, take_up, without_idle_spins
 from atwood.mechanics.constraints.values import Values, constraint_values, find_constraints, levels, velocity_levels
@@ -64,19 +65,27 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
     site = Site(graph, derivation.graph, bodies, space, turns)
     motion = (motion_in_space if space.is_spatial else motion_in_plane)(derivation, forest, shape_of)
     values, taken = _use_up(derivation, site, masses, forest, motion)
-    state = motion.finish(taken.solution, taken.speeds)
+    while True:
+        state = motion.finish(taken.solution, taken.speeds)
+        signals = resolve_signals(derivation, site, state.kinematics)
+        rows = motion_rows(site, derivation.locals_, masses, state.kinematics, state.lifted, signals, state.speeds)
+        knots = linear_knots(derivation, state, rows, values) if forest.form == "reduced" and not taken.left else {}
+        if not knots:
+            break
+        placed = dict(zip(taken.solution, substitute(list(taken.solution.values()), knots), strict=True))
+        taken = replace(taken, solution={**placed, **knots})
+        values = [(path, c, substitute([v], knots)[0]) for path, c, v in values]
     values, prescribed = drop_closed(derivation, state.coordinates, values)
-    signals = resolve_signals(derivation, site, state.kinematics)
     held = [(path, c, _multiplier(graph, path, c)) for path, c, _ in values]
     rolling = [(path, c, _multiplier(graph, path, c)) for path, c in taken.left]
     integrals = integrated(derivation, site, state, taken.left) if forest.form == "dae" else {}
-    rows = motion_rows(site, derivation.locals_, masses, state.kinematics, state.lifted, signals, state.speeds)
     # Before the constraints' rates, which can then be written with the slopes that the forces are made of.
     forces = force_rows(site, derivation.locals_, state.kinematics, [*held, *rolling], signals, state.speeds)
     constraints = (
         *levels(derivation, site, state, held, [value for _, _, value in values]),
         *velocity_levels(derivation, site, state, rolling, signals, integrals),
     )
+    pushes, constraints = balance_knots(derivation, state, rows, forces, constraints)
     parts = _states(derivation, site, state.kinematics, signals)
     made = Equations(
         graph=graph,
@@ -97,7 +106,7 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         speed_names=state.speed_names,
         rates=(*state.rates, *(one.rate for one in parts)),
         rows=tuple(rows),
-        constraint_rows=tuple(forces),
+        constraint_rows=pushes,
         constraints=constraints,
         eliminated=_names_of(forest, motion.all_coordinates, taken.solution),
         prescribed=prescribed,

@@ -30,10 +30,18 @@ def check_held(
 ) -> None:
     """Refuse a body that has no mass and that no joint or constraint holds."""
     weightless = _weightless(mechanism, masses, forest)
+    pulled = {
+        mechanism.bodies.body_of[mechanism.graph.node_of[path, name]]
+        for path, local in mechanism.locals_.items()
+        if local.potentials or local.dissipations or local.loads
+        for name in local.connectors
+    }
     for one in forest.attachments:
         if one.joint is not None or not weightless.issuperset(one.coordinates):
             continue
         own = [q[number] for number in one.coordinates]
+        if one.body in pulled:
+            continue
         if not on_velocities and not any(depends_on(value, own) for _, _, value in values):
             raise TopologyError(
                 "the body is free to move and has no mass: any force would accelerate it without bound",

@@ -12,6 +12,7 @@ from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.kept import Key
 from atwood.late import dataclass
 from atwood.mechanics.build import extent
+from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable
 from atwood.model.values.units import parse_unit
@@ -115,9 +116,15 @@ def motion_scales(equations: Equations, length: float) -> FloatArray:
 
 def is_length(equations: Equations, key: tuple[str, str, int]) -> bool:
     """Return whether a constraint misses by a length: then its multiplier is a force, else a torque."""
+    return _unit(equations, key) == "N"
+
+
+def _unit(equations: Equations, key: tuple[str, str, int]) -> str:
+    """Return the unit of a constraint's multiplier."""
+    if key[1] in BALANCES:
+        return BALANCES[key[1]]
     local = equations.locals_[key[0]]
-    law = next(c.law for c in local.constraints if (c.law.name, c.index) == key[1:])
-    return str(law.options.unit) == "N"
+    return next(str(c.law.options.unit) for c in local.constraints if c.law.name == key[1])
 
 
 def multiplier_sizes(assembly: Assembly, form: FormName) -> FloatArray:
@@ -128,11 +135,7 @@ def multiplier_sizes(assembly: Assembly, form: FormName) -> FloatArray:
     """
     length = extent(assembly.mechanism) or scene_length(assembly)
     equations = assembly.in_coordinates(form)
-    parts = dict.fromkeys(one.key[0] for one in equations.constraints)
-    units = {
-        (path, one.law.name): str(one.law.options.unit) for path in parts for one in equations.locals_[path].constraints
-    }
-    found = [units[one.key[:2]] for one in equations.constraints]
+    found = [_unit(equations, one.key) for one in equations.constraints]
     # A force is of one power of a length.
     return np.array([length ** (parse_unit(unit).exponents[1] - 1) for unit in found])
 

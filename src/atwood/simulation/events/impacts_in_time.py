@@ -9,19 +9,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from atwood.arrays import FloatArray
+from atwood.arrays import BoolArray, FloatArray
 from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.late import replace
 from atwood.linalg.matrices import scaled, to_array
+from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
-from atwood.simulation.events.mode_change import LetsGo, enter_mode, generalized_speeds, plastic_impact
+from atwood.simulation.events.mode_change import (
+    LetsGo,
+    enter_mode,
+    generalized_speeds,
+    generalized_state,
+    plastic_impact,
+)
 from atwood.simulation.events.modes import EventRecord
 from atwood.tolerances import tolerances
 
@@ -32,6 +39,9 @@ _MOTION_SWITCHES: Key[bool] = Key("whether prescribed motion switches")
 
 _SAME_SPEED = 1e-9
 """Relative to the largest speed: by how much velocities may differ without an impact."""
+
+_ITERATIONS, _ROUNDED = 30, 1e-15
+"""So many steps of Newton's method at most, and how short the last one is relative to coordinates."""
 
 _HOLDS = 1e-6
 """Relative to the largest speed: by how much velocities after an impact may miss a constraint."""
@@ -103,7 +113,13 @@ def pass_time_event(
     balance = balance_of(after, "dae")
     was, now = balance_of(before, "dae").at(t, big_q, big_u), _values_after(after, balance, t, big_q, big_u)
     rows = balance.row_scales(now, t, big_q, sizes)
-    _check_places(after, t, (was, now), sizes, rows)
+    knots = np.array([one.key[1] in BALANCES for one in after.maximal.constraints], dtype=bool)
+    _check_places(after, t, (was, now), sizes, rows, knots)
+    if knots.any() and np.max(np.abs(now.value - was.value)[knots]) > 0.0:
+        big_q = _rebalanced(balance, t, big_q, now)
+        now = _values_after(after, balance, t, big_q, big_u)
+        if after.form == "reduced":
+            q, u, _ = generalized_state(before, after, t, (q, u), (big_q, big_u), length)
     if after.form == "dae":  # a jump as small as rounding allows leaves nothing that would have to be caught up with
         q, u = balance.project(t, big_q, big_u, sizes)
         big_q = q
@@ -116,11 +132,12 @@ def pass_time_event(
     faster = [constraints[i].key for i in np.flatnonzero(jumps > _SAME_SPEED * fastest)]
     if not faster:
         return q, u, ()
-    laws = {part: law for part, law, _ in reversed(faster)}
+    laws = {part: law for part, law, _ in reversed(faster) if law not in BALANCES}
     message = "the speed of the prescribed motion jumps: an impact"
     impacts = tuple(EventRecord(t, part, law, message, "", True) for part, law in reversed(laws.items()))
+    told = impacts[0] if impacts else EventRecord(t, *faster[0][:2], message, "", True)
     try:
-        big_u = plastic_impact(after, balance, impacts[0], (t, big_q, big_u), sizes)
+        big_u = plastic_impact(after, balance, told, (t, big_q, big_u), sizes)
     except LetsGo as error:  # other velocities may jump nevertheless
         error.event = replace(error.event, impact=bool(laws.keys() - {error.event.part}))
         raise
@@ -149,20 +166,39 @@ def _values_after(after: Assembly, balance: Balance, t: float, q: FloatArray, u:
         ) from error
 
 
+def _rebalanced(balance: Balance, t: float, q: FloatArray, now: BalanceValues) -> FloatArray:
+    """Return the coordinates at which forces that have jumped balance: what has no mass goes there at once."""
+    free = ~np.any(to_array(now.mass) != 0.0, axis=1)
+    still = np.zeros(len(free))
+    for _ in range(_ITERATIONS):
+        step = np.zeros_like(still)
+        step[free] = np.linalg.lstsq(to_array(now.jacobian)[:, free], -now.value, rcond=None)[0]
+        q = balance.kinematic_map.moved(t, q, step)
+        if np.max(np.abs(step)) <= _ROUNDED * np.max(np.abs(q)):
+            break
+        now = balance.at(t, q, still)
+    return q
+
+
 def _check_places(
-    after: Assembly, t: float, sides: tuple[BalanceValues, BalanceValues], sizes: FloatArray, rows: FloatArray
+    after: Assembly,
+    t: float,
+    sides: tuple[BalanceValues, BalanceValues],
+    sizes: FloatArray,
+    rows: FloatArray,
+    knots: BoolArray,
 ) -> None:
-    """Refuse motions that jump in position."""
+    """Refuse motions that jump in position; knots have no mass, and may."""
     was, now = sides
     constraints = after.maximal.constraints
-    moved = np.abs(now.value - was.value) / rows
+    moved = np.where(knots, 0.0, np.abs(now.value - was.value) / rows)
     worst = int(np.argmax(moved))
     by = ""
     if moved[worst] > tolerances.HELD:
         by = _in_words(after, constraints[worst], float(now.value[worst] - was.value[worst]))
     else:  # by half a turn, at which the sine of an angle is zero again, the constraint is turned over
         jacobians = [to_array(scaled(one.jacobian, sizes, rows)) for one in sides]
-        over = np.flatnonzero(np.sum(jacobians[0] * jacobians[1], axis=1) < -tolerances.RANK)
+        over = np.flatnonzero((np.sum(jacobians[0] * jacobians[1], axis=1) < -tolerances.RANK) & ~knots)
         if not len(over):
             return
         worst, by = int(over[0]), " by more than a quarter turn"
@@ -181,6 +217,10 @@ def _switching(assembly: Assembly) -> list[str]:
         read = (*assembly.mechanism.relations.symbols, *held, *local.signal_symbols.values())
         if any(depends_on(one.value, read) for one in local.constraints):
             found.append(path)
+    read = (*assembly.mechanism.relations.symbols, *(one.symbol for one in assembly.discrete_states))
+    for one in assembly.maximal.constraints:
+        if one.key[1] in BALANCES and depends_on(one.rate if one.value is None else one.value, read):
+            found.append(one.key[0])
     return found
 
 

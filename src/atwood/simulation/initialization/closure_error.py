@@ -11,6 +11,7 @@ from atwood.expr import Expression, depends_on, evaluate, live
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
+from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.model.local.laws import LocalConnector, LocalConstraint, LocalPart
@@ -73,7 +74,7 @@ def find_closure_errors(
     signals = resolve_signals(assembly.mechanism, equations.site, equations.kinematics, equations.read)
     rows: dict[str, list[LocalConstraint]] = {}
     for one in equations.constraints:
-        if one.value is not None:
+        if one.value is not None and one.key[1] not in BALANCES:
             local = equations.locals_[one.key[0]]
             rows.setdefault(one.key[0], []).extend(c for c in local.constraints if (c.law.name, c.index) == one.key[1:])
     found = []

@@ -139,7 +139,7 @@ def find_arc(
             known = None if guess is None else guess(times)
             begin = known or (np.repeat(q[:, None], _POINTS, 1), np.repeat(u[:, None], _POINTS, 1))
             return _settle(plan, (t, q, u), end, times, begin, known is None)
-    except AtwoodError:  # a state without a value, or without accelerations: nothing goes on smoothly here
+    except (AtwoodError, np.linalg.LinAlgError):  # a state without a value, or without accelerations: nothing goes on
         return None
 
 
