@@ -80,23 +80,6 @@ def test_an_inertia_that_no_body_can_have(settings: dict[str, Any], text: str, f
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_slender_body_whose_spin_is_damped(form: str) -> None:
-    scene = Scene(space="space")
-    ground, ball, bar = (
-        scene.add("ground", Ground()),
-        scene.add("ball", Spherical(damping=0.1)),
-        scene.add("bar", Bar()),
-    )
-    scene.connect(ground.frame, ball.a)
-    scene.connect(ball.b, bar.a)
-    error = refused(scene, form)
-    assert error.where == "bar"
-    assert "without inertia" in error.message
-    assert "bar.spin.z" in error.message
-    assert "moment of inertia" in error.advice
-
-
-@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("joint", [Spherical, Pivot])
 def test_a_frame_without_mass_that_a_spring_pulls(form: str, joint: type[Component]) -> None:
     scene = Scene(space="space")

@@ -26,7 +26,7 @@ from atwood.mechanics.kinematics.mechanism import (
     extent,
     make_gravity,
 )
-from atwood.mechanics.kinematics.motion import Motion, motion_in_plane, motion_in_space
+from atwood.mechanics.kinematics.motion import Motion, Movement, motion_in_plane, motion_in_space
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, shapes
 from atwood.model.declare.binding import bind
@@ -65,16 +65,7 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
     site = Site(graph, derivation.graph, bodies, space, turns)
     motion = (motion_in_space if space.is_spatial else motion_in_plane)(derivation, forest, shape_of)
     values, taken = _use_up(derivation, site, masses, forest, motion)
-    while True:
-        state = motion.finish(taken.solution, taken.speeds)
-        signals = resolve_signals(derivation, site, state.kinematics)
-        rows = motion_rows(site, derivation.locals_, masses, state.kinematics, state.lifted, signals, state.speeds)
-        knots = linear_knots(derivation, state, rows, values) if forest.form == "reduced" and not taken.left else {}
-        if not knots:
-            break
-        placed = dict(zip(taken.solution, substitute(list(taken.solution.values()), knots), strict=True))
-        taken = replace(taken, solution={**placed, **knots})
-        values = [(path, c, substitute([v], knots)[0]) for path, c, v in values]
+    state, signals, rows, values, taken = _moving(derivation, site, masses, forest, motion, values, taken)
     values, prescribed = drop_closed(derivation, state.coordinates, values)
     held = [(path, c, _multiplier(graph, path, c)) for path, c, _ in values]
     rolling = [(path, c, _multiplier(graph, path, c)) for path, c in taken.left]
@@ -122,6 +113,34 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         return replace(made, read=dict(zip(read, read, strict=True)))
     with derivation.relations.reading(False):
         return with_known(made, known_multipliers(derivation, made, read)) if read else made
+
+
+def _moving(
+    derivation: Derivation,
+    site: Site,
+    masses: Masses,
+    forest: SpanningForest,
+    motion: Motion,
+    values: Values,
+    taken: Taken,
+) -> tuple[Movement, dict[Expression, Expression], list[Expression], Values, Taken]:
+    """Return how the mechanism moves, with its linked inputs and its forces, with linear knots eliminated.
+
+    Returns
+    -------
+    tuple
+        The motion, inputs, inertial less applied forces, the constraints on positions, and what was eliminated.
+    """
+    while True:
+        state = motion.finish(taken.solution, taken.speeds)
+        signals = resolve_signals(derivation, site, state.kinematics)
+        rows = motion_rows(site, derivation.locals_, masses, state.kinematics, state.lifted, signals, state.speeds)
+        knots = linear_knots(derivation, state, rows, values) if forest.form == "reduced" and not taken.left else {}
+        if not knots:
+            return state, signals, rows, values, taken
+        placed = dict(zip(taken.solution, substitute(list(taken.solution.values()), knots), strict=True))
+        taken = replace(taken, solution={**placed, **knots})
+        values = [(path, c, substitute([v], knots)[0]) for path, c, v in values]
 
 
 def _use_up(

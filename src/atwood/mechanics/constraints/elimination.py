@@ -13,7 +13,7 @@ from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.inertia import Masses
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent
-from atwood.model.local.laws import LocalConstraint
+from atwood.model.local.laws import LocalConstraint, LocalPart
 from atwood.tolerances import tolerances
 from atwood.topology.spanning_forest import SpanningForest
 
@@ -33,7 +33,7 @@ def check_held(
     pulled = {
         mechanism.bodies.body_of[mechanism.graph.node_of[path, name]]
         for path, local in mechanism.locals_.items()
-        if local.potentials or local.dissipations or local.loads
+        if local.potentials or local.dissipations or _reacts(local)
         for name in local.connectors
     }
     for one in forest.attachments:
@@ -48,6 +48,13 @@ def check_held(
                 where=mechanism.bodies.bodies[one.body].name,
                 advice="Connect it to something that has a mass or holds it, give it a mass, or remove it.",
             )
+
+
+def _reacts(local: LocalPart) -> bool:
+    """Return whether a load of a part changes with where its connectors are, or how they move."""
+    read = [s for one in local.connectors.values() for s in (*one.position, *one.velocity, *one.orientation, *one.spin)]
+    found = (component for one in local.loads for component in (*one.force, *one.torque))
+    return any(isinstance(one, Expression) and depends_on(one, read) for one in found)
 
 
 class _Solved:

@@ -45,6 +45,8 @@ def linear_knots(
         The constraints on positions; what they touch is left to them.
     """
     found: dict[Expression, Expression] = {}
+    if not any(depends_on(row, state.accelerations) for row in rows):
+        return found  # nothing has mass, and nothing would move by itself
     of_speed = {rate: q for q, rate in zip(state.coordinates, state.rates, strict=True)}
     for speed, row in zip(state.speeds, rows, strict=True):
         own = of_speed.get(speed)
@@ -117,6 +119,8 @@ def _balances(
     Constraints among what has no inertia, such as gears, join speeds where their coefficients are the same everywhere;
     where these change, they hold what they touch.
     """
+    if not any(depends_on(row, state.accelerations) for row in rows):
+        return []
     unknown = (*state.accelerations, *(one.multiplier for one in constraints))
     light = [state.speeds[k] for k, row in enumerate(rows) if not depends_on(row, unknown)]
     solved: dict[Expression, Expression] = {}
