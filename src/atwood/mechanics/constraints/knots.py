@@ -13,7 +13,8 @@ from functools import partial
 import numpy as np
 
 from atwood.errors import AtwoodError
-from atwood.expr import Expression, depends_on, evaluate, jacobian, jvp, substitute
+from atwood.expr import Expression, depends_on, evaluate, jacobian, jvp, live, substitute
+from atwood.expr.core.analysis import dependents
 from atwood.mechanics.constraints.pfaffian import Places
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.equations import Constraint, constraint_levels
@@ -45,12 +46,11 @@ def linear_knots(
         The constraints on positions; what they touch is left to them.
     """
     found: dict[Expression, Expression] = {}
-    if not any(depends_on(row, state.accelerations) for row in rows):
-        return found  # nothing has mass, and nothing would move by itself
+    light = _without_inertia(rows, state)
     of_speed = {rate: q for q, rate in zip(state.coordinates, state.rates, strict=True)}
-    for speed, row in zip(state.speeds, rows, strict=True):
-        own = of_speed.get(speed)
-        if own is None or depends_on(row, (*state.accelerations, *state.speeds)):
+    for k in light:
+        row, own = rows[k], of_speed.get(state.speeds[k])
+        if own is None or depends_on(row, state.speeds):
             continue
         (force,) = substitute([row], found)
         (slope,) = jvp([force], {own: 1.0})
@@ -119,10 +119,8 @@ def _balances(
     Constraints among what has no inertia, such as gears, join speeds where their coefficients are the same everywhere;
     where these change, they hold what they touch.
     """
-    if not any(depends_on(row, state.accelerations) for row in rows):
-        return []
-    unknown = (*state.accelerations, *(one.multiplier for one in constraints))
-    light = [state.speeds[k] for k, row in enumerate(rows) if not depends_on(row, unknown)]
+    multipliers = [one.multiplier for one in constraints]
+    light = [state.speeds[k] for k in _without_inertia(rows, state) if not depends_on(rows[k], multipliers)]
     solved: dict[Expression, Expression] = {}
     for one in constraints if light else ():
         slopes = jacobian([one.rate], light)
@@ -151,6 +149,13 @@ def _balances(
                 force = force + share * rows[state.speeds.index(other)]
             found.append((k, force))
     return found
+
+
+def _without_inertia(rows: Sequence[Expression], state: Movement) -> list[int]:
+    """Return the numbers of the rows without accelerations; none where nothing has mass and would move by itself."""
+    heavy = dependents(live(rows), state.accelerations)
+    light = [k for k, row in enumerate(rows) if row.index not in heavy]
+    return light if len(light) < len(rows) else []
 
 
 def _largest(coefficients: Sequence[Expression], mechanism: Mechanism) -> int:
