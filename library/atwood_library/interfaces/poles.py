@@ -1,4 +1,4 @@
-"""Angles and rates near where they mean nothing: at the poles of Euler angles and of polar coordinates.
+"""Angles and rates near where they mean nothing: at the poles of polar coordinates.
 
 There an angle is zero and its rate has no value, whichever way the state came there: what rounding leaves of a distance
 that is zero would give one form an angle and the other none.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 
 from atwood import (
@@ -11,15 +10,13 @@ from atwood import (
     Frame,
     Scalar,
     Vector,
-    atan2,
     connector,
     cross,
     dot,
     inertia,
     observable,
-    sqrt,
 )
-from atwood_library.interfaces.poles import angle_off_pole, rate_off_pole
+from atwood_library.interfaces.euler_angles import EulerAngles, restated_angles
 
 __all__ = ["Solid", "Tensor"]
 
@@ -31,8 +28,10 @@ class Solid(Component):
     """A rigid body; subclasses say its mass, its centre of mass and its inertia tensor in the axes of its frame.
 
     Its orientation is reported as the three axes of its frame and as Euler angles in the z-y-z convention: phi about z,
-    theta about the new y, psi about the new z. Where theta is zero or half a turn, within 1e-10 rad, phi and psi are
-    zero and the three rates have no value.
+    theta about the new y, psi about the new z. Where theta is zero, within 1e-12 rad, only phi + psi has a value, and
+    where it is half a turn only phi - psi: at the start of a run, if it does not say them, phi is zero and psi is what
+    there is, and along it the other combination stays what it was before. There the rates have values as long as the
+    axis stays; where it just passes they have none.
     """
 
     frame: Frame = connector(Frame, "The frame that everything about the body is given in.")
@@ -55,16 +54,14 @@ class Solid(Component):
 
     def restate_start(self, given: Mapping[str, float], space: str) -> dict[str, float]:
         """Return start values with Euler angles said as the axes that they stand for; those not given are zero."""
-        said = dict(given)
-        if space != "space" or not {"phi", "theta", "psi"} & said.keys():
-            return said
-        phi, theta, psi = (said.pop(name, 0.0) for name in ("phi", "theta", "psi"))
-        (sa, ca), (sb, cb), (sc, cc) = ((math.sin(angle), math.cos(angle)) for angle in (phi, theta, psi))
-        x_axis = (ca * cb * cc - sa * sc, sa * cb * cc + ca * sc, -sb * cc)
-        z_axis = (ca * sb, sa * sb, cb)
-        said.update({f"x_axis.{axis}": value for axis, value in zip("xyz", x_axis, strict=True)})
-        said.update({f"z_axis.{axis}": value for axis, value in zip("xyz", z_axis, strict=True)})
-        return said
+        if space != "space":
+            return dict(given)
+        return restated_angles(given, "zyz", ("phi", "theta", "psi"), ("x_axis", "z_axis"))
+
+    def euler_angles(self) -> EulerAngles:
+        """Return the Euler angles of the frame in world axes."""
+        world = Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0)
+        return EulerAngles("zyz", world, self.frame.axes, self.frame.angular_velocity)
 
     @inertia
     def rigid_body(self) -> Iterable[BodyInertia]:
@@ -129,49 +126,49 @@ class Solid(Component):
         doc="First Euler angle, about the world's z axis.",
         periodic=True,
         rate="phi_rate",
+        pole="pole",
         spaces=("space",),
     )
     def phi(self) -> Scalar:
         """Return the azimuth of the frame's z axis (Goldstein, section 4.4, in the z-y-z convention)."""
-        z = self.frame.axes[2]
-        return angle_off_pole(z.y, z.x)
+        return self.euler_angles().first()
 
     @observable(unit="rad", doc="Second Euler angle, of the frame's z axis from the world's.", spaces=("space",))
     def theta(self) -> Scalar:
         """Return the angle between the two z axes."""
-        z = self.frame.axes[2]
-        return atan2(sqrt(z.x * z.x + z.y * z.y), z.z)
+        return self.euler_angles().second()
 
     @observable(
         unit="rad",
         doc="Third Euler angle, about the frame's z axis.",
         periodic=True,
         rate="psi_rate",
+        pole="pole",
         spaces=("space",),
     )
     def psi(self) -> Scalar:
         """Return the angle about the frame's own z axis."""
-        x, y, _ = self.frame.axes
-        return angle_off_pole(y.z, -x.z)
+        return self.euler_angles().last()
+
+    @observable(unit="1", doc="At a pole, the sign with which psi is added to phi; else zero.", spaces=("space",))
+    def pole(self) -> Scalar:
+        """Return the sign, which is there the cosine between the first and the third axis."""
+        return self.euler_angles().pole()
 
     @observable(unit="rad/s", doc="Rate of phi (precession).", spaces=("space",))
     def phi_rate(self) -> Scalar:
         """Return the rate of the first Euler angle (Goldstein, section 4.9, in the z-y-z convention)."""
-        (x, y, _), w = self.frame.axes, self.spin()
-        square = x.z * x.z + y.z * y.z
-        return rate_off_pole(w.x * x.z + w.y * y.z, square, square)
+        return self.euler_angles().rates()[0]
 
     @observable(unit="rad/s", doc="Rate of theta (nutation).", spaces=("space",))
     def theta_rate(self) -> Scalar:
         """Return the rate of the second Euler angle."""
-        (x, y, _), w = self.frame.axes, self.spin()
-        square = x.z * x.z + y.z * y.z
-        return rate_off_pole(w.x * y.z - w.y * x.z, sqrt(square), square)
+        return self.euler_angles().rates()[1]
 
     @observable(unit="rad/s", doc="Rate of psi (spin).", spaces=("space",))
     def psi_rate(self) -> Scalar:
         """Return the rate of the third Euler angle."""
-        return self.spin().z - self.phi_rate() * self.frame.axes[2].z
+        return self.euler_angles().rates()[2]
 
     @observable(unit="J", doc="Energy of turning about the centre of mass.", spaces=("space",))
     def turning_energy(self) -> Scalar:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import permutations
+from collections.abc import Mapping
 
-from atwood import Component, Frame, Scalar, Vector, atan2, connector, cross, dot, observable, parameter, sqrt
-from atwood_library.interfaces.poles import angle_off_pole, rate_off_pole
+from atwood import Component, Frame, Scalar, Vector, connector, observable, parameter
+from atwood_library.interfaces.euler_angles import CONVENTIONS, EulerAngles, restated_angles
 from atwood_library.interfaces.rotation_vector import rotation_vector
-
-CONVENTIONS = tuple(
-    first + second + third for first, second in permutations("xyz", 2) for third in "xyz" if third != second
-)
-"""The twelve sequences of axes."""
 
 
 class OrientationSensor(Component):
@@ -21,7 +16,9 @@ class OrientationSensor(Component):
     convention names these axes in order: ``"zyz"`` and ``"zxz"`` are those of textbooks on tops, ``"zyx"`` is yaw,
     pitch, roll (Goldstein, section 4.4 and appendix A). The second angle is within 0 to a half turn where the first
     axis comes again, within a quarter turn either way where it does not; the others count turns. Where the first
-    and the third axis are parallel, within 1e-10 rad, the first and third angles are zero and the rates have no value.
+    and the third axis are parallel, within 1e-12 rad, only the sum or the difference of the first and the third angle
+    has a value: at the start of a run, if it does not say them, the first is zero, and along the run the other
+    combination stays what it was before. There the rates have values as long as the axes stay parallel.
     A part of space.
     """
 
@@ -32,69 +29,60 @@ class OrientationSensor(Component):
     a: Frame = connector(Frame, "The frame that the orientation is measured from.")
     b: Frame = connector(Frame, "The frame whose orientation is measured.")
 
-    def _entry(self, row: str, column: str) -> Scalar:
-        """Return the scalar product of an axis of a and an axis of b, by their names."""
-        return dot(self.a.axes["xyz".index(row)], self.b.axes["xyz".index(column)])
+    def restate_start(self, given: Mapping[str, float], space: str) -> dict[str, float]:
+        """Return start values with the three angles said as the axes that they stand for; those not given are zero."""
+        return restated_angles(given, self.convention, ("angle_1", "angle_2", "angle_3"), ("x_axis", "z_axis"))
 
-    def _sequence(self) -> tuple[str, str, str, bool, float]:
-        """Return the first two axes and the one that is left, whether the first comes again, and the sense."""
-        i, j, last = tuple(self.convention)
-        again = last == i
-        k = next(axis for axis in "xyz" if axis not in (i, j)) if again else last
-        return i, j, k, again, 1.0 if (i + j + k) in ("xyz", "yzx", "zxy") else -1.0
+    def euler_angles(self) -> EulerAngles:
+        """Return the angles."""
+        return EulerAngles(self.convention, self.a.axes, self.b.axes, self.relative_spin())
 
-    @observable(unit="rad", doc="First Euler angle.", periodic=True, rate="rate_1", spaces=("space",))
+    @observable(unit="rad", doc="First Euler angle.", periodic=True, rate="rate_1", pole="pole", spaces=("space",))
     def angle_1(self) -> Scalar:
         """Return the angle of the first turn."""
-        i, j, k, again, sense = self._sequence()
-        if again:
-            return angle_off_pole(self._entry(j, i), -sense * self._entry(k, i))
-        return angle_off_pole(-sense * self._entry(j, k), self._entry(k, k))
+        return self.euler_angles().first()
 
     @observable(unit="rad", doc="Second Euler angle.", spaces=("space",))
     def angle_2(self) -> Scalar:
         """Return the angle of the second turn."""
-        i, j, k, again, sense = self._sequence()
-        if again:
-            across = sqrt(self._entry(j, i) ** 2 + self._entry(k, i) ** 2)
-            return atan2(across, self._entry(i, i))
-        along = sqrt(self._entry(j, k) ** 2 + self._entry(k, k) ** 2)
-        return atan2(sense * self._entry(i, k), along)
+        return self.euler_angles().second()
 
-    @observable(unit="rad", doc="Third Euler angle.", periodic=True, rate="rate_3", spaces=("space",))
+    @observable(unit="rad", doc="Third Euler angle.", periodic=True, rate="rate_3", pole="pole", spaces=("space",))
     def angle_3(self) -> Scalar:
         """Return the angle of the third turn."""
-        i, j, k, again, sense = self._sequence()
-        if again:
-            return angle_off_pole(self._entry(i, j), sense * self._entry(i, k))
-        return angle_off_pole(-sense * self._entry(i, j), self._entry(i, i))
+        return self.euler_angles().last()
 
-    def _outer_axes(self) -> tuple[Vector, Vector, Vector, Scalar]:
-        """Return the axes of the first and the third turn in world axes, their vector product, and its square."""
-        first = self.a.axes["xyz".index(self.convention[0])]
-        third = self.b.axes["xyz".index(self.convention[2])]
-        normal = cross(first, third)
-        return first, third, normal, dot(normal, normal)
+    @observable(
+        unit="1", doc="At a pole, the sign with which angle 3 is added to angle 1; else zero.", spaces=("space",)
+    )
+    def pole(self) -> Scalar:
+        """Return the sign, which is there the cosine between the first and the third axis."""
+        return self.euler_angles().pole()
 
     @observable(unit="rad/s", doc="Rate of the first angle.", spaces=("space",))
     def rate_1(self) -> Scalar:
         """Return the component of the relative angular velocity along the first axis, in the frame of the three."""
-        _, third, normal, square = self._outer_axes()
-        return rate_off_pole(dot(self.relative_spin(), cross(third, normal)), square, square)
+        return self.euler_angles().rates()[0]
 
     @observable(unit="rad/s", doc="Rate of the second angle.", spaces=("space",))
     def rate_2(self) -> Scalar:
         """Return the component of the relative angular velocity along the second axis, the normal of the others."""
-        _, _, normal, square = self._outer_axes()
-        _, _, _, again, sense = self._sequence()
-        factor = 1.0 if again else -sense
-        return rate_off_pole(factor * dot(self.relative_spin(), normal), sqrt(square), square)
+        return self.euler_angles().rates()[1]
 
     @observable(unit="rad/s", doc="Rate of the third angle.", spaces=("space",))
     def rate_3(self) -> Scalar:
         """Return the component of the relative angular velocity along the third axis."""
-        first, _, normal, square = self._outer_axes()
-        return rate_off_pole(dot(self.relative_spin(), cross(normal, first)), square, square)
+        return self.euler_angles().rates()[2]
+
+    @observable(unit="1", doc="Frame b's x axis in the axes of frame a.", spaces=("space",))
+    def x_axis(self) -> Vector:
+        """Return the axis."""
+        return self.a.to_frame(self.b.axes[0])
+
+    @observable(unit="1", doc="Frame b's z axis in the axes of frame a.", spaces=("space",))
+    def z_axis(self) -> Vector:
+        """Return the axis."""
+        return self.a.to_frame(self.b.axes[2])
 
     def relative_spin(self) -> Vector:
         """Return the angular velocity of frame b as seen from frame a, in world axes."""

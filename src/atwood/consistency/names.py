@@ -80,8 +80,8 @@ def _in_law(component: Component, law: Law) -> Iterator[tuple[str, str]]:
         yield from _named("a constraint", options.solves, [one.name for one in cls.laws("constraint")])
         yield from _named("an observable", options.coordinates, observables)
         yield from _wrong_arguments(cls, law)
-    elif law.kind == "observable" and options.rate:
-        yield from _named("an observable", (options.rate,), observables)
+    elif law.kind == "observable":
+        yield from _named("an observable", filter(None, (options.rate, options.pole)), observables)
     elif law.kind == "event":
         yield from _wrong_target(component, law)
     elif law.kind == "derivative":

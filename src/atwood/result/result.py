@@ -290,17 +290,13 @@ class Result(Trajectories):
         missing = tuple(path for path in paths if path not in self._cache)
         if not missing:
             return
-        pieces = [reading.values(missing) for reading in self._readings]
-        for i, path in enumerate(missing):
-            self._cache[path] = np.concatenate([piece[i] for piece in pieces])
-        observables = self.assembly.observables
-        guesses = {**self.assembly.flat.guess, **self.assembly.flat.start}
+        turning = self._turns.needed(missing)
+        needed = tuple(dict.fromkeys((*missing, *turning)))
+        pieces = np.concatenate([reading.values(needed) for reading in self._readings], axis=1)
+        raw = dict(zip(needed, pieces, strict=True))
         for path in missing:
-            if observables[path].periodic:
-                rate = observables[path].rate
-                turning = (rate, self.samples(rate)) if rate else None
-                values, start = self._cache[path], guesses.get(path)
-                self._cache[path] = self._turns.counted(path, values, start, self._all_time, turning)
+            counts = self.assembly.observables[path].periodic
+            self._cache[path] = self._turns.counted(path, raw, self._all_time) if counts else raw[path]
 
     @cached_property
     def _turns(self) -> TurnCounter:

@@ -8,7 +8,7 @@ made again with more samples.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -46,33 +46,39 @@ class TurnCounter:
     """
 
     def __init__(self, run: Run) -> None:
-        self._run = run
+        self._run, self._observables = run, run.assembly.observables
+        self._said = {**run.assembly.flat.guess, **run.assembly.flat.start}
         self._finer: dict[int, Run | None] = {}
 
-    def counted(
-        self, path: str, values: FloatArray, start: float | None, time: FloatArray, rate: tuple[str, FloatArray] | None
-    ) -> FloatArray:
+    def needed(self, paths: Iterable[str]) -> tuple[str, ...]:
+        """Return what turns of some quantities are counted by, besides themselves, by path."""
+        found: list[str] = []
+        for one in (self._observables[path] for path in paths):
+            if one.periodic:
+                beside = (*one.sharing, *(self._observables[path].rate for path in one.sharing[:2]))
+                found += [path for path in (one.rate, *beside) if path]
+        return tuple(dict.fromkeys(found))
+
+    def counted(self, path: str, raw: Mapping[str, FloatArray], time: FloatArray) -> FloatArray:
         """Return a quantity at all samples without jumps by whole turns.
 
         Parameters
         ----------
         path
             The quantity.
-        values
-            At the samples, each within one turn, rad.
-        start
-            What it was said to be at the start; none if not given.
+        raw
+            It, and what `needed` says, at the samples, by path: angles within one turn, rad.
         time
             The samples, s.
-        rate
-            Path of its rate, and that at the samples, rad/s; None if it has none.
         """
-        if rate is None:
+        start, rate = self._said.get(path), self._observables[path].rate
+        values = self._across_poles(path, raw, time)
+        if not rate:
             return unwrap(values, start)
         spans = np.diff(time)
         longest = float(np.max(spans, initial=0.0))
         often = max(_UNSEEN[one.solver] for one in self._run.choices)
-        factor = max(_needed(rate[1], longest), _FIRST if self._run.statistics.steps > often * len(time) else 1)
+        factor = max(_parts_of(raw[rate], longest), _FIRST if self._run.statistics.steps > often * len(time) else 1)
         while factor > 1:
             finer = self._finely(factor, time)
             if finer is None:
@@ -82,14 +88,38 @@ class TurnCounter:
                     stacklevel=4,
                 )
                 break
-            fine_time, fine, fine_rate = _read(finer.segments, path, rate[0])
-            more = factor * _needed(fine_rate, longest / factor)
+            fine_time, fine = _read(finer.segments, (path, *self.needed((path,))))
+            more = factor * _parts_of(fine[rate], longest / factor)
             if more > factor and more * len(time) <= _MOST:
                 factor = more
                 continue
-            whole = unwrap(fine, start, fine_time, fine_rate)
+            whole = unwrap(self._across_poles(path, fine, fine_time), start, fine_time, fine[rate])
             return whole[_places(self._run.segments, finer.segments)]
-        return unwrap(values, start, time, rate[1])
+        return unwrap(values, start, time, raw[rate])
+
+    def _across_poles(self, path: str, raw: Mapping[str, FloatArray], time: FloatArray) -> FloatArray:
+        """Return an angle that at a pole has a value only together with another: their difference stays, or their sum.
+
+        The other combination is what the state says, within a turn, and goes on by its rate.
+        """
+        sharing = self._observables[path].sharing
+        if not sharing or not np.any(raw[sharing[2]]):
+            return raw[path]
+        both, signs = np.array([raw[one] for one in sharing[:2]]), np.sign(raw[sharing[2]])
+        rates = np.array([raw[self._observables[one].rate] for one in sharing[:2]])
+        said = np.array([self._said.get(one, 0.0) for one in sharing[:2]])
+        for i in np.flatnonzero(signs):
+            if not i and not any(one in self._said for one in sharing[:2]):
+                continue
+            ways = np.array([[1.0, signs[i]], [1.0, -signs[i]]])
+            expected, kept = ways @ (both[:, i - 1] if i else said)
+            if i:
+                step = 0.5 * (time[i] - time[i - 1]) * float(ways[0] @ (rates[:, i] + rates[:, i - 1]))
+                expected += step if np.isfinite(step) else 0.0
+            whole = ways[0] @ both[:, i]
+            whole += 2.0 * np.pi * np.round((expected - whole) / (2.0 * np.pi))
+            both[:, i] = 0.5 * (ways.T @ np.array([whole, kept]))
+        return np.asarray(both[sharing.index(path)])
 
     def _finely(self, factor: int, time: FloatArray) -> Run | None:
         """Return the same run with so many times the samples; None if there is none."""
@@ -104,7 +134,7 @@ class TurnCounter:
         return self._finer[factor]
 
 
-def _needed(rates: FloatArray, span: float) -> int:
+def _parts_of(rates: FloatArray, span: float) -> int:
     """Return into how many parts samples that lie a span apart are to be cut: a power of two."""
     known = rates[np.isfinite(rates)]
     if not len(known):
@@ -114,10 +144,9 @@ def _needed(rates: FloatArray, span: float) -> int:
     return 1 if change <= np.pi else 1 << int(np.ceil(np.log2(change)))
 
 
-def _read(segments: Sequence[SegmentRecord], path: str, rate: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    pieces = [SegmentQuantities(segment).values((path, rate)) for segment in segments]
-    values, rates = np.concatenate(pieces, axis=1)
-    return np.concatenate([segment.time for segment in segments]), values, rates
+def _read(segments: Sequence[SegmentRecord], paths: tuple[str, ...]) -> tuple[FloatArray, dict[str, FloatArray]]:
+    pieces = np.concatenate([SegmentQuantities(segment).values(paths) for segment in segments], axis=1)
+    return np.concatenate([segment.time for segment in segments]), dict(zip(paths, pieces, strict=True))
 
 
 def _places(own: Sequence[SegmentRecord], finer: Sequence[SegmentRecord]) -> list[int]:

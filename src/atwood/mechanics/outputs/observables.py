@@ -44,6 +44,8 @@ class Observable:
         The expression, of time, coordinates, speeds, accelerations and reactions.
     rate
         Path of its rate, for a periodic one; empty if none is said.
+    sharing
+        Of two angles that share a value at a pole: their paths, and that of the sign with which the second is added.
     """
 
     path: str
@@ -52,6 +54,7 @@ class Observable:
     periodic: bool
     value: Expression
     rate: str = ""
+    sharing: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

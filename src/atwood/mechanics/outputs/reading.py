@@ -142,7 +142,7 @@ def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, 
         except MissingNameError as error:  # a name that is misspelt
             raise not_evaluated(path, law, error) from error
         except (AtwoodError, ArithmeticError):
-            continue  # it asks for an orientation that nothing determines, or that never leaves a pole
+            continue  # it asks for an orientation that nothing determines, or for what never leaves a pole
         except Exception as error:  # whatever a law of somebody's own can raise
             raise not_evaluated(path, law, error) from error
         if isinstance(value, tuple) and law.name in local.part.component.state_specs():
@@ -160,8 +160,17 @@ def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, 
         if has_inertia:
             take(mechanism, found, f"{path}.kinetic_energy", kinetic, "J", "Kinetic energy.", False)
         take(mechanism, found, f"{path}.potential_energy", potential, "J", "Potential energy.", False)
-    # A rate that has no value, as of an angle that never leaves a pole, tells no turns.
-    return {name: one if one.rate in found else replace(one, rate="") for name, one in found.items()}
+    # A rate that has no value tells no turns.
+    found = {name: one if one.rate in found else replace(one, rate="") for name, one in found.items()}
+    sharing: dict[str, list[str]] = {}
+    for law in local.part.component.laws("observable"):
+        if law.options.pole and f"{path}.{law.name}" in found:
+            sharing.setdefault(f"{path}.{law.options.pole}", []).append(f"{path}.{law.name}")
+    for pole, angles in sharing.items():
+        if pole in found and len(angles) == 2:
+            shared = (*angles, pole)  # also where it is a sum of coordinates by itself, as it is at a pole for ever
+            found.update({angle: replace(found[angle], periodic=True, sharing=shared) for angle in angles})
+    return found
 
 
 class Reader:

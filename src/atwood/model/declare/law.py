@@ -102,6 +102,7 @@ class ObservableOptions:
     periodic: bool
     rate: str
     spaces: tuple[str, ...]
+    pole: str = ""
 
 
 @dataclass(frozen=True)

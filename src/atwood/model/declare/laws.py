@@ -242,7 +242,7 @@ def joint(
     return lambda function: mark(function, Law("joint", function.__name__, options))
 
 
-@takes(DeclarationError, unit=TEXT, doc=DOC, periodic=FLAG, rate=TEXT, spaces=_SPACES)
+@takes(DeclarationError, unit=TEXT, doc=DOC, periodic=FLAG, rate=TEXT, spaces=_SPACES, pole=TEXT)
 def observable(
     *,
     unit: str,
@@ -250,6 +250,7 @@ def observable(
     periodic: bool = False,
     rate: str = "",
     spaces: Sequence[str] = ("line", "plane", "space"),
+    pole: str = "",
 ) -> Callable[[Callable[[Any], _R]], ObservableLaw[_R]]:
     """Mark a method that returns a quantity to report: a scalar or a `Vector`.
 
@@ -265,6 +266,11 @@ def observable(
         Name of the observable that is its rate, by which the turns of a periodic one are counted.
     spaces
         The spaces in which it has a meaning.
+    pole
+        Of two periodic angles of which at a pole only the sum or the difference has a value, as of Euler angles: the
+        name of the observable that is, there, the sign with which the second is added to the first, and zero
+        elsewhere. By itself a state gives the first one zero; along a run the other combination stays what it was
+        before.
     """
     parse_si_unit(unit)
 
@@ -276,7 +282,7 @@ def observable(
             known = self._known_observable(name)
             return function(self) if known is None else known
 
-        law = Law("observable", name, ObservableOptions(unit, doc, periodic, rate, tuple(spaces)))
+        law = Law("observable", name, ObservableOptions(unit, doc, periodic, rate, tuple(spaces), pole))
         return ObservableLaw(read, law)
 
     return decorate
