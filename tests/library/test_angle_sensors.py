@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import atwood_library as lib
 from atwood import ParameterError, Scene, assemble, simulate
-from atwood_library.sensors.orientation_sensor import CONVENTIONS
+from atwood_library.interfaces.euler_angles import CONVENTIONS
 
 ANGLES = (0.7, 0.4, -1.1)
 RATES = (0.5, -0.3, 0.9)

@@ -28,7 +28,7 @@ Axes = tuple[Vector, Vector, Vector]
 
 def _sequence(convention: str) -> tuple[str, str, str, bool, float]:
     """Return the first two axes and the one that is left, whether the first comes again, and the sense of the three."""
-    i, j, last = convention
+    i, j, last = tuple(convention)
     k = next(axis for axis in "xyz" if axis not in (i, j))
     return i, j, k, last == i, 1.0 if (i + j + k) in ("xyz", "yzx", "zxy") else -1.0
 

@@ -24,7 +24,7 @@ from atwood import (
     sqrt,
     turn,
 )
-from atwood_library.sensors.orientation_sensor import CONVENTIONS
+from atwood_library.interfaces.euler_angles import CONVENTIONS
 
 
 class Weld(Component):

@@ -81,7 +81,7 @@ def _in_law(component: Component, law: Law) -> Iterator[tuple[str, str]]:
         yield from _named("an observable", options.coordinates, observables)
         yield from _wrong_arguments(cls, law)
     elif law.kind == "observable":
-        yield from _named("an observable", filter(None, (options.rate, options.pole)), observables)
+        yield from _named("an observable", [one for one in (options.rate, options.pole) if one], observables)
     elif law.kind == "event":
         yield from _wrong_target(component, law)
     elif law.kind == "derivative":

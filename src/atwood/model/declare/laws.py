@@ -267,10 +267,8 @@ def observable(
     spaces
         The spaces in which it has a meaning.
     pole
-        Of two periodic angles of which at a pole only the sum or the difference has a value, as of Euler angles: the
-        name of the observable that is, there, the sign with which the second is added to the first, and zero
-        elsewhere. By itself a state gives the first one zero; along a run the other combination stays what it was
-        before.
+        Of two periodic angles of which at a pole only the sum or the difference has a value: the name of the
+        observable that is there the sign of the second in it, and elsewhere zero. Along a run the other stays.
     """
     parse_si_unit(unit)
 
