@@ -19,8 +19,7 @@ from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.function_values import Function
-from atwood.model.declare.law import Law
-from atwood.model.declare.laws import scalars
+from atwood.model.declare.law import Law, scalars
 from atwood.model.values.rotation import Rotation
 from atwood.model.values.units import Exponents, parse_unit
 from atwood.model.values.vector import Vector

@@ -13,8 +13,7 @@ from atwood.consistency.trials import STEP, Pose, Trial, in_components, nudged, 
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.model.declare.connectors import Motion
-from atwood.model.declare.law import Law
-from atwood.model.declare.laws import scalars
+from atwood.model.declare.law import Law, scalars
 from atwood.model.values.rotation import FREE
 
 __all__ = ["Unknown", "attempt", "wrong_joint", "wrong_rates"]

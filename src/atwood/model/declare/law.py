@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import keyword
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Literal, TypeVar
 
 from atwood.arguments import NAME, Kind as ArgumentKind, Refused
@@ -22,6 +22,7 @@ __all__ = [
     "ObservableOptions",
     "UpdateOptions",
     "mark",
+    "scalars",
 ]
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -156,3 +157,8 @@ def _reaction(value: Any) -> str:
 
 
 REACTION = ArgumentKind("a name of letters, digits and _", _reaction)
+
+
+def scalars(value: Any) -> list[Any]:
+    """Return what a law gave as a list of scalars."""
+    return list(value) if isinstance(value, Iterable) else [value]

@@ -7,7 +7,7 @@ functions, and never sees the graph or the solver. Newton's equations are put to
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar, overload
 
 from atwood.arguments import (
@@ -26,7 +26,6 @@ from atwood.arguments import (
     whole,
 )
 from atwood.errors import DeclarationError
-from atwood.expr import Scalar
 from atwood.model.declare.law import (
     REACTION,
     ActingOptions,
@@ -273,15 +272,14 @@ def observable(
     parse_si_unit(unit)
 
     def decorate(function: Callable[[Any], _R]) -> ObservableLaw[_R]:
-        name = function.__name__
+        name, options = function.__name__, ObservableOptions(unit, doc, periodic, rate, tuple(spaces), pole)
 
         @functools.wraps(function)
         def read(self: Any) -> Any:
             known = self._known_observable(name)
             return function(self) if known is None else known
 
-        law = Law("observable", name, ObservableOptions(unit, doc, periodic, rate, tuple(spaces), pole))
-        return ObservableLaw(read, law)
+        return ObservableLaw(read, Law("observable", name, options))
 
     return decorate
 
@@ -397,8 +395,3 @@ def update(
     names = (sets,) if isinstance(sets, str) else tuple(sets)
     options = UpdateOptions(names, every, offset, at, when, None if reads is None else tuple(reads), pure)
     return lambda function: mark(function, Law("update", function.__name__, options))
-
-
-def scalars(value: Any) -> list[Scalar]:
-    """Return what a law gave as a list of scalars."""
-    return list(value) if isinstance(value, Iterable) else [value]

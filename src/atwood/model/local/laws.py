@@ -17,8 +17,7 @@ from atwood.late import dataclass, replace
 from atwood.model.declare.binding import Binding, bind
 from atwood.model.declare.carried_inertia import Asked, Carried
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
-from atwood.model.declare.law import Law
-from atwood.model.declare.laws import scalars
+from atwood.model.declare.law import Law, scalars
 from atwood.model.local.bound import bind_part
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.gravity_field import energies_in

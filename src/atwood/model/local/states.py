@@ -7,8 +7,7 @@ from typing import Any
 
 from atwood.errors import DeclarationError, suggestion
 from atwood.expr import Expression, Graph
-from atwood.model.declare.law import Law
-from atwood.model.declare.laws import scalars
+from atwood.model.declare.law import Law, scalars
 from atwood.model.declare.states import StateSpec
 from atwood.model.local.flatten import Part
 from atwood.model.local.parts import DiscreteState, LocalState

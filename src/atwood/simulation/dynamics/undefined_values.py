@@ -21,7 +21,7 @@ from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.model.declare.binding import bind
 from atwood.model.declare.contributions import CoordinateLoad, Load
-from atwood.model.declare.laws import scalars
+from atwood.model.declare.law import scalars
 from atwood.model.local.laws import LocalPart
 
 __all__ = ["ADVICE_AT_START", "UndefinedValue", "find_undefined_value", "states_ahead", "undefined_value_at"]
