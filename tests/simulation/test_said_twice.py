@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 
-from atwood import Scene, StartError, assemble, simulate, sin
+from atwood import Result, Scene, StartError, assemble, simulate, sin
 from atwood.simulation.initialization.start import find_start
 from atwood_library import Drive, Ground, Link, Pivot, PointMass, RigidBody, Slider, Weld
+from atwood_library.scenes import SCENES
 
 FORMS = ("reduced", "dae")
 
@@ -101,3 +103,69 @@ def test_what_another_run_has_left_of_a_speed_is_a_start() -> None:
     scene.start.update({"pivot.angle": 0.3, "pivot.angular_velocity": 1.6e-206})
     found = simulate(scene, t_end=0.1, outputs=2)
     assert found["pivot.angle"][-1] == pytest.approx(0.3, abs=1e-15)
+
+
+# -- what a run said ---------------------------------------------------------------------------------------------------
+
+ROTATING = ("phi", "theta", "psi")
+
+
+def said_by(result: Result) -> dict[str, float]:
+    """Return all positions, orientations and speeds at the end of a run."""
+    bodies = [path.removesuffix(".theta") for path in result if path.endswith(".theta")]
+    paths = [f"{body}.{name}" for body in bodies for name in ROTATING]
+    for path in result:
+        last = path.rpartition(".")[2]
+        if last in ("angle", "displacement", "angular_velocity", "speed") or re.search(
+            r"\.(position|velocity|spin)\.", path
+        ):
+            paths.append(path)
+    return {path: float(result[path][-1]) for path in paths if np.isfinite(result[path][-1])}
+
+
+RESTARTED = (
+    *("four-bar", "slider-crank", "andrews-squeezer", "scott-russell-lift", "bricard", "gyroscope", "heavy-top"),
+    *("lagrange-top", "stewart-platform", "double-pendulum-3d", "spherical-pendulum", "benchmark-bicycle", "trebuchet"),
+)
+
+
+@pytest.mark.sample(5)
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("name", RESTARTED)
+def test_what_a_run_says_is_a_start(name: str, form: str) -> None:
+    """All of it is said, many times what would do, with the rounding that it has."""
+    scene = SCENES[name]()
+    end = min(0.1, scene.t_end)
+    said = said_by(simulate(scene, form=form, t_end=end, outputs=2))
+    again = SCENES[name](t_start=end, t_end=2.0 * end)
+    again.start.clear()
+    again.start.update(said)
+    found = simulate(again, form=form, t_end=end + 1e-6, outputs=2)
+    for path, value in said.items():
+        assert found[path][0] == pytest.approx(value, rel=1e-7, abs=1e-7), path
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("name", [name for name in RESTARTED if name != "benchmark-bicycle"])
+def test_rounding_at_rest_is_no_contradiction(name: str, form: str) -> None:
+    said = said_by(simulate(SCENES[name](), form=form, t_end=1e-6, outputs=2))
+    chance = np.random.default_rng(2)
+    for size in (1e-16, 1e-14, 1e-12):
+        scene = SCENES[name]()
+        scene.start.clear()
+        for path, value in said.items():
+            is_speed = re.search(r"(angular_velocity|speed)$|\.(velocity|spin)\.", path)
+            scene.start[path] = size * chance.uniform(-1.0, 1.0) if is_speed else value
+        result = simulate(scene, form=form, t_end=1e-6, outputs=2)
+        assert np.max(np.abs(result.run.segments[0].speeds[:, 0])) < 1e-9
+
+
+def test_speeds_that_would_part_what_is_joined_contradict_each_other() -> None:
+    """However slow they are, for a scene that lasts as long."""
+    for span in (1.0, 1e9):
+        scene = SCENES["double-pendulum"](t_end=span)
+        scene.start.update({"rod1.angular_velocity": 1e-3 / span, "bob1.velocity.x": 2e-3 / span})
+        scene.start["bob1.velocity.z"] = 0.0
+        with pytest.raises(StartError, match="contradict"):
+            simulate(scene, t_end=1e-3 * span)

@@ -26,6 +26,9 @@ _KNOWN = 1e-6
 def _least_rates(assembly: Assembly, level: Level, rows: FloatArray, length: float, fastest: float) -> FloatArray:
     """Return for each condition what counts as nothing: rounding beside what is fastest, or not seen in all the time.
 
+    Not seen is what takes nothing farther, in all the time of the scene, than what is apart in one place: so speeds
+    that a run gave, with their rounding, are a start again, also of a mechanism that was just at rest.
+
     Parameters
     ----------
     assembly, level
@@ -40,9 +43,10 @@ def _least_rates(assembly: Assembly, level: Level, rows: FloatArray, length: flo
     said = np.array([abs(one.value) for one in level.fixed])
     units = np.array([length if one.observable.unit == "m/s" else 1.0 for one in level.fixed])
     span = assembly.flat.t_end - assembly.flat.t_start
-    rate = max(fastest, float(np.max(said / units, initial=0.0)), 1.0 / span if span > 0.0 else 0.0)
+    rate = max(fastest, float(np.max(said / units, initial=0.0)))
     sizes = np.concatenate([rows[: len(rows) - len(units)], units])
-    return rate * certain(np.zeros_like(sizes), sizes)
+    unseen = tolerances.CLOSED / span * sizes if span > 0.0 else 0.0
+    return rate * certain(np.zeros_like(sizes), sizes) + unseen
 
 
 def _told(
