@@ -158,7 +158,7 @@ def test_rounding_at_rest_is_no_contradiction(name: str, form: str) -> None:
             is_speed = re.search(r"(angular_velocity|speed)$|\.(velocity|spin)\.", path)
             scene.start[path] = size * chance.uniform(-1.0, 1.0) if is_speed else value
         result = simulate(scene, form=form, t_end=1e-6, outputs=2)
-        assert np.max(np.abs(result.run.segments[0].speeds[:, 0])) < 1e-9
+        assert np.max(np.abs(result.run.segments[0].speeds[:, 0])) < 1e-7  # of parts of millimetres
 
 
 def test_speeds_that_would_part_what_is_joined_contradict_each_other() -> None:
