@@ -55,7 +55,7 @@ def test_accuracy_counts_quantities_with_a_nominal_size():
     assert given.accuracy.is_met
     assert np.max(given.error("rod.tension")) <= 1e-7
     assert np.max(plain.error("rod.tension")) > 1e-7
-    assert math.isclose(given.accuracy.reached, np.max(given.error("rod.tension")) / 1e-3)
+    assert math.isclose(given.accuracy.reached, 3.0 * np.max(given.error("rod.tension")) / 1e-3)
 
 
 @pytest.mark.parametrize(

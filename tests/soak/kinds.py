@@ -10,8 +10,10 @@ from collections.abc import Callable
 from .trial import Discarded, Finding, Trial
 
 KINDS = {
+    "accuracies": "accuracies",
     "arguments": "arguments",
     "broken": "broken",
+    "control": "control",
     "files": "files",
     "interrupts": "interrupts",
     "methods": "methods",

@@ -20,6 +20,9 @@ __all__ = ["Accuracy", "compared_paths", "difference", "estimate_accuracy"]
 _LOST = 0.1
 """Errors beyond this share of the scene's size are no longer those of the same motion."""
 
+_SURE = 3.0
+"""So many times the distance of two solutions is told: the second has an error, too, at times one as large."""
+
 _DOUBT = 100.0
 """So many tolerances of a second solution its balance of energy may be off before it is not believed."""
 
@@ -35,17 +38,17 @@ class Accuracy:
 
     What is guaranteed: no solution is compared with whose energy drifts, at any sample, by more than its tolerance or
     the error that is told accounts for; see `atwood.EnergyLedger`. What is not: the distance of two solutions is an
-    estimate, right to a factor where errors are small. A law that both solutions step over is not seen where it leaves
-    the energy at all samples as it is, such as a short pulse that a function in Python gives to a body at rest. Errors
-    that keep the energy, as those of the time along a periodic motion, are told by the distance alone.
+    estimate of the error, so three times this distance is told. A law that both solutions step over is not seen where
+    it leaves the energy at all samples as it is, such as a short pulse that a function in Python gives to a body at
+    rest. Errors that keep the energy, as those of the time along a periodic motion, are told by the distance alone.
 
     Attributes
     ----------
     asked
         The largest error that was asked for; None if none was.
     reached
-        The estimated error of positions, relative to the extent of the scene, of angles, rad, and of quantities with
-        nominal sizes, relative to these: the largest over all outputs. Infinite where it is not known.
+        Three times the estimated error of positions, relative to the extent of the scene, of angles, rad, and of
+        quantities with nominal sizes, relative to these: the largest over all outputs. Infinite where it is not known.
     path
         Which quantity it is of.
     until
@@ -164,7 +167,7 @@ def estimate_accuracy(first: Run, second: Run, time: FloatArray, error: Callable
     worst, path = 0.0, ""
     late = len(time)
     for one, scale in scales.items():
-        found = error(one) / scale
+        found = _SURE * error(one) / scale
         largest = float(np.max(found, initial=0.0))
         if not largest <= worst:
             worst, path = largest, one

@@ -13,7 +13,7 @@ from atwood.simulation.run.made import Run
 
 __all__ = ["accurate_run"]
 
-_FIRST_BY_IDA = 0.03
+_FIRST, _FIRST_BY_IDA = 0.3, 0.01
 """The first tolerance, relative to the error that was asked for: errors of IDA add up more than those of others."""
 
 _SHARE = 0.3
@@ -48,7 +48,7 @@ def accurate_run(
         The run with the loosest of the tolerances that were tried which meets it, else the most accurate one; the
         second solution; and, where the limit is not met, what was reached and until when, in words.
     """
-    rtol = min(1e-2, accuracy * (_FIRST_BY_IDA if solver.startswith("ida") else 1.0))
+    rtol = min(1e-2, accuracy * (_FIRST_BY_IDA if solver.startswith("ida") else _FIRST))
     best: Result | None = None
     failure = ""
     for _ in range(_RUNS):
