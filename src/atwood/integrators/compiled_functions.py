@@ -7,7 +7,7 @@ from collections.abc import Callable
 from atwood.arrays import FloatArray
 from atwood.late import dataclass
 
-__all__ = ["Lookout", "NativeCallbacks"]
+__all__ = ["Lookout", "NativeCallbacks", "StepGuard"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,4 +107,27 @@ class Lookout:
     due: Callable[[], float]
     due_at: int = 0
     look: int = 0
+    keep: object = None
+
+
+@dataclass(frozen=True, eq=False)
+class StepGuard:
+    """What judges a step that a method would keep: whether laws did something within it that slopes may have missed.
+
+    Parameters
+    ----------
+    function
+        Address of ``int (double t0, y0, yp0, double t1, y1, yp1, data)``: times, values and rates at both ends of a
+        step; it returns 0 where the step is good.
+    data
+        Its last argument.
+    passes
+        The same for Python: ``passes(t0, y0, yp0, t1, y1, yp1)``.
+    keep
+        Whatever must live as long as the addresses are used.
+    """
+
+    function: int
+    data: int
+    passes: Callable[[float, FloatArray, FloatArray, float, FloatArray, FloatArray], bool]
     keep: object = None

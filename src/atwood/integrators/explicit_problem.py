@@ -14,7 +14,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.compiled_functions import Lookout
+from atwood.integrators.compiled_functions import Lookout, StepGuard
 from atwood.integrators.event_location import State
 from atwood.integrators.protocol import FloatArray, SolverOptions, Values
 from atwood.late import dataclass
@@ -135,6 +135,8 @@ class ExplicitProblem:
     project
         ``project(t, y)``: the values nearest to these that meet the constraints, with which steps end; None where there
         are none.
+    guard
+        What judges steps besides their error; None where there is nothing to be missed.
     """
 
     size: int
@@ -146,6 +148,7 @@ class ExplicitProblem:
     compiled: Callable[[], CompiledRates] | None = None
     compiled_events: Callable[[], CompiledEvents | None] | None = None
     project: Callable[[float, FloatArray], Values] | None = None
+    guard: StepGuard | None = None
 
     def __post_init__(self) -> None:
         if self.size < 1:

@@ -6,7 +6,7 @@ it knows of a problem comes in through pointers, so that it is compiled once and
 
 from __future__ import annotations
 
-from atwood.integrators.dop853.ends_code import begin_code, project_code, watch_code
+from atwood.integrators.dop853.ends_code import begin_code, guard_code, project_code, watch_code
 from atwood.integrators.dop853.layout import COUNTS, NUMBERS, POINTERS, prologue
 from atwood.integrators.dop853.reference import APART, GROWTH, RETREAT, SAFETY, SHRINKAGE
 from atwood.integrators.dop853.stepping_code import ROWS, loop_code
@@ -192,7 +192,11 @@ last:
 renew:
   %e12 = call i32 @evaluate(ptr %session, double %t_new, i64 {ROWS["trial"]}, i64 12)
   %ok12 = icmp eq i32 %e12, 0
-  br i1 %ok12, label %accept, label %retreat
+  br i1 %ok12, label %judged, label %retreat
+judged:
+  %passed = call i32 @guarded(ptr %session, double %t, double %t_new)
+  %passes = icmp eq i32 %passed, 0
+  br i1 %passes, label %accept, label %retreat
 {_rejection()}"""
 
 
@@ -358,6 +362,7 @@ def step_code() -> str:
         _look(),
         project_code(),
         watch_code(),
+        guard_code(),
         _run(),
         _densify(),
         _interpolate(),

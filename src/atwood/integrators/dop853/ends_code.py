@@ -6,7 +6,7 @@ from atwood.integrators.dop853.layout import prologue
 from atwood.integrators.dop853.stepping_code import ROWS
 from atwood.integrators.machine_text import exact
 
-__all__ = ["begin_code", "project_code", "watch_code"]
+__all__ = ["begin_code", "guard_code", "project_code", "watch_code"]
 
 _STRETCH = 1.5
 """The end of a step takes the place of a look that was wanted before, if that makes the way to it longer by no more."""
@@ -132,6 +132,27 @@ ask:
   %index = mul i64 %m, {ROWS["trial"]}
   %y = getelementptr double, ptr %arrays, i64 %index
   %code = call i32 %project(double %t, ptr %y, ptr %project_data)
+  ret i32 %code
+nothing:
+  ret i32 0
+}}"""
+
+
+def guard_code() -> str:
+    """Return the function that asks what judges steps about one that is good enough otherwise; 0 where it is good."""
+    rows = {"y0": ROWS["y"], "p0": 0, "y1": ROWS["trial"], "p1": 12}
+    places = "\n".join(
+        f"  %{name}.index = mul i64 %m, {row}\n  %{name} = getelementptr double, ptr %arrays, i64 %{name}.index"
+        for name, row in rows.items()
+    )
+    return f"""define internal i32 @guarded(ptr %session, double %t0, double %t1) #0 {{
+entry:
+{prologue()}
+  %is_free = icmp eq ptr %guard, null
+  br i1 %is_free, label %nothing, label %ask
+ask:
+{places}
+  %code = call i32 %guard(double %t0, ptr %y0, ptr %p0, double %t1, ptr %y1, ptr %p1, ptr %guard_data)
   ret i32 %code
 nothing:
   ret i32 0

@@ -40,6 +40,8 @@ POINTERS = (
     "watch",
     "watch_data",
     "due",
+    "guard",
+    "guard_data",
 )
 
 

@@ -170,6 +170,9 @@ class CompiledStepper:
         self._numbers[_R : _FIRST + 1] = options.relative_tolerance, longest, options.horizon, options.first_step or 0.0
         self._pointers[:5] = rates.function, rates.data, base + 8 * ends[0], base + 8 * ends[1], base
         self._pointers[_PROJECT : _PROJECT + 2] = rates.project, rates.project_data
+        if problem.guard is not None:
+            self._keep = (self._keep, problem.guard)
+            self._pointers[_GUARD : _GUARD + 2] = problem.guard.function, problem.guard.data
         self._session = base + 8 * ends[2]
         self._places = base + 8 * ends[3], base + 8 * ends[4]
         self._run, self._interpolate, self._sample, self._begin = functions()
@@ -319,7 +322,7 @@ _T, _STOP, _R, _LONGEST, _HORIZON, _FIRST = map(NUMBERS.index, ("t", "stop", "re
 _T_OLD = NUMBERS.index("t_old")
 _LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
 _EVENTS, _HEEDS, _SEEN = map(COUNTS.index, ("event_count", "heeds", "seen"))
-_PROJECT, _WATCH = map(POINTERS.index, ("project", "watch"))
+_PROJECT, _WATCH, _GUARD = map(POINTERS.index, ("project", "watch", "guard"))
 
 
 @once

@@ -87,7 +87,7 @@ class ReferenceStepper:
 
     def __init__(self, problem: ExplicitProblem, options: SolverOptions) -> None:
         self._rates, self._size, self._options = problem.rates, problem.size, options
-        self._project = problem.project
+        self._project, self._guard = problem.project, problem.guard
         self._absolute = absolute_tolerances(options, problem.size)
         self._longest = options.max_step or inf
         self._counts = Counts()
@@ -189,7 +189,7 @@ class ReferenceStepper:
             if error <= 1.0:
                 new = self._held(t + h, new)
                 slope = self._slope(t + h, new)
-                if np.isfinite(slope).all():
+                if np.isfinite(slope).all() and self._passes(t + h, new, slope):
                     break
                 error = np.nan
             h *= 1.0 / min(SHRINKAGE, _root(error) / SAFETY) if isfinite(error) else RETREAT
@@ -203,6 +203,10 @@ class ReferenceStepper:
         self._y_old, self._y = y, new
         self._counts.steps += 1
         return True
+
+    def _passes(self, t: float, new: FloatArray, slope: FloatArray) -> bool:
+        guard = self._guard
+        return guard is None or guard.passes(self._t, self._y, self._slopes[0], t, new, slope)
 
     def _held(self, t: float, y: FloatArray) -> FloatArray:
         """Return values at the end of a step on the constraints; nan where these cannot be met."""

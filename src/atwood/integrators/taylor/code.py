@@ -7,7 +7,7 @@ pointers to the two compiled programs of its recurrences, so that it is compiled
 from __future__ import annotations
 
 from atwood.integrators.machine_text import exact, sample_code, unpack
-from atwood.integrators.taylor.problem import HIGHEST, LOWEST, RETREAT, RETRIES, SMALLER, WATCHED
+from atwood.integrators.taylor.problem import HIGHEST, LOWEST, PARTS, RETREAT, RETRIES, SMALLER, WATCHED
 from atwood.integrators.taylor.start_code import begin_code
 from atwood.integrators.taylor.stepping_code import LANES, ROWS, STRIDE, loop_code
 
@@ -27,6 +27,7 @@ POINTERS = (
     *("start_derived", "derived", "scratch", "known"),
     *("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out"),  # tables of pointers
     *("arrays", "table", "pair_sums", "square_sums", "numbers", "counts"),
+    *("guard", "guard_data"),
 )
 FUNCTIONS = ("run", "interpolate", "sample", "begin")
 
@@ -253,7 +254,56 @@ compare:
   %pace = fdiv double 1.0, %unit
   %weight = fdiv double %h, %p.number
   %missed = call i1 @misses(ptr %arrays, i64 %m, double %pace, double %weight, double %allowed)
-  br i1 %missed, label %retreat, label %accept"""
+  br i1 %missed, label %retreat, label %judge
+judge:
+  %asked = call i32 @guarded(ptr %session, double %t, double %h)
+  %passes = icmp eq i32 %asked, 0
+  br i1 %passes, label %accept, label %retreat"""
+
+
+def _guarded() -> str:
+    """Return the function that asks what judges steps about each quarter of one; 0 where all are good."""
+    return f"""define internal i32 @guarded(ptr %session, double %t, double %h) #0 {{
+entry:
+{_prologue()}
+{_row("y", "y")}
+{_row("rates", "rates")}
+{_row("trial", "trial")}
+{_row("slope", "trial_rates")}
+{_row("kept", "kept")}
+{_row("kept.rates", "kept_rates")}
+  %is.free = icmp eq ptr %guard, null
+  br i1 %is.free, label %good, label %begin
+begin:
+  %bytes = mul i64 %n, 8
+  %unit = load double, ptr %unit.at
+  call void @llvm.memcpy.p0.p0.i64(ptr %kept, ptr %y, i64 %bytes, i1 false)
+  call void @llvm.memcpy.p0.p0.i64(ptr %kept.rates, ptr %rates, i64 %bytes, i1 false)
+  br label %part
+part:
+  %i = phi i64 [ 1, %begin ], [ %following, %passed ]
+  %t0 = phi double [ %t, %begin ], [ %t1, %passed ]
+  %number = sitofp i64 %i to double
+  %share = fmul double %number, {exact(1.0 / PARTS)}
+  %since = fmul double %share, %h
+  %t1 = fadd double %t, %since
+  %units = fdiv double %since, %unit
+  %pace = fdiv double 1.0, %unit
+  call void @inside(ptr %arrays, i64 %m, i64 %p, double %units, double %pace)
+  %code = call i32 %guard(double %t0, ptr %kept, ptr %kept.rates, double %t1, ptr %trial, ptr %slope, ptr %guard_data)
+  %ok = icmp eq i32 %code, 0
+  br i1 %ok, label %passed, label %bad
+passed:
+  call void @llvm.memcpy.p0.p0.i64(ptr %kept, ptr %trial, i64 %bytes, i1 false)
+  call void @llvm.memcpy.p0.p0.i64(ptr %kept.rates, ptr %slope, i64 %bytes, i1 false)
+  %following = add i64 %i, 1
+  %is.done = icmp sgt i64 %following, {PARTS}
+  br i1 %is.done, label %good, label %part
+good:
+  ret i32 0
+bad:
+  ret i32 1
+}}"""
 
 
 def _run() -> str:
@@ -353,7 +403,7 @@ def step_code() -> str:
     They take a pointer to the pointers of a session, in the order of `POINTERS`; numbers and counts are in the order of
     `NUMBERS` and `COUNTS`.
     """
-    parts = [loop_code(), _evaluate(), begin_code(_prologue()), _expand(), _choose(), _run(), _interpolate()]
+    parts = [loop_code(), _evaluate(), begin_code(_prologue()), _expand(), _choose(), _guarded(), _run(), _interpolate()]
     parts += [sample_code("%session", _prologue(), "%n")]
     parts += ["declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)", "declare double @llvm.floor.f64(double)"]
     return "\n".join(parts)

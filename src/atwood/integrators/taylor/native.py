@@ -22,6 +22,7 @@ from atwood.codegen.once import once
 from atwood.errors import UsageError
 from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.event_location import State
+from atwood.integrators.compiled_functions import StepGuard
 from atwood.integrators.explicit_problem import Counts, Outcome, absolute_tolerances, no_interpolation
 from atwood.integrators.machine_text import WIDTH
 from atwood.integrators.protocol import FloatArray, SolverOptions
@@ -132,7 +133,7 @@ class _Layout:
         far |= {name: far["tables"] + 8 * at for name, at in zip(names, (0, 2, 4, 6, 8, 12), strict=True)}
         code = recurrences.addresses
         given = {"start": code["start"], "prologue": code["order_prologue"], "recurrence": code["order"]}
-        given["start_derived"] = 0  # of each session
+        given |= dict.fromkeys(("start_derived", "guard", "guard_data"), 0)  # of each session
         self.pointers = np.array([{**far, **given}[name] for name in POINTERS], dtype=np.int64)
         self.is_own = np.array([name not in given for name in POINTERS], dtype=np.int64)
 
@@ -148,16 +149,24 @@ class CompiledStepper:
         The accuracy.
     order
         The order of the method; None takes the one that suits the tolerance.
+    guard
+        What judges steps besides their error.
     """
 
-    def __init__(self, problem: TaylorProblem, options: SolverOptions, order: int | None = None) -> None:
+    def __init__(
+        self,
+        problem: TaylorProblem,
+        options: SolverOptions,
+        order: int | None = None,
+        guard: StepGuard | None = None,
+    ) -> None:
         if problem.compiled is None:
             raise UsageError("there is no machine code of these recurrences")
         recurrences, derived = problem.compiled()
         self._size, self._options = recurrences.size, options
         self._keep = recurrences, derived
         chosen = choose_order(options) if order is None else order
-        self._lay_out(recurrences, derived)
+        self._lay_out(recurrences, derived, guard)
         n = self._size
         self._arrays[ROWS["floors"]] = 1.0
         self._arrays[ROWS["floors"], :n] = absolute_tolerances(options, n) / options.relative_tolerance
@@ -170,7 +179,7 @@ class CompiledStepper:
         self._numbers[_FIRST:] = options.first_step or 0.0, 0.0, problem.stop_time, share, *limits
         self._run, self._interpolate, self._sample, self._begin = _functions()
 
-    def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray) -> None:
+    def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray, guard: StepGuard | None) -> None:
         """Find a place for everything, in one piece of memory that begins with a cache line."""
         layout, n = recurrences.layout, self._size
         memory = np.zeros(layout.size + _LINE)
@@ -187,6 +196,9 @@ class CompiledStepper:
         pointers = whole[at["pointers"] : at["pointers"] + len(POINTERS)]
         pointers[:] = layout.pointers + base * layout.is_own
         pointers[POINTERS.index("start_derived")] = derived.ctypes.data
+        if guard is not None:
+            self._guard = guard
+            pointers[POINTERS.index("guard") :] = guard.function, guard.data
         self._session = base + 8 * at["pointers"]
         self._parameters = recurrences.addresses["start_prologue"], derived.ctypes.data, base + 8 * at["scratch"]
         self._outputs = base + 8 * at["values"], base + 8 * (at["values"] + n)

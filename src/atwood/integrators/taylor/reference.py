@@ -7,6 +7,7 @@ exact.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import inf, log2, sqrt
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from atwood.codegen.python.backend import compile_program
 from atwood.errors import KernelEvaluationError
+from atwood.integrators.compiled_functions import StepGuard
 from atwood.integrators.event_location import State
 from atwood.integrators.explicit_problem import (
     Counts,
@@ -26,6 +28,7 @@ from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.integrators.taylor.problem import (
     DEFECT,
     FLOOR,
+    PARTS,
     RETREAT,
     RETRIES,
     SMALLER,
@@ -51,9 +54,17 @@ class ReferenceStepper:
         The accuracy.
     order
         The order of the method; None takes the one that suits the tolerance.
+    guard
+        What judges steps besides their error.
     """
 
-    def __init__(self, problem: TaylorProblem, options: SolverOptions, order: int | None = None) -> None:
+    def __init__(
+        self,
+        problem: TaylorProblem,
+        options: SolverOptions,
+        order: int | None = None,
+        guard: StepGuard | None = None,
+    ) -> None:
         programs = problem.programs
         self._size = len(programs.start.inputs[1].symbols)
         self._order = choose_order(options) if order is None else order
@@ -64,7 +75,7 @@ class ReferenceStepper:
         self._allowed = DEFECT * options.relative_tolerance + FLOOR
         self._longest, self._stop_time, self._reach = options.max_step or inf, problem.stop_time, problem.reach
         self._horizon, self._first = options.horizon, options.first_step
-        self._counts = Counts()
+        self._counts, self._guard = Counts(), guard
         p, n = self._order, self._size
         self._series = np.zeros((p + 1, n))
         self._left, self._right = np.zeros((p + 1, programs.pairs)), np.zeros((p + 1, programs.pairs))
@@ -140,7 +151,7 @@ class ReferenceStepper:
             share = h / self._unit
             y, y_low = _add(self._y, self._y_low, self._moved(share))
             found = self._evaluate(t, y)
-            if found is not None and self._fits(share, h, y, found[0]):
+            if found is not None and self._fits(share, h, y, found[0]) and self._passes(h):
                 break
             self._counts.failures += 1
             h *= RETREAT
@@ -150,6 +161,18 @@ class ReferenceStepper:
         self._counts.steps += 1
         self._last = h
         return True
+
+    def _passes(self, h: float) -> bool:
+        """Return whether what judges steps finds nothing in any part of one."""
+        if self._guard is None:
+            return True
+        powers = np.arange(self._order + 1)
+        times, rows = h * np.linspace(0.0, 1.0, PARTS + 1), []
+        for share in times / self._unit:
+            slope = powers[1:] * share ** powers[:-1]
+            rows.append((share**powers @ self._series, slope @ self._series[1:] / self._unit))
+        ends = [(self._t + float(since), *row) for since, row in zip(times, rows, strict=True)]
+        return all(self._guard.passes(*one, *other) for one, other in pairwise(ends))
 
     def _evaluate(self, t: float, y: FloatArray) -> tuple[FloatArray, list[float]] | None:
         """Return the rates and the values that recurrences need; None where one is not finite."""

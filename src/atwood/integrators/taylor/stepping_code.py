@@ -20,7 +20,10 @@ LANES = 8
 STRIDE = LANES * (HIGHEST + 1)
 """How far one block is from the next: an odd number of rows, so that the rows of one order do not share cache sets."""
 
-_NAMES = ("y", "y_low", "new", "new_low", "rates", "new_rates", "slope", "floors", "sizes", "trial", "trial_rates")
+_NAMES = (
+    *("y", "y_low", "new", "new_low", "rates", "new_rates", "slope", "floors", "sizes"),
+    *("trial", "trial_rates", "kept", "kept_rates"),
+)
 ROWS = {"x": 0, **{name: HIGHEST + 1 + i for i, name in enumerate(_NAMES)}, "all": HIGHEST + 1 + len(_NAMES)}
 """The rows of the table of arrays: the coefficients of the unknowns from order zero on, and what steps need."""
 
@@ -300,6 +303,15 @@ def _look() -> str:
     return loop.function("look", ", i64 %order, double %share", ("share",))
 
 
+def _inside() -> str:
+    """Return the function that writes values, and the slopes of their polynomials, at a share of a step."""
+    loop = _Columns()
+    moved, slope = _horner(loop)
+    loop.keep(loop.each("fadd", loop.row(0), moved), "trial")
+    loop.keep(loop.each("fmul", slope, "%pace.all"), "trial_rates")
+    return loop.function("inside", ", i64 %order, double %share, double %pace", ("share", "pace"))
+
+
 def _misses() -> str:
     """Return the function that tells whether rates are not the slope of the polynomial."""
     loop = _Columns()
@@ -326,7 +338,7 @@ def _accept() -> str:
 def loop_code() -> str:
     """Return the functions."""
     parts = [_pairs(order) for order in range(1, HIGHEST)] + [_squares(order) for order in range(1, HIGHEST)]
-    parts += [_unfold(), _sizes(), _largest(), _move(), _look(), _misses(), _accept()]
+    parts += [_unfold(), _sizes(), _largest(), _move(), _look(), _inside(), _misses(), _accept()]
     parts += [
         f"declare {_BLOCK} @llvm.fmuladd.v{LANES}f64({_BLOCK}, {_BLOCK}, {_BLOCK})",
         f"declare {_PART} @llvm.fmuladd.v{WIDTH}f64({_PART}, {_PART}, {_PART})",

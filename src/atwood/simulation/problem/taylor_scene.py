@@ -166,9 +166,9 @@ def open_taylor(
     if stepper == "compiled" or (stepper == "auto" and series.compiled is not None):
         from atwood.integrators.taylor.native import CompiledStepper
 
-        takes = CompiledStepper(series, options)
+        takes = CompiledStepper(series, options, guard=problem.guard)
     else:
         from atwood.integrators.taylor.reference import ReferenceStepper
 
-        takes = ReferenceStepper(series, options)
+        takes = ReferenceStepper(series, options, guard=problem.guard)
     return ExplicitSession(problem, options, takes, t, y, budget)

@@ -192,7 +192,8 @@ class ClosedLoopSession:
         # Choices change at the end of a step, and not within it, where a state is known less well.
         first = len(probe.directions)
         ends = (*range(first, first + margins), *range(first + 2 * margins, len(directions)))
-        problem = replace(problem, event_rough=(*probe.rough, *ends))
+        guard = request.guard(self._solver, (solved.form, solved.values))
+        problem = replace(problem, event_rough=(*probe.rough, *ends), guard=guard)
         self._events = None
         if directions and problem.compiled is not None:
             problem = self._with_compiled(problem, solved, shifts)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from atwood.errors import UsageError
-from atwood.integrators.compiled_functions import NativeCallbacks
+from atwood.integrators.compiled_functions import NativeCallbacks, StepGuard
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession, Leave
 from atwood.integrators.protocol import Budget, FloatArray, ImplicitProblem, LinearSolver, Session, SolverOptions
@@ -18,8 +18,10 @@ from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.options import FIXED_STEPS, LEAST, SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.step_guard import REACHES, step_guard
 
 if TYPE_CHECKING:
+    from atwood.forms.loops.closed_form import ClosedForm
     from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
     from atwood.simulation.run.closed_session import ClosedLoopSession
     from atwood.simulation.singular.monitor import SingularityMonitor
@@ -51,6 +53,10 @@ class SolverRequest:
     end: float
     budget: Budget
     kept: KeptSession
+
+    def guard(self, solver: str, closed: tuple[ClosedForm, FloatArray] | None = None) -> StepGuard | None:
+        """Return what judges the steps of a method besides their error; see `step_guard`."""
+        return step_guard(self.plan.assembly, (self.plan.assembly.flat.t_start, self.options.t_end), REACHES[solver], closed)
 
     def horizon(self, t: float) -> float:
         """Return a typical length of what is left of the run at a time, s."""
@@ -241,7 +247,7 @@ def _open_steps(request: SolverRequest, t: float, y: FloatArray, leave: Leave | 
     from atwood.simulation.problem.explicit_scene import own_rates
 
     problem, kept, assembly = _explicit_problem(request, "explicit"), request.kept, request.plan.assembly
-    own = None if problem.events is not None else own_rates(assembly)
+    own = None if problem.events is not None or problem.guard is not None else own_rates(assembly)
     if own is None:
         return open_explicit(problem, request.settings(t, LOOSEST), t, y, request.budget, leave=leave, end=request.end)
     code, rates = own
@@ -263,7 +269,7 @@ def _open_constrained(request: SolverRequest, t: float, y: FloatArray, leave: Le
     settings = request.settings(t, LOOSEST)
     absolute = np.asarray(settings.absolute_tolerances)[: len(y)]
     settings = replace(settings, absolute_tolerances=absolute)
-    session = open_explicit(_watched(request, problem), settings, t, y, request.budget, leave=leave, end=request.end)
+    session = open_explicit(_watched(request, problem, "explicit"), settings, t, y, request.budget, leave=leave, end=request.end)
     session.limit_steps(longest_step(plan.assembly.own_equations, plan.program.split(y)[1]))
     return session
 
@@ -300,13 +306,13 @@ def _explicit_problem(request: SolverRequest, solver: str) -> ExplicitProblem:
             where=assembly.flat.name,
             advice="Use the solver 'explicit' or 'ida'.",
         )
-    return _watched(request, problem)
+    return _watched(request, problem, solver)
 
 
-def _watched(request: SolverRequest, problem: ExplicitProblem) -> ExplicitProblem:
-    """Return a problem whose events are machine code too, if they can be."""
+def _watched(request: SolverRequest, problem: ExplicitProblem, solver: str) -> ExplicitProblem:
+    """Return a problem with what judges its steps, whose events are machine code too, if they can be."""
     probe = request.probe
-    problem = replace(problem, event_rough=probe.rough)
+    problem = replace(problem, event_rough=probe.rough, guard=request.guard(solver))
     found = None if problem.events is None else probe.compiled(for_ida=False)
     if found is None:
         return problem

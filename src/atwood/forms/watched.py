@@ -1,0 +1,315 @@
+"""Laws that may act briefly or narrowly, and a program that says whether a step may have passed over what they do.
+
+An exponential, a hyperbolic tangent, a quotient or a high power changes with its argument as fast as that is large: a
+hill of a tenth of a metre on a way of many metres, a tap of a millisecond in an hour. A method that takes slopes at a
+few moments of a step may see nothing of it. So over each step the arguments of these functions are enclosed between
+bounds (`atwood.expr.core.enclosures`), and no argument may change by more than the function's own scale, unless the
+function is as good as constant there. What arguments are made of are linear functions, products, sines and cosines of
+coordinates and speeds; these lie between the control points of the cubics through their values and rates at both ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import inf
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp, live, substitute
+from atwood.expr.core.enclosures import Pair, enclose, magnitude
+from atwood.expr.core.functions import Scalar, absolute, log, maximum, minimum, select, sign, sqrt, tan
+from atwood.expr.core.intervals import bounds
+from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
+from atwood.late import dataclass
+from atwood.mechanics.build import resolve_signals
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map
+from atwood.model.local.laws import LocalPart
+
+__all__ = ["Curved", "find_curved", "is_needed", "watched_program"]
+
+_CURVED: Key[tuple[Curved, ...]] = Key("functions that may change fast")
+
+_FAINT = 60.0
+"""An exponential of less than minus this is as good as zero, whatever it is multiplied by."""
+
+_FLAT = 20.0
+"""Beyond this argument a hyperbolic tangent is one, to rounding."""
+
+_TURN = 3.0
+"""No angle that an argument is made of turns farther in a step, rad: its sine is between the control points then."""
+
+_HIGH = 4.0
+"""Powers from here on are curved."""
+
+_ALWAYS = frozenset({"exp", "tanh", "sinh", "cosh", "tan", "atan", "log", "pow"})
+
+
+@dataclass(frozen=True)
+class Curved:
+    """A function in a law that may change fast: its operation, what it is of, and its exponent if it is a power."""
+
+    operation: str
+    argument: Expression
+    exponent: Expression | None = None
+
+
+def find_curved(assembly: Assembly) -> tuple[Curved, ...]:
+    """Return the functions in the laws of a scene that may change fast, in the coordinates and speeds of its form."""
+    return assembly.shared.get(_CURVED, lambda: tuple(_find(assembly, assembly.own_equations)), assembly.form)
+
+
+def _find(assembly: Assembly, equations: Equations) -> Iterable[Curved]:
+    rows = [*equations.rows, *equations.rates, *(one.second for one in equations.constraints)]
+    found = dict.fromkeys(_curved_in(rows, _ALWAYS - {"log", "pow"}))
+    kinematics = equations.kinematics
+    signals = resolve_signals(assembly.mechanism, equations.site, kinematics, equations.read)
+    for local in equations.locals_.values():
+        laws, _ = in_joint_coordinates(local, kinematics, _laws_of(local))
+        mine = list(_curved_in([*laws, *signals.values()], _ALWAYS | {"div", "mul"}))
+        if mine:
+            mapping = {**local_map(equations.site, local, kinematics), **signals}
+            placed = substitute([one.argument for one in mine], mapping)
+            powers = substitute([one.exponent or equations.graph.one for one in mine], mapping)
+            more = zip(mine, placed, powers, strict=True)
+            found |= dict.fromkeys(Curved(a.operation, b, None if a.exponent is None else c) for a, b, c in more)
+    known = {equations.time, *equations.coordinates, *equations.speeds, *assembly.parameters}
+    for one in found:
+        nodes = live([one.argument] if one.exponent is None else [one.argument, one.exponent])
+        moves = any(node.is_symbol and not node.is_parametric and node not in assembly.parameters for node in nodes)
+        if moves and all(node in known for node in nodes if node.is_symbol):
+            yield one
+
+
+def _laws_of(local: LocalPart) -> list[Expression]:
+    """Return what the laws of a part give."""
+    found: list[Scalar] = [*local.potentials, *local.dissipations, *local.lagrangians, *local.stand_ins.values()]
+    found += [c for load in local.loads for c in (*load.force, *load.torque)]
+    found += [one.value for one in local.constraints] + [one.rate for one in local.states]
+    return [one for one in found if isinstance(one, Expression)]
+
+
+def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Iterable[Curved]:
+    nodes = live(outputs)
+    for node in nodes:
+        if node.is_parametric or node.operation not in operations:
+            continue
+        first = node.arguments[0]
+        if node.operation == "pow":
+            yield Curved("pow", first, node.arguments[1])
+        elif node.operation == "div":
+            over = node.arguments[1]
+            if not over.is_parametric and (first.is_parametric or over.operation != "sqrt"):  # else a direction
+                yield Curved("div", over)
+        elif node.operation == "mul":
+            base, power = node, 1.0
+            while base.operation == "mul" and base.arguments[0] is base.arguments[1]:
+                base, power = base.arguments[0], 2.0 * power
+            if power > _HIGH:
+                yield Curved("pow", base, node.graph.constant(power))
+        else:
+            yield Curved(node.operation, first)
+
+
+# -- how far an argument goes, in units of the function's scale ----------------------------------------------------
+
+
+def _span(one: Curved, argument: Pair, exponent: Pair | None) -> Scalar:
+    """Return how far a function changes between bounds of its argument, in units of its own scale."""
+    low, high = argument
+    if one.operation == "exp":
+        return maximum(high, -_FAINT) - maximum(low, -_FAINT)
+    if one.operation == "tanh":
+        return maximum(minimum(high, _FLAT), -_FLAT) - maximum(minimum(low, _FLAT), -_FLAT)
+    if one.operation in ("sinh", "cosh"):
+        return high - low
+    if one.operation == "atan":
+        return 3.0 * (_steep(high) - _steep(low))
+    if one.operation == "tan":
+        return 3.0 * (high - low)
+    least, most = (log(maximum(x, 1e-150)) for x in magnitude(argument))
+    if exponent is None:  # a quotient or a logarithm
+        return 2.0 * (most - least)
+    power = maximum(absolute(exponent[0]), absolute(exponent[1]))
+    ends = [select(exponent[1] < 0.0, x * power, maximum(x * power, -_FAINT)) for x in (least, most)]  # type: ignore[operator]
+    is_low = (exponent[0] > 0.0) * (exponent[1] <= _HIGH)  # type: ignore[operator]
+    return select(is_low, 0.0, ends[1] - ends[0])
+
+
+def _steep(x: Scalar) -> Scalar:
+    """Return the inverse of the hyperbolic sine."""
+    return sign(x) * log(absolute(x) + sqrt(x * x + 1.0))
+
+
+def is_needed(
+    assembly: Assembly, curved: Sequence[Curved], span: tuple[float, float], values: FloatArray, reach: float
+) -> bool:
+    """Return whether any of the functions can change by more than a step may, whatever coordinates and speeds are.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    curved
+        The functions.
+    span
+        The times of the run, s.
+    values
+        Values of the parameters.
+    reach
+        How far a function may change in a step, in units of its own scale.
+    """
+    equations = assembly.own_equations
+    known = {s: (np.array([v]), np.array([v])) for s, v in zip(assembly.parameters, values.tolist(), strict=False)}
+    anywhere = np.array([-inf]), np.array([inf])
+    known |= dict.fromkeys((*equations.coordinates, *equations.speeds), anywhere)
+    known[equations.time] = np.array([span[0]]), np.array([span[1]])
+    for one in curved:
+        pairs = bounds([one.argument] if one.exponent is None else [one.argument, one.exponent], known)
+        ends = [(float(low[0]), float(high[0])) for low, high in pairs]
+        with np.errstate(all="ignore"):
+            if not np.all(np.isfinite(ends[0])) and one.operation not in ("exp", "tanh"):
+                return True
+            found = float(_span(one, ends[0], ends[1] if one.exponent is not None else None))  # type: ignore[arg-type]
+        if not found <= reach:
+            return True
+    return False
+
+
+# -- the program ---------------------------------------------------------------------------------------------------
+
+
+def watched_program(
+    name: str,
+    curved: Sequence[Curved],
+    inputs: Sequence[InputGroup],
+    parameters: Sequence[Expression],
+    angles: Sequence[Expression] = (),
+    known: Mapping[Expression, Expression] | None = None,
+) -> Program:
+    """Return a program that says how far functions change over a step of a solver.
+
+    Its inputs are the time, the unknowns and their rates at the beginning of the step, then at its end, and the reach:
+    how far a function may change, in units of its own scale. Its one output is how many times that it changes.
+
+    Parameters
+    ----------
+    name
+        Named in messages.
+    curved
+        The functions.
+    inputs
+        The symbols of time, coordinates and speeds of the solver.
+    parameters
+        The symbols of parameters.
+    angles
+        The symbols of angles, of whose sines and cosines places are made.
+    known
+        What other coordinates and speeds are, in terms of the solver's.
+    """
+    (time,), *states = (group.symbols for group in inputs)
+    unknowns = [one for group in states for one in group]
+    graph = time.graph
+    ends = [_End(time, unknowns, number) for number in (0, 1)]
+    reach = graph.symbol("watched:reach")
+    along: dict[Expression, Expression | float] = {time: 1.0}
+    along |= {y: graph.symbol(f"watched:{y.name}'") for y in unknowns}
+    hull = _Hull(ends, along, set(parameters), set(angles), dict(known or {}))
+    wanted = [x for one in curved for x in (one.argument, one.exponent) if x is not None]
+    found = enclose(wanted, hull)
+    spans = [_span(one, found[one.argument.index], found[one.exponent.index] if one.exponent else None) for one in curved]
+    score: Scalar = 0.0
+    for span in spans:
+        score = maximum(score, span / reach)
+    for angle in hull.angles.values():
+        score = maximum(score, (angle[1] - angle[0]) * (1.0 / _TURN))
+    groups = [group for end in ends for group in end.groups]
+    outputs = (OutputGroup("share", (graph.convert(score),)),)
+    return Program(f"{name} (steps)", (*groups, InputGroup("reach", (reach,))), tuple(parameters), outputs)
+
+
+class _End:
+    """One end of a step: symbols for time, unknowns and their rates there."""
+
+    def __init__(self, time: Expression, unknowns: Sequence[Expression], number: int) -> None:
+        symbol = time.graph.symbol
+        self.time = symbol(f"watched:t{number}")
+        self.values = [symbol(f"watched:{y.name}:{number}") for y in unknowns]
+        self.rates = [symbol(f"watched:{y.name}':{number}") for y in unknowns]
+        moved = [symbol(f"watched:{y.name}'") for y in unknowns]
+        self.there = {time: self.time, **dict(zip([*unknowns, *moved], [*self.values, *self.rates], strict=True))}
+        self.groups = (
+            InputGroup(f"t{number}", (self.time,)),
+            InputGroup(f"y{number}", tuple(self.values)),
+            InputGroup(f"rates{number}", tuple(self.rates)),
+        )
+
+
+class _Hull:
+    """Bounds over a step of what is smooth in it: the control points of the cubic through both ends with their rates."""
+
+    def __init__(
+        self,
+        ends: Sequence[_End],
+        along: Mapping[Expression, Expression | float],
+        parameters: set[Expression],
+        coordinates: set[Expression],
+        known: Mapping[Expression, Expression],
+    ) -> None:
+        self._ends, self._along, self._parameters, self._known = ends, dict(along), parameters, known
+        self._coordinates = coordinates
+        self._smooth: dict[int, str] = {}
+        self.angles: dict[int, Pair] = {}
+
+    def __call__(self, node: Expression) -> Pair | None:
+        kind = self._kind(node)
+        if kind == "fixed":
+            return node, node
+        if kind == "":
+            return None
+        for one in live([node]):
+            if one.operation in ("sin", "cos") and self._kind(one) == "smooth":
+                angle = one.arguments[0]
+                if angle.index not in self.angles:
+                    self.angles[angle.index] = self._points(angle)
+        return self._points(node)
+
+    def _points(self, node: Expression) -> Pair:
+        (value,) = substitute([node], self._known) if self._known else [node]
+        (rate,) = jvp([value], self._along)
+        begin, end = (substitute([value, rate], one.there) for one in self._ends)
+        third = (self._ends[1].time - self._ends[0].time) * (1.0 / 3.0)
+        points = [begin[0], begin[0] + third * begin[1], end[0] - third * end[1], end[0]]
+        low: Scalar = points[0]
+        high: Scalar = points[0]
+        for point in points[1:]:
+            low, high = minimum(low, point), maximum(high, point)
+        return low, high
+
+    def _kind(self, node: Expression) -> str:
+        """Return ``"fixed"``, ``"angle"`` or ``"smooth"`` for what is so over any step; empty for all else."""
+        if node.index not in self._smooth:
+            for one in live([node]):
+                if one.index not in self._smooth:
+                    self._smooth[one.index] = self._kind_of(one)
+        return self._smooth[node.index]
+
+    def _kind_of(self, node: Expression) -> str:
+        if node.is_symbol:
+            if node in self._parameters:
+                return "fixed"
+            return "angle" if node in self._coordinates else "smooth"
+        kinds = [self._smooth[one.index] for one in node.arguments]
+        if all(kind == "fixed" for kind in kinds):
+            return "fixed"
+        if "" in kinds:
+            return ""
+        if node.operation in ("add", "sub", "neg"):
+            return "angle" if all(kind in ("angle", "fixed") for kind in kinds) else "smooth"
+        if node.operation == "mul":
+            return "smooth" if node.arguments[0] is not node.arguments[1] else ""
+        if node.operation == "div":
+            return "smooth" if kinds[1] == "fixed" else ""
+        return "smooth" if node.operation in ("sin", "cos") and kinds[0] == "angle" else ""

@@ -1,0 +1,72 @@
+"""Which runs have steps that laws could slip through, and what judges their steps (`atwood.forms.watched`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from atwood.arrays import FloatArray
+from atwood.expr import Expression, Program
+from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
+from atwood.forms.loops.closed_form import ClosedForm
+from atwood.forms.program import state_groups
+from atwood.forms.watched import find_curved, is_needed, watched_program
+from atwood.integrators.compiled_functions import StepGuard
+
+__all__ = ["REACHES", "step_guard"]
+
+REACHES = {"explicit": 8.0, "taylor": 1.0, "ida": 2.0, "ida-sundae": 2.0}
+"""How far a curved function may change in a step, in units of its own scale: as far as the slopes that a method takes
+show. Of a Taylor series that is so in each quarter of a step, of IDA at the end of a step alone."""
+
+_SHORTEST = 1e-13
+"""Relative to the run: steps that are no longer are taken as they are, and what lasts no longer is a moment."""
+
+_PROGRAM: Key[Program] = Key("how far functions in laws change over a step")
+_CODE: Key[object] = Key("machine code of that")
+
+
+def step_guard(
+    assembly: Assembly,
+    span: tuple[float, float],
+    reach: float,
+    closed: tuple[ClosedForm, FloatArray] | None = None,
+) -> StepGuard | None:
+    """Return what judges the steps of a session; None where no law can change faster than coordinates do.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    span
+        The times of the run, s.
+    reach
+        How far a function may change in a step; see `REACHES`.
+    closed
+        Its closed loops, solved by formulas, with the values of their parameters; None where all coordinates are
+        integrated.
+    """
+    curved = find_curved(assembly)
+    if not curved or not is_needed(assembly, curved, span, assembly.parameter_values, reach):
+        return None
+    form, values = closed or (None, assembly.parameter_values)
+
+    def make() -> Program:
+        equations, parameters = assembly.own_equations, assembly.parameters
+        angles = [s for s, one in zip(equations.coordinates, equations.names, strict=True) if one.unit == "rad"]
+        groups, known = state_groups(equations), None
+        if form is not None:
+            found = form.accelerations.program
+            groups, parameters, known = found.inputs, found.parameters, form.known
+        return watched_program(assembly.flat.name, curved, groups, parameters, angles, known)
+
+    shared = assembly.shared
+    try:
+        from atwood.codegen.llvm.step_guard import GuardCode, compile_guard
+    except ImportError:  # no compiler
+        return None
+    with shared.lock:
+        program = shared.get(_PROGRAM, make, assembly.form, form)
+    code = shared.get(_CODE, lambda: compile_guard(program), program)
+    assert isinstance(code, GuardCode)
+    return StepGuard(*code.bind(values, reach, _SHORTEST * abs(span[1] - span[0])))
