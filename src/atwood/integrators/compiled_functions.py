@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
+
+import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.errors import KernelEvaluationError
 from atwood.late import dataclass
 
-__all__ = ["Lookout", "NativeCallbacks", "StepGuard"]
+__all__ = ["GuardedResidual", "Lookout", "NativeCallbacks", "StepGuard"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,3 +135,41 @@ class StepGuard:
     data: int
     passes: Callable[[float, FloatArray, FloatArray, float, FloatArray, FloatArray], bool]
     keep: object = None
+
+
+class GuardedResidual:
+    """A residual in Python that judges each step before it is worked out.
+
+    It has no value where a step may have passed over something, which makes IDA try a smaller one. Time goes on only
+    from a step that was kept.
+
+    Parameters
+    ----------
+    residual
+        The residual itself.
+    guard
+        What judges.
+    size
+        How many of the unknowns, the first ones, are looked at.
+    """
+
+    def __init__(self, residual: Callable[..., Any], guard: StepGuard, size: int) -> None:
+        self._residual, self._guard, self._size = residual, guard, size
+        self._kept = self._tried = (0.0, np.zeros(size), np.zeros(size))
+        self._passes = True
+
+    def begin(self, t: float, y: FloatArray, yp: FloatArray) -> None:
+        """Hear of a start."""
+        self._kept = self._tried = (t, y[: self._size].copy(), yp[: self._size].copy())
+
+    def __call__(self, t: float, y: FloatArray, yp: FloatArray) -> Any:
+        """Return the values of the residual."""
+        if t > self._tried[0]:
+            self._kept = self._tried
+        here = (t, y[: self._size].copy(), yp[: self._size].copy())
+        if t != self._tried[0]:
+            self._passes = self._guard.passes(*self._kept, *here)
+        self._tried = here if self._passes else (t, *self._tried[1:])
+        if not self._passes:
+            raise KernelEvaluationError(f"a law may change too fast within a step to t = {t:.9g}")
+        return self._residual(t, y, yp)

@@ -94,6 +94,8 @@ class ImplicitProblem:
     pivots
         ``pivots(samples)``: an elimination of the matrix with fixed pivots, which are good for matrices given by
         their entries in the order of `pattern`; None if there is none.  It answers alike whenever it is asked.
+    begin
+        ``begin(t, y, yp)``, called at every start of a session: residuals that judge steps hear of it so.
     """
 
     size: int
@@ -107,6 +109,7 @@ class ImplicitProblem:
     event_rough: tuple[int, ...] = ()
     native: Callable[[LinearSolver], NativeCallbacks] | None = None
     pivots: ChoosePivots | None = None
+    begin: Callable[[float, FloatArray, FloatArray], None] | None = None
 
     def __post_init__(self) -> None:
         if self.size < 1:

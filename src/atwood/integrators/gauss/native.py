@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import warnings
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
 from typing import Protocol
@@ -13,8 +14,9 @@ from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.errors import KernelEvaluationError, SolveError, UnsupportedError
 from atwood.expr import Program
+from atwood.integrators.compiled_functions import StepGuard
 from atwood.integrators.event_location import State
-from atwood.integrators.explicit_problem import CompiledRates, Counts, Outcome
+from atwood.integrators.explicit_problem import CompiledRates, Counts, Outcome, sample_one_by_one
 from atwood.integrators.gauss.code import FUNCTIONS, gauss_code
 from atwood.integrators.gauss.layout import COUNTS, NUMBERS, POINTERS, Layout
 from atwood.integrators.gauss.tableau import tableau
@@ -23,6 +25,8 @@ from atwood.integrators.protocol import FloatArray
 __all__ = ["CompiledGauss", "CompiledMethod", "GaussStepper", "bind_functions"]
 
 _UNLIMITED = 2**62
+_CALM = 8
+"""After so many good steps one that was divided is made longer again."""
 _NO_VALUE = 3
 _HALVINGS, _LOOKED_AT, _CLOSE = 60, 40, 0.2
 """So many steps are tried, on so many steps of the motion each, until an error is so near to what is allowed."""
@@ -124,6 +128,8 @@ class GaussStepper:
         The step, s.
     sizes
         How large coordinates and momenta are in the scene.
+    guard
+        What judges steps. One that is not good is divided where that is allowed (`vary_step`), and told of elsewhere.
     """
 
     def __init__(
@@ -134,6 +140,7 @@ class GaussStepper:
         rates: CompiledRates,
         step: float,
         sizes: FloatArray,
+        guard: StepGuard | None = None,
     ) -> None:
         self._compiled, self._momenta, self._rates = compiled, momenta, rates
         layout = compiled.layout
@@ -148,6 +155,7 @@ class GaussStepper:
         self._memory[places["per_size"] : places["per_size"] + n] = 1.0 / sizes
         self._width = layout.coordinates + layout.speeds
         self._functions = compiled.functions
+        self._guard, self._longest, self._good, self._warned = guard, 0.0, 0, False
 
     @property
     def counts(self) -> Counts:
@@ -164,6 +172,10 @@ class GaussStepper:
         """Take steps of another length from the next start on."""
         self._numbers[_STEP] = step
 
+    def vary_step(self) -> None:
+        """Let steps be shorter than now where they would pass over something."""
+        self._longest = self.step
+
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether its equations have a value there."""
         layout = self._compiled.layout
@@ -178,9 +190,45 @@ class GaussStepper:
 
     def run(self, t_stop: float, steps: int) -> Outcome:
         """Take steps until one ends at or after a time, but no more than so many."""
+        if self._guard is not None:
+            return self._run_guarded(self._guard, t_stop, steps)
         self._numbers[_STOP] = t_stop
         self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
         return Outcome(self._checked(self._functions["run"](self._session)))
+
+    def _run_guarded(self, guard: StepGuard, t_stop: float, steps: int) -> Outcome:
+        """Take steps one by one; those that may have passed over something are taken again as two, and so on."""
+        last = self._counts[_STEPS] + steps
+        self._numbers[_STOP] = t_stop
+        while self._numbers[_T] < t_stop:
+            if self._counts[_STEPS] >= last:
+                return Outcome.USED_UP
+            before, memory = self.state(), self._memory.copy()
+            self._counts[_LIMIT] = self._counts[_STEPS] + 1
+            self._checked(self._functions["run"](self._session))
+            if guard.passes(*before, *self.state()):
+                self._good += 1
+                if self._good >= _CALM and self.step < self._longest:
+                    self._change_step(min(2.0 * self.step, self._longest), self.state())
+            elif self._longest:
+                counts = self._counts.copy()
+                self._memory[:] = memory
+                self._counts[_EVALUATIONS] = counts[_EVALUATIONS]
+                self._counts[_FAILURES] += 1
+                self._change_step(0.5 * self.step, before)
+            elif not self._warned:
+                self._warned = True
+                warnings.warn(
+                    f"at t = {before[0]:.6g} a law may change by more within a step of {self.step:.3g} s than the "
+                    "method sees: give a smaller step, or none",
+                    stacklevel=2,
+                )
+        return Outcome.REACHED
+
+    def _change_step(self, step: float, state: State) -> None:
+        self._good = 0
+        self.take_step(step)
+        self.start(state[0], state[1])
 
     def state(self) -> State:
         """Return time, values and rates at the end of the last step."""
@@ -195,6 +243,8 @@ class GaussStepper:
 
     def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
         """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
+        if self._guard is not None:
+            return sample_one_by_one(self, times, steps)
         times = np.ascontiguousarray(times, dtype=np.float64)
         y, yp = np.empty((2, len(times), self._width))
         self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
@@ -282,5 +332,6 @@ class GaussStepper:
 
 _T, _STOP, _STEP = map(NUMBERS.index, ("t", "stop", "step"))
 _LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
+_FAILURES, _EVALUATIONS = map(COUNTS.index, ("failures", "evaluations"))
 _COUNTED = tuple(map(COUNTS.index, ("steps", "failures", "evaluations", "undefined")))
 assert POINTERS[:2] == ("derived", "scratch")

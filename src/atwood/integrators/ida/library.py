@@ -82,6 +82,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
     "IDASetDeltaCjLSetup": (c_int, _P, _D),
     "IDASetInitStep": (c_int, _P, _D),
     "IDASetMaxStep": (c_int, _P, _D),
+    "IDASetMaxConvFails": (c_int, _P, c_int),
     "IDASetStopTime": (c_int, _P, _D),
     "IDAClearStopTime": (c_int, _P),
     "IDASetMaxNumSteps": (c_int, _P, c_long),

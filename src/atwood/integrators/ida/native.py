@@ -220,6 +220,8 @@ class NativeSession:
             self._locator.restart(state)
         if self._native is not None and self._native.restart_events is not None:
             self._native.restart_events(state[0])
+        if self._problem.begin is not None:
+            self._problem.begin(*state)
         self._here = state
         self._newest: State | None = state  # the end of the last step, where IDA has just taken a single one
         self._reached = state[0]

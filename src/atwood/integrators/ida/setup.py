@@ -24,6 +24,9 @@ _GROWTH, _SMOOTH_GROWTH, _HELD_GROWTH = 2.0, 1.5, 1.2
 _AGE, _SHORT_AGE, _FIXED_AGE = 0.25, 0.05, 0.1
 """Bounds for `IdaTuning.jacobian_age`: IDA's own, that for few unknowns, and with fixed pivots for many."""
 
+_SHORTENINGS = 40
+"""So often a step may be cut to a quarter where steps are judged."""
+
 _CHEAP, _CHEAPEST = 60, 40
 """Up to so many unknowns a new Jacobian costs little, and less than the iterations that it saves."""
 
@@ -130,6 +133,8 @@ def prepare(
     if native.events:
         memory.call("IDARootInit", problem.event_count, native.events)
         memory.call("IDASetNoInactiveRootWarn")
+    if problem.begin is not None:
+        memory.call("IDASetMaxConvFails", _SHORTENINGS)
     memory.call("IDASetMaxOrd", options.max_order)
     if options.first_step is not None:
         memory.call("IDASetInitStep", options.first_step)

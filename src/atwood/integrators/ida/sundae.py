@@ -116,7 +116,7 @@ class SundaeSession:
     ) -> None:
         self.budget = budget or Budget()
         self._opened = 0.0  # when it first went on
-        self._size = problem.size
+        self._size, self._begins = problem.size, problem.begin
         self._horizon = options.horizon
         self._record = _Record()
         self._create: Callable[[float], Any] = lambda share: _create_solver(
@@ -190,6 +190,8 @@ class SundaeSession:
         self._restart(state)
 
     def _restart(self, state: State) -> None:
+        if self._begins is not None:
+            self._begins(*state)
         self._solver.init_step(*state)
         if self._locator is not None:
             self._locator.restart(state)

@@ -159,10 +159,11 @@ def open_gauss(
     kernel = assembly.kernel(programs.momenta) if solved is None else solved.kernel(programs.momenta)
     momenta = momenta_of(programs, kernel)
     sizes = _canonical_sizes(momenta, t, y, len(y) - speeds, settings.sizes)
-    stepper = GaussStepper(compiled, values, momenta, problem.compiled(), settings.step or 1.0, sizes)
+    stepper = GaussStepper(compiled, values, momenta, problem.compiled(), settings.step or 1.0, sizes, problem.guard)
     if settings.step is None:
         absolute = np.broadcast_to(np.asarray(options.absolute_tolerances, dtype=float), y.shape)
         longest = stepper.find_step(t, y, settings.end, absolute, options.relative_tolerance)
         if options.max_step is not None and options.max_step < longest:
             stepper.take_step(options.max_step)
+        stepper.vary_step()
     return ExplicitSession(problem, options, stepper, t, y, budget, end=settings.end)

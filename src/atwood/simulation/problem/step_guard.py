@@ -15,7 +15,7 @@ from atwood.integrators.compiled_functions import StepGuard
 
 __all__ = ["REACHES", "step_guard"]
 
-REACHES = {"explicit": 8.0, "taylor": 1.0, "ida": 2.0, "ida-sundae": 2.0}
+REACHES = {"explicit": 8.0, "taylor": 1.0, "ida": 2.0, "ida-sundae": 2.0, "gauss": 8.0, "composition": 8.0}
 """How far a curved function may change in a step, in units of its own scale: as far as the slopes that a method takes
 show. Of a Taylor series that is so in each quarter of a step, of IDA at the end of a step alone."""
 

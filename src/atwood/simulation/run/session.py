@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from atwood.errors import UsageError
-from atwood.integrators.compiled_functions import NativeCallbacks, StepGuard
+from atwood.integrators.compiled_functions import GuardedResidual, NativeCallbacks, StepGuard
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession, Leave
 from atwood.integrators.protocol import Budget, FloatArray, ImplicitProblem, LinearSolver, Session, SolverOptions
@@ -56,7 +56,10 @@ class SolverRequest:
 
     def guard(self, solver: str, closed: tuple[ClosedForm, FloatArray] | None = None) -> StepGuard | None:
         """Return what judges the steps of a method besides their error; see `step_guard`."""
-        return step_guard(self.plan.assembly, (self.plan.assembly.flat.t_start, self.options.t_end), REACHES[solver], closed)
+        options, reach = self.options, REACHES[solver]
+        if solver in FIXED_STEPS and options.step is None:  # no error is estimated along the way
+            reach *= options.relative_tolerance ** (1.0 / (1 + (options.order or 8)))
+        return step_guard(self.plan.assembly, (self.plan.assembly.flat.t_start, options.t_end), reach, closed)
 
     def horizon(self, t: float) -> float:
         """Return a typical length of what is left of the run at a time, s."""
@@ -101,7 +104,7 @@ def open_implicit_session(
     """
     plan, probe, settings = request.plan, request.probe, request.settings(t)
     if solver == "ida":
-        problem = _with_events(_implicit_problem(request), probe)
+        problem = _guarded(_with_events(_implicit_problem(request), probe), request, solver)
         from atwood.integrators.ida import native as ida_native
 
         tuning = ida_native.IdaTuning(angle_like=plan.angles, stop_time=request.end)
@@ -114,12 +117,40 @@ def open_implicit_session(
         monitor.look_in_python()
     from atwood.integrators.ida.sundae import open_session
 
-    return open_session(_implicit_problem(request), settings, t, y, yp, request.budget)
+    problem = _guarded(_implicit_problem(request), request, solver)
+    return open_session(problem, settings, t, y, yp, request.budget)
 
 
 def _implicit_problem(request: SolverRequest) -> ImplicitProblem:
     probe = request.probe
     return replace(request.plan.problem(probe.function(), probe.directions), event_rough=probe.rough)
+
+
+def _guarded(problem: ImplicitProblem, request: SolverRequest, solver: str) -> ImplicitProblem:
+    """Return a problem whose residual judges steps, if laws could slip through them."""
+    guard, make = request.guard(solver), problem.native
+    if guard is None:
+        return problem
+    size = request.plan.program.coordinates + request.plan.program.speeds
+    residual = GuardedResidual(problem.residual, guard, size)
+    begins = [residual.begin]
+
+    def native(linear_solver: LinearSolver) -> NativeCallbacks:
+        from atwood.codegen.sundials.guarded_residual import guarded_residual
+
+        assert make is not None
+        made = make(linear_solver)
+        address, block, begin, own = guarded_residual(
+            (guard.function, guard.data), made.residual, made.user_data, made.data_bytes, size
+        )
+        begins[:] = [begin]
+        keep = (made.keep, guard, block, own)
+        return replace(made, residual=address, user_data=ctypes.addressof(block), data_bytes=0, keep=keep)
+
+    def begin(t: float, y: FloatArray, yp: FloatArray) -> None:
+        begins[0](t, y, yp)
+
+    return replace(problem, residual=residual, native=None if make is None else native, begin=begin)
 
 
 def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem:
@@ -138,7 +169,7 @@ def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem
         return replace(
             made,
             user_data=ctypes.addressof(block),
-            data_bytes=0,
+            data_bytes=ctypes.sizeof(block),
             events=found.ida,
             restart_events=found.restart,
             has_noticed=found.has_noticed,
