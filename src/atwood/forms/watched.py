@@ -15,10 +15,9 @@ from math import inf
 
 import numpy as np
 
-from atwood.arrays import FloatArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp, live, substitute
 from atwood.expr.core.enclosures import Pair, enclose, magnitude
-from atwood.expr.core.functions import Scalar, absolute, log, maximum, minimum, select, sign, sqrt, tan
+from atwood.expr.core.functions import Scalar, absolute, log, maximum, minimum, select, sign, sqrt
 from atwood.expr.core.intervals import bounds
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
@@ -133,8 +132,8 @@ def _span(one: Curved, argument: Pair, exponent: Pair | None) -> Scalar:
     if exponent is None:  # a quotient or a logarithm
         return 2.0 * (most - least)
     power = maximum(absolute(exponent[0]), absolute(exponent[1]))
-    ends = [select(exponent[1] < 0.0, x * power, maximum(x * power, -_FAINT)) for x in (least, most)]  # type: ignore[operator]
-    is_low = (exponent[0] > 0.0) * (exponent[1] <= _HIGH)  # type: ignore[operator]
+    ends = [select(exponent[1] < 0.0, x * power, maximum(x * power, -_FAINT)) for x in (least, most)]
+    is_low = (exponent[0] > 0.0) * (exponent[1] <= _HIGH)
     return select(is_low, 0.0, ends[1] - ends[0])
 
 
@@ -143,9 +142,7 @@ def _steep(x: Scalar) -> Scalar:
     return sign(x) * log(absolute(x) + sqrt(x * x + 1.0))
 
 
-def is_needed(
-    assembly: Assembly, curved: Sequence[Curved], span: tuple[float, float], values: FloatArray, reach: float
-) -> bool:
+def is_needed(assembly: Assembly, curved: Sequence[Curved], span: tuple[float, float], reach: float) -> bool:
     """Return whether any of the functions can change by more than a step may, whatever coordinates and speeds are.
 
     Parameters
@@ -156,13 +153,11 @@ def is_needed(
         The functions.
     span
         The times of the run, s.
-    values
-        Values of the parameters.
     reach
         How far a function may change in a step, in units of its own scale.
     """
-    equations = assembly.own_equations
-    known = {s: (np.array([v]), np.array([v])) for s, v in zip(assembly.parameters, values.tolist(), strict=False)}
+    equations, values = assembly.own_equations, assembly.parameter_values.tolist()
+    known = {s: (np.array([v]), np.array([v])) for s, v in zip(assembly.parameters, values, strict=True)}
     anywhere = np.array([-inf]), np.array([inf])
     known |= dict.fromkeys((*equations.coordinates, *equations.speeds), anywhere)
     known[equations.time] = np.array([span[0]]), np.array([span[1]])
@@ -172,7 +167,7 @@ def is_needed(
         with np.errstate(all="ignore"):
             if not np.all(np.isfinite(ends[0])) and one.operation not in ("exp", "tanh"):
                 return True
-            found = float(_span(one, ends[0], ends[1] if one.exponent is not None else None))  # type: ignore[arg-type]
+            found = float(_span(one, ends[0], ends[1] if one.exponent is not None else None))
         if not found <= reach:
             return True
     return False
@@ -219,10 +214,10 @@ def watched_program(
     hull = _Hull(ends, along, set(parameters), set(angles), dict(known or {}))
     wanted = [x for one in curved for x in (one.argument, one.exponent) if x is not None]
     found = enclose(wanted, hull)
-    spans = [_span(one, found[one.argument.index], found[one.exponent.index] if one.exponent else None) for one in curved]
     score: Scalar = 0.0
-    for span in spans:
-        score = maximum(score, span / reach)
+    for one in curved:
+        power = None if one.exponent is None else found[one.exponent.index]
+        score = maximum(score, _span(one, found[one.argument.index], power) / reach)
     for angle in hull.angles.values():
         score = maximum(score, (angle[1] - angle[0]) * (1.0 / _TURN))
     groups = [group for end in ends for group in end.groups]
@@ -248,7 +243,7 @@ class _End:
 
 
 class _Hull:
-    """Bounds over a step of what is smooth in it: the control points of the cubic through both ends with their rates."""
+    """Bounds over a step of what is smooth in it: control points of the cubic through both ends with their rates."""
 
     def __init__(
         self,

@@ -20,7 +20,8 @@ __all__ = ["GuardCode", "GuardData", "compile_guard"]
 _PROLOGUE = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
 _GUARD = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_double, c_void_p, c_void_p, c_void_p)
 
-_TEXT = """define i32 @guard(double %t0, ptr %y0, ptr %p0, double %t1, ptr %y1, ptr %p1, ptr %data) #0 {
+_TEXT = (
+    """define i32 @guard(double %t0, ptr %y0, ptr %p0, double %t1, ptr %y1, ptr %p1, ptr %data) #0 {
 entry:
   %first = alloca double
   %second = alloca double
@@ -35,11 +36,13 @@ entry:
 ask:
   store double %t0, ptr %first
   store double %t1, ptr %second
-""" + "\n".join(
-    f"""  %in{i} = getelementptr ptr, ptr %inputs, i64 {i}
+"""
+    + "\n".join(
+        f"""  %in{i} = getelementptr ptr, ptr %inputs, i64 {i}
   store ptr {name}, ptr %in{i}"""
-    for i, name in enumerate(("%first", "%y0", "%p0", "%second", "%y1", "%p1", "%reach.at"))
-).replace("  %in0", "  %reach.at = getelementptr double, ptr %data, i64 2\n  %in0", 1) + """
+        for i, name in enumerate(("%first", "%y0", "%p0", "%second", "%y1", "%p1", "%reach.at"))
+    ).replace("  %in0", "  %reach.at = getelementptr double, ptr %data, i64 2\n  %in0", 1)
+    + """
   store ptr %share, ptr %outputs
   %derived = load ptr, ptr %data
   %scratch.at = getelementptr ptr, ptr %data, i64 1
@@ -54,6 +57,7 @@ bad:
   ret i32 1
 }
 """
+)
 
 
 class GuardData(NamedTuple):
@@ -106,7 +110,7 @@ class GuardCode:
         ) -> bool:
             rows = [np.ascontiguousarray(one, dtype=np.float64) for one in (y0, p0, y1, p1)]
             a, b, c, d = (one.ctypes.data for one in rows)
-            return call(t0, a, b, t1, c, d, place) == 0
+            return bool(call(t0, a, b, t1, c, d, place) == 0)
 
         return GuardData(addresses["guard"], place, passes, keep)
 

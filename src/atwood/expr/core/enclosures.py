@@ -8,9 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from atwood.expr.core import algebra
-from atwood.expr.core.functions import Scalar, absolute, atan, cos, exp, floor, log, maximum, minimum, select, sign
-from atwood.expr.core.functions import sin, sinh, sqrt, tan, tanh
+from atwood.expr.core.functions import (
+    Scalar,
+    absolute,
+    atan,
+    cos,
+    exp,
+    floor,
+    log,
+    maximum,
+    minimum,
+    select,
+    sign,
+    sin,
+    sinh,
+    sqrt,
+    tan,
+    tanh,
+)
 from atwood.expr.core.graph import Expression
 
 __all__ = ["Pair", "enclose"]
@@ -83,15 +98,16 @@ def _quotient(a: Pair, b: Pair) -> Pair:
 
 
 def _at_most(a: Scalar, b: Scalar) -> Scalar:
-    return a <= b  # type: ignore[operator]
+    return a <= b
 
 
-def _wave(function: Callable[[Scalar], Scalar]) -> Callable[[Pair], Pair]:
-    """Return bounds of a sine or cosine: it changes no faster than its argument."""
+def _wave(function: Callable[[Scalar], Scalar], slope: Callable[[Scalar], Scalar]) -> Callable[[Pair], Pair]:
+    """Return bounds of a sine or cosine: neither it nor its slope changes faster than its argument."""
 
     def of(a: Pair) -> Pair:
-        reach = 0.5 * (a[1] - a[0])
-        middle = function(a[0] + reach)
+        half = 0.5 * (a[1] - a[0])
+        middle = function(a[0] + half)
+        reach = half * minimum(absolute(slope(a[0] + half)) + 0.5 * half, 1.0)
         return maximum(middle - reach, -1.0), minimum(middle + reach, 1.0)
 
     return of
@@ -140,8 +156,8 @@ _RULES: Mapping[str, Callable[..., Pair]] = {
     "tanh": _rising(tanh),
     "atan": _rising(atan),
     "log": _rising(lambda x: log(maximum(x, 1e-300))),
-    "sin": _wave(sin),
-    "cos": _wave(cos),
+    "sin": _wave(sin, cos),
+    "cos": _wave(cos, sin),
     "tan": _tangent,
     "asin": lambda a: (-0.5 * _PI, 0.5 * _PI),
     "acos": lambda a: (0.0, _PI),

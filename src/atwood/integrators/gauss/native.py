@@ -25,8 +25,8 @@ from atwood.integrators.protocol import FloatArray
 __all__ = ["CompiledGauss", "CompiledMethod", "GaussStepper", "bind_functions"]
 
 _UNLIMITED = 2**62
-_CALM = 8
-"""After so many good steps one that was divided is made longer again."""
+_CALM, _SHORTEST = 8, 1e-12
+"""After so many good steps one that was divided is made longer again; none is shorter than such a share."""
 _NO_VALUE = 3
 _HALVINGS, _LOOKED_AT, _CLOSE = 60, 40, 0.2
 """So many steps are tried, on so many steps of the motion each, until an error is so near to what is allowed."""
@@ -205,12 +205,19 @@ class GaussStepper:
                 return Outcome.USED_UP
             before, memory = self.state(), self._memory.copy()
             self._counts[_LIMIT] = self._counts[_STEPS] + 1
-            self._checked(self._functions["run"](self._session))
-            if guard.passes(*before, *self.state()):
+            outcome = self._functions["run"](self._session)
+            if not self._longest:
+                self._checked(outcome)
+            (t, y, yp), h = before, self.step
+            # The parts of a composition reach beyond its step, to both sides.
+            around = t - h, y - h * yp, yp, t + 2.0 * h, y + 2.0 * h * yp, yp
+            if outcome != Outcome.TOO_SMALL and guard.passes(*around) and guard.passes(*before, *self.state()):
                 self._good += 1
                 if self._good >= _CALM and self.step < self._longest:
                     self._change_step(min(2.0 * self.step, self._longest), self.state())
             elif self._longest:
+                if not self.step > _SHORTEST * self._longest:
+                    self._checked(Outcome.TOO_SMALL)
                 counts = self._counts.copy()
                 self._memory[:] = memory
                 self._counts[_EVALUATIONS] = counts[_EVALUATIONS]

@@ -403,7 +403,16 @@ def step_code() -> str:
     They take a pointer to the pointers of a session, in the order of `POINTERS`; numbers and counts are in the order of
     `NUMBERS` and `COUNTS`.
     """
-    parts = [loop_code(), _evaluate(), begin_code(_prologue()), _expand(), _choose(), _guarded(), _run(), _interpolate()]
+    parts = [
+        loop_code(),
+        _evaluate(),
+        begin_code(_prologue()),
+        _expand(),
+        _choose(),
+        _guarded(),
+        _run(),
+        _interpolate(),
+    ]
     parts += [sample_code("%session", _prologue(), "%n")]
     parts += ["declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)", "declare double @llvm.floor.f64(double)"]
     return "\n".join(parts)

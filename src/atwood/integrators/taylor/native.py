@@ -21,8 +21,8 @@ from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.once import once
 from atwood.errors import UsageError
 from atwood.expr.series.taylor import TaylorPrograms
-from atwood.integrators.event_location import State
 from atwood.integrators.compiled_functions import StepGuard
+from atwood.integrators.event_location import State
 from atwood.integrators.explicit_problem import Counts, Outcome, absolute_tolerances, no_interpolation
 from atwood.integrators.machine_text import WIDTH
 from atwood.integrators.protocol import FloatArray, SolverOptions

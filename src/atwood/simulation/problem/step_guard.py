@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, Program
+from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.loops.closed_form import ClosedForm
@@ -23,6 +21,7 @@ _SHORTEST = 1e-13
 """Relative to the run: steps that are no longer are taken as they are, and what lasts no longer is a moment."""
 
 _PROGRAM: Key[Program] = Key("how far functions in laws change over a step")
+_NEEDED: Key[bool] = Key("whether a function in a law may change fast in a run")
 _CODE: Key[object] = Key("machine code of that")
 
 
@@ -47,7 +46,7 @@ def step_guard(
         integrated.
     """
     curved = find_curved(assembly)
-    if not curved or not is_needed(assembly, curved, span, assembly.parameter_values, reach):
+    if not curved or not assembly.kept.get(_NEEDED, lambda: is_needed(assembly, curved, span, reach), span, reach):
         return None
     form, values = closed or (None, assembly.parameter_values)
 

@@ -133,7 +133,7 @@ def _guarded(problem: ImplicitProblem, request: SolverRequest, solver: str) -> I
         return problem
     size = request.plan.program.coordinates + request.plan.program.speeds
     residual = GuardedResidual(problem.residual, guard, size)
-    begins = [residual.begin]
+    begins: list[Callable[[float, FloatArray, FloatArray], None]] = [residual.begin]
 
     def native(linear_solver: LinearSolver) -> NativeCallbacks:
         from atwood.codegen.sundials.guarded_residual import guarded_residual
@@ -300,7 +300,8 @@ def _open_constrained(request: SolverRequest, t: float, y: FloatArray, leave: Le
     settings = request.settings(t, LOOSEST)
     absolute = np.asarray(settings.absolute_tolerances)[: len(y)]
     settings = replace(settings, absolute_tolerances=absolute)
-    session = open_explicit(_watched(request, problem, "explicit"), settings, t, y, request.budget, leave=leave, end=request.end)
+    problem = _watched(request, problem, "explicit")
+    session = open_explicit(problem, settings, t, y, request.budget, leave=leave, end=request.end)
     session.limit_steps(longest_step(plan.assembly.own_equations, plan.program.split(y)[1]))
     return session
 

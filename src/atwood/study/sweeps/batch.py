@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
+from atwood.forms.watched import find_curved
 from atwood.integrators.ensemble.batch import BatchPlaces
 from atwood.late import dataclass
 from atwood.simulation.events.modes import find_event_functions
@@ -39,6 +40,9 @@ def why_not_batched(request: SweepRequest) -> str:
     assembly, options = request.assembly, request.options
     if options.solver not in ("auto", *METHODS):
         return f"the solver {options.solver!r} was asked for"
+    varies = any(not axis.is_start for axis in request.cases.axes) or bool(assembly.mechanism.constants)
+    if varies and find_curved(assembly):
+        return "laws that may act briefly or narrowly are watched with the values of each run"
     if assembly.form != "reduced":
         return "the dae form keeps constraints"
     equations = assembly.reduced

@@ -25,6 +25,7 @@ from atwood.simulation.events.margins import without_margin
 from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, margins_at_start
 from atwood.simulation.problem.explicit_scene import explicit_problem_of, own_rates
 from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.step_guard import REACHES, step_guard
 from atwood.simulation.run.choice import choose
 from atwood.study.sweeps.motions import OpenTree
 from atwood.study.sweeps.runs import SweepRequest
@@ -242,7 +243,8 @@ def _opened(
     events = None if data is None else data.function()
     program = OpenTree(assembly).program
     problem = explicit_problem_of(assembly, program, assembly.parameter_values, events, directions)
-    problem = replace(problem, compiled=lambda: rates.rates)
+    guard = step_guard(assembly, (assembly.flat.t_start, options.t_end), REACHES["explicit"])
+    problem = replace(problem, compiled=lambda: rates.rates, guard=guard)
     if data is not None:
         compiled = CompiledEvents(data.explicit, data.address, data.count, data.restart, data)
         problem = replace(problem, compiled_events=lambda: compiled)

@@ -27,6 +27,7 @@ from atwood.simulation.problem.closed_loops_many import ManyBranches
 from atwood.simulation.problem.explicit_scene import compiled_rates, explicit_problem, explicit_problem_of
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.step_guard import REACHES, step_guard
 from atwood.simulation.run.choice import choose
 from atwood.study.sweeps.runs import SweepRequest
 
@@ -271,18 +272,21 @@ def open_places(motion: Motion, solver: str, options: RunOptions, values: FloatA
     relative = min(options.relative_tolerance, LOOSEST)
     span = options.t_end - assembly.flat.t_start
     settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=span)
+    form = (motion.solved.form, values) if isinstance(motion, ClosedLoops) else None
+    guard = step_guard(assembly, (assembly.flat.t_start, options.t_end), REACHES[solver], form)
     if solver == "taylor":
         from atwood.integrators.taylor.native import CompiledStepper as CompiledSeries
         from atwood.simulation.problem.taylor_scene import taylor_problem
 
         series = taylor_problem(assembly, options.t_end, False, motion.program, values)
-        return CompiledSeries(series, settings).batch_places()
+        return CompiledSeries(series, settings, guard=guard).batch_places()
     from atwood.integrators.dop853.native import CompiledStepper
 
     code = compiled_rates(assembly, motion.program)
     own = code.open()
     code.fill(own, values)
-    problem = replace(explicit_problem_of(assembly, motion.program, values), compiled=lambda: own.rates)
+    problem = explicit_problem_of(assembly, motion.program, values)
+    problem = replace(problem, compiled=lambda: own.rates, guard=guard)
     places = CompiledStepper(problem, settings).batch_places()
     return replace(places, parameters=(own.prologue, own.derived, own.scratch))
 
