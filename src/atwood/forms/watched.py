@@ -68,6 +68,8 @@ def _find(assembly: Assembly, equations: Equations) -> Iterable[Curved]:
     for local in equations.locals_.values():
         laws, _ = in_joint_coordinates(local, kinematics, _laws_of(local))
         mine = list(_curved_in([*laws, *signals.values()], _ALWAYS | {"div", "mul"}))
+        places = [one.value for one in local.constraints]  # where a quotient with a root is a direction
+        mine += [one for one in _curved_in(places, _ALWAYS - {"tan"} | {"div", "mul"}) if not _has_root(one.argument)]
         if mine:
             mapping = {**local_map(equations.site, local, kinematics), **signals}
             placed = substitute([one.argument for one in mine], mapping)
@@ -86,8 +88,12 @@ def _laws_of(local: LocalPart) -> list[Expression]:
     """Return what the laws of a part give."""
     found: list[Scalar] = [*local.potentials, *local.dissipations, *local.lagrangians, *local.stand_ins.values()]
     found += [c for load in local.loads for c in (*load.force, *load.torque)]
-    found += [one.value for one in local.constraints] + [one.rate for one in local.states]
+    found += [one.rate for one in local.states]
     return [one for one in found if isinstance(one, Expression)]
+
+
+def _has_root(value: Expression) -> bool:
+    return any(node.operation == "sqrt" for node in live([value]))
 
 
 def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Iterable[Curved]:

@@ -1,0 +1,233 @@
+"""Laws that act briefly or narrowly are seen by every method, whatever their steps would be without them."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+import atwood
+import atwood_library as lib
+from atwood import Component, Point, Scalar, Scene, connector, parameter, potential, simulate
+
+PLAIN = ("explicit", "taylor", "ida")
+ALL = ("auto", *PLAIN, "gauss", "composition")
+BOUND = {"ida": 3e-4}
+"""Errors at the usual tolerances; of what is not named 1e-5."""
+
+
+def on_a_line(potential: str | None = None, force: Any = None, speed: float = 1.0, x: float = 0.0) -> Scene:
+    """Return one mass of 1 kg on a line for ten seconds, with a potential of its place or a force."""
+    scene = Scene(space="line", gravity=0.0, t_end=10.0)
+    mass = scene.add("mass", lib.Mass1D(mass=1.0))
+    if potential is not None:
+        field = scene.add("field", lib.Potential(energy_function=potential))
+        scene.connect(field.point, mass.flange)
+    if force is not None:
+        push = scene.add("push", lib.Force(direction=(1, 0, 0), value=force))
+        scene.connect(push.point, mass.flange)
+    scene.start.update({"mass.displacement": x, "mass.speed": speed})
+    return scene
+
+
+class Bell(Component):
+    """A hill at 2 m."""
+
+    point: Point = connector(Point, "What is on it.")
+    width: float = parameter(1.0, unit="m", doc="Its width.")
+
+    @potential
+    def hill(self) -> Scalar:
+        return 0.45 * atwood.exp(-(((self.point.position.x - 2.0) / self.width) ** 2))
+
+
+def delayed(potential: Any, at: float, width: float, speed: float = 1.0) -> float:
+    """Return where a mass is after ten seconds that began at zero: the integral of one over the speed."""
+    energy = 0.5 * speed**2
+
+    def lost(x: float) -> float:
+        return 1.0 / math.sqrt(2.0 * (energy - potential(x))) - 1.0 / speed
+
+    edges = [at + k * width for k in (-8, -4, -2, -1, 0, 1, 2, 4, 8)]
+    delay = sum(quad(lost, a, b, epsabs=1e-14)[0] for a, b in pairwise(edges))
+    return speed * (10.0 - delay)
+
+
+def impulse(force: Any, at: float, width: float) -> tuple[float, float]:
+    """Return place and speed after ten seconds of 1 kg at rest that a force pushes about one moment."""
+    edges = [at + k * width for k in (-40, -8, -4, -2, -1, 0, 1, 2, 4, 8, 40)]
+    pairs = list(pairwise(edges))
+    speed = sum(quad(force, a, b, epsabs=1e-14)[0] for a, b in pairs)
+    return sum(quad(lambda t: (10.0 - t) * force(t), a, b, epsabs=1e-14)[0] for a, b in pairs), speed
+
+
+@pytest.mark.parametrize("solver", ALL)
+@pytest.mark.parametrize(("width", "height"), [(0.1, 0.45), (1e-4, 0.45), (1e-3, -3.0)])
+def test_a_narrow_hill_or_well_is_crossed(solver: str, width: float, height: float) -> None:
+    scene = on_a_line(f"{height}*exp(-((x-2)/{width})^2)")
+    expected = delayed(lambda x: height * math.exp(-(((x - 2) / width) ** 2)), 2.0, width)
+    result = simulate(scene, solver=solver)
+    assert result["mass.displacement"][-1] == pytest.approx(expected, abs=BOUND.get(solver, 1e-5))
+    assert result["mass.speed"][-1] == pytest.approx(1.0, abs=BOUND.get(solver, 1e-5))
+
+
+@pytest.mark.parametrize("solver", ["auto", "taylor", "ida", "composition"])
+def test_an_accuracy_that_is_asked_for_is_had_across_a_hill(solver: str) -> None:
+    expected = delayed(lambda x: 0.45 * math.exp(-(((x - 2) / 0.1) ** 2)), 2.0, 0.1)
+    result = simulate(on_a_line("0.45*exp(-((x-2)/0.1)^2)"), solver=solver, accuracy=1e-8)
+    assert abs(result["mass.displacement"][-1] - expected) < 10 * 1e-8
+    assert result.accuracy.reached < 1e-8
+
+
+PULSES = {
+    "tap": (lambda t: 1e2 * atwood.exp(-(((t - 5.123) / 5.6418958e-3) ** 2)), 5.123, 5.6418958e-3),
+    "tap of a microsecond": (lambda t: 1e6 * atwood.exp(-(((t - 5.123) / 5.6418958e-7) ** 2)), 5.123, 5.6418958e-7),
+    "edges": (lambda t: 50 * (atwood.tanh((t - 4) / 1e-3) - atwood.tanh((t - 4.01) / 1e-3)), 4.005, 5e-3),
+    "burst": (lambda t: 1e3 * atwood.sin(3e3 * (t - 6)) * atwood.exp(-(((t - 6.001) / 2e-3) ** 2)), 6.001, 2e-3),
+    "power": (lambda t: 50 * ((1 + atwood.cos(t - 4)) / 2) ** 100_000, 4.0, 6e-3),
+    "bell of steps": (lambda t: 50 * (1 - atwood.tanh((t - 3) / 1e-3) ** 2), 3.0, 1e-3),
+}
+
+
+@pytest.mark.parametrize("solver", PLAIN)
+@pytest.mark.parametrize("pulse", PULSES)
+def test_a_brief_force_on_what_rests_is_felt(solver: str, pulse: str) -> None:
+    force, at, width = PULSES[pulse]
+    place, speed = impulse(force, at, width)
+    result = simulate(on_a_line(force=force, speed=0.0), solver=solver)
+    assert result["mass.speed"][-1] == pytest.approx(speed, abs=1e-6)
+    assert result["mass.displacement"][-1] == pytest.approx(place, abs=1e-5)
+
+
+def test_a_force_that_dies_away_slowly_beside_its_peak_is_felt() -> None:
+    expected = 1e-3 * (math.atan(7e3) + math.atan(3e3))  # the integral of 1/(1 + s^2)
+    for solver in PLAIN:
+        result = simulate(on_a_line(force=lambda t: 1 / (1 + ((t - 3) / 1e-3) ** 2), speed=0.0), solver=solver)
+        assert result["mass.speed"][-1] == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("solver", ["explicit", "ida"])
+def test_a_bump_of_the_road_under_a_mass_at_rest_is_felt(form: str, solver: str) -> None:
+    scene = Scene(space="line", gravity=0.0, t_end=10.0)
+    ground = scene.add("ground", lib.Ground())
+    road = scene.add("road", lib.Drive(motion=lambda t: 0.05 * atwood.exp(-(((t - 5.3) / 0.015) ** 2))))
+    spring = scene.add("spring", lib.Spring(stiffness=40.0, natural_length=1.0))
+    mass = scene.add("mass", lib.Mass1D(mass=1.0))
+    scene.connect(ground.frame, road.a)
+    scene.connect(road.b, spring.a)
+    scene.connect(spring.b, mass.flange)
+    scene.start.update({"mass.displacement": 1.0, "mass.speed": 0.0})
+    w = math.sqrt(40.0)
+
+    def pushed(t: float) -> float:
+        return w * math.sin(w * (10.0 - t)) * 0.05 * math.exp(-(((t - 5.3) / 0.015) ** 2))
+
+    expected = 1.0 + quad(pushed, 5.1, 5.5, points=[5.3], epsabs=1e-14)[0]
+    result = simulate(scene, form=form, solver=solver)
+    assert result["mass.displacement"][-1] == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("solver", ALL)
+def test_what_turns_back_within_a_narrow_wall_has_its_speed_again(solver: str) -> None:
+    result = simulate(on_a_line("1e3*exp(-500*(3-x))"), solver=solver)
+    assert result["mass.speed"][-1] == pytest.approx(-1.0, abs=BOUND.get(solver, 1e-5))
+
+
+def in_a_plane(potential: str, velocity: tuple[float, float], scale: float = 1.0) -> Scene:
+    scene = Scene(gravity=0.0, t_end=10.0)
+    mass = scene.add("mass", lib.PointMass(mass=1.0))
+    field = scene.add("field", lib.Potential(energy_function=potential))
+    scene.connect(field.point, mass.point)
+    for axis, speed in zip("xz", velocity, strict=True):
+        scene.start.update({f"mass.position.{axis}": 0.0, f"mass.velocity.{axis}": scale * speed})
+    return scene
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_ridge_across_the_way_is_felt_whatever_its_direction_and_size(form: str, scale: float) -> None:
+    c, s = math.cos(0.7), math.sin(0.7)
+    ridge = f"{0.3 * scale**2}*exp(-((x*{c}+z*{s}-{2 * scale})/{0.01 * scale})^2)"
+    along = delayed(lambda x: 0.3 * math.exp(-(((x - 2) / 0.01) ** 2)), 2.0, 0.01)
+    result = simulate(in_a_plane(ridge, (c, s), scale), form=form)
+    assert result["mass.position.x"][-1] / scale == pytest.approx(along * c, abs=1e-6)
+
+
+@pytest.mark.parametrize("solver", ALL)
+def test_what_passes_close_by_a_centre_is_turned_away(solver: str) -> None:
+    near = 1e-3
+
+    def rates(_: float, y: np.ndarray) -> np.ndarray:
+        return np.concatenate([y[2:], -0.01 * y[:2] / np.hypot(*y[:2]) ** 3])
+
+    exact = solve_ivp(rates, (0, 10), [-5, near, 1, 0], method="DOP853", rtol=1e-13, atol=1e-15, max_step=0.1).y[:, -1]
+    scene = in_a_plane("-0.01/sqrt(x^2+z^2)", (1.0, 0.0))
+    scene.start.update({"mass.position.x": -5.0, "mass.position.z": near})
+    result = simulate(scene, solver=solver)
+    assert result["mass.position.x"][-1] == pytest.approx(exact[0], abs=2e-4)
+    assert result["mass.position.z"][-1] == pytest.approx(exact[1], abs=2e-4)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("solver", ["explicit", "ida"])
+def test_a_small_magnet_on_the_way_of_a_pendulum_acts(form: str, solver: str) -> None:
+    scene = Scene(t_end=3.0)
+    ground, rod = scene.add("ground", lib.Ground()), scene.add("rod", lib.Rod(length=1.0))
+    bob = scene.add("bob", lib.PointMass(mass=1.0))
+    magnet = scene.add("magnet", lib.Potential(energy_function="-3*exp(-((x-0.5)^2+(z+0.8660254)^2)/2e-3^2)"))
+    scene.connect(ground.frame, rod.a)
+    scene.connect(rod.b, bob.point)
+    scene.connect(magnet.point, bob.point)
+    scene.start.update({"rod.angle": "80 deg", "rod.angular_velocity": 0.0})
+    result = simulate(scene, form=form, solver=solver)
+    assert result["rod.angle"][-1] == pytest.approx(pendulum_over_a_magnet(), abs=1e-4)
+
+
+@cache
+def pendulum_over_a_magnet() -> float:
+    """Return the angle after three seconds, by steps far shorter than the magnet is small."""
+
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        x, z = math.sin(y[0]), -math.cos(y[0])
+        well = -3 * math.exp(-((x - 0.5) ** 2 + (z + 0.8660254) ** 2) / 4e-6)
+        pull = well * (-2 / 4e-6) * ((x - 0.5) * math.cos(y[0]) + (z + 0.8660254) * math.sin(y[0]))
+        return [y[1], -9.81 * math.sin(y[0]) - pull]
+
+    start = [math.radians(80), 0]
+    exact = solve_ivp(rates, (0, 3), start, method="DOP853", rtol=1e-12, atol=1e-13, max_step=2e-3)
+    return float(exact.y[0, -1])
+
+
+def test_sweeps_and_other_values_are_watched_with_their_own() -> None:
+    def expected(width: float, speed: float) -> float:
+        return delayed(lambda x: 0.45 * math.exp(-(((x - 2) / width) ** 2)), 2.0, width, speed)
+
+    hill = in_a_plane("0.45*exp(-((x-2)/0.1)^2)", (1.0, 0.0))
+    speeds = {"mass.velocity.x": [1.0, 1.5, 2.0]}
+    found = atwood.sweep(hill, start=speeds, quantities=["mass.position.x"], t_end=10.0)
+    assert found.statistics.batched == 3
+    for speed, place in zip((1.0, 1.5, 2.0), found.quantities["mass.position.x"][:, -1], strict=True):
+        assert place == pytest.approx(expected(0.1, speed), abs=1e-5)
+    bell = Scene(space="line", gravity=0.0, t_end=10.0)
+    mass, slope = bell.add("mass", lib.Mass1D(mass=1.0)), bell.add("bell", Bell(width=1e3))
+    bell.connect(slope.point, mass.flange)
+    bell.start.update({"mass.displacement": 0.0, "mass.speed": 1.0})
+    first = atwood.assemble(bell)
+    simulate(first)
+    narrow = first.with_values({"bell.width": 1e-3})
+    assert not narrow.why_new
+    assert simulate(narrow)["mass.displacement"][-1] == pytest.approx(expected(1e-3, 1.0), abs=1e-5)
+
+
+def test_laws_no_faster_than_coordinates_are_not_watched() -> None:
+    from atwood.forms.watched import find_curved
+    from atwood_library.scenes import DoublePendulum, ElasticPendulum, FourBar, LagrangeTop
+
+    for scene in (DoublePendulum(), FourBar(), ElasticPendulum(), LagrangeTop()):
+        assert not find_curved(atwood.assemble(scene))
