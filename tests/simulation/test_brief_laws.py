@@ -226,7 +226,7 @@ def test_sweeps_and_other_values_are_watched_with_their_own() -> None:
 
 
 def test_laws_no_faster_than_coordinates_are_not_watched() -> None:
-    from atwood.forms.watched import find_curved
+    from atwood.simulation.problem.curved_laws import find_curved
     from atwood_library.scenes import DoublePendulum, ElasticPendulum, FourBar, LagrangeTop
 
     for scene in (DoublePendulum(), FourBar(), ElasticPendulum(), LagrangeTop()):

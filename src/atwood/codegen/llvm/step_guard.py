@@ -121,7 +121,7 @@ def compile_guard(program: Program) -> GuardCode:
     Parameters
     ----------
     program
-        See `atwood.forms.watched.watched_program`.
+        See `atwood.simulation.problem.curved_laws.watched_program`.
     """
     part = Part("kernel", program)
     return GuardCode(program, build_code([part], default_options([part]), more=_TEXT, exports=["guard"]))

@@ -7,7 +7,7 @@ pointers to the two compiled programs of its recurrences, so that it is compiled
 from __future__ import annotations
 
 from atwood.integrators.machine_text import exact, sample_code, unpack
-from atwood.integrators.taylor.problem import HIGHEST, LOWEST, PARTS, RETREAT, RETRIES, SMALLER, WATCHED
+from atwood.integrators.taylor.problem import HIGHEST, LOWEST, RETREAT, RETRIES, SMALLER, WATCHED
 from atwood.integrators.taylor.start_code import begin_code
 from atwood.integrators.taylor.stepping_code import LANES, ROWS, STRIDE, loop_code
 
@@ -259,51 +259,6 @@ judge:
   %asked = call i32 @guarded(ptr %session, double %t, double %h)
   %passes = icmp eq i32 %asked, 0
   br i1 %passes, label %accept, label %retreat"""
-
-
-def _guarded() -> str:
-    """Return the function that asks what judges steps about each quarter of one; 0 where all are good."""
-    return f"""define internal i32 @guarded(ptr %session, double %t, double %h) #0 {{
-entry:
-{_prologue()}
-{_row("y", "y")}
-{_row("rates", "rates")}
-{_row("trial", "trial")}
-{_row("slope", "trial_rates")}
-{_row("kept", "kept")}
-{_row("kept.rates", "kept_rates")}
-  %is.free = icmp eq ptr %guard, null
-  br i1 %is.free, label %good, label %begin
-begin:
-  %bytes = mul i64 %n, 8
-  %unit = load double, ptr %unit.at
-  call void @llvm.memcpy.p0.p0.i64(ptr %kept, ptr %y, i64 %bytes, i1 false)
-  call void @llvm.memcpy.p0.p0.i64(ptr %kept.rates, ptr %rates, i64 %bytes, i1 false)
-  br label %part
-part:
-  %i = phi i64 [ 1, %begin ], [ %following, %passed ]
-  %t0 = phi double [ %t, %begin ], [ %t1, %passed ]
-  %number = sitofp i64 %i to double
-  %share = fmul double %number, {exact(1.0 / PARTS)}
-  %since = fmul double %share, %h
-  %t1 = fadd double %t, %since
-  %units = fdiv double %since, %unit
-  %pace = fdiv double 1.0, %unit
-  call void @inside(ptr %arrays, i64 %m, i64 %p, double %units, double %pace)
-  %code = call i32 %guard(double %t0, ptr %kept, ptr %kept.rates, double %t1, ptr %trial, ptr %slope, ptr %guard_data)
-  %ok = icmp eq i32 %code, 0
-  br i1 %ok, label %passed, label %bad
-passed:
-  call void @llvm.memcpy.p0.p0.i64(ptr %kept, ptr %trial, i64 %bytes, i1 false)
-  call void @llvm.memcpy.p0.p0.i64(ptr %kept.rates, ptr %slope, i64 %bytes, i1 false)
-  %following = add i64 %i, 1
-  %is.done = icmp sgt i64 %following, {PARTS}
-  br i1 %is.done, label %good, label %part
-good:
-  ret i32 0
-bad:
-  ret i32 1
-}}"""
 
 
 def _run() -> str:

@@ -1,11 +1,12 @@
-"""The start of the Taylor-series method in LLVM's language: rates at the start, and a unit of time."""
+"""The start of the Taylor-series method in LLVM's language, and what is asked about its steps."""
 
 from __future__ import annotations
 
 from atwood.integrators.machine_text import exact
+from atwood.integrators.taylor.problem import PARTS
 from atwood.integrators.taylor.stepping_code import ROWS, STRIDE
 
-__all__ = ["begin_code"]
+__all__ = ["begin_code", "guarded_code"]
 
 
 def begin_code(prologue: str) -> str:
@@ -101,3 +102,49 @@ chosen:
   %unit = select i1 %moves, double %shorter, double %bound
   store double %unit, ptr %unit.at
   ret i32 0"""
+
+
+def guarded_code(prologue: str) -> str:
+    """Return the function that asks what judges steps about each quarter of one; 0 where all are good."""
+    names = {"y": "y", "rates": "rates", "trial": "trial", "slope": "trial_rates"}
+    names |= {"kept": "kept", "kept.rates": "kept_rates"}
+    rows = "\n".join(
+        f"  %{name}.index = mul i64 %m, {ROWS[row]}\n  %{name} = getelementptr double, ptr %arrays, i64 %{name}.index"
+        for name, row in names.items()
+    )
+    return f"""define internal i32 @guarded(ptr %session, double %t, double %h) #0 {{
+entry:
+{prologue}
+{rows}
+  %is.free = icmp eq ptr %guard, null
+  br i1 %is.free, label %good, label %begin
+begin:
+  %bytes = mul i64 %n, 8
+  %unit = load double, ptr %unit.at
+  call void @llvm.memcpy.p0.p0.i64(ptr %kept, ptr %y, i64 %bytes, i1 false)
+  call void @llvm.memcpy.p0.p0.i64(ptr %kept.rates, ptr %rates, i64 %bytes, i1 false)
+  br label %part
+part:
+  %i = phi i64 [ 1, %begin ], [ %following, %passed ]
+  %t0 = phi double [ %t, %begin ], [ %t1, %passed ]
+  %number = sitofp i64 %i to double
+  %share = fmul double %number, {exact(1.0 / PARTS)}
+  %since = fmul double %share, %h
+  %t1 = fadd double %t, %since
+  %units = fdiv double %since, %unit
+  %pace = fdiv double 1.0, %unit
+  call void @inside(ptr %arrays, i64 %m, i64 %p, double %units, double %pace)
+  %code = call i32 %guard(double %t0, ptr %kept, ptr %kept.rates, double %t1, ptr %trial, ptr %slope, ptr %guard_data)
+  %ok = icmp eq i32 %code, 0
+  br i1 %ok, label %passed, label %bad
+passed:
+  call void @llvm.memcpy.p0.p0.i64(ptr %kept, ptr %trial, i64 %bytes, i1 false)
+  call void @llvm.memcpy.p0.p0.i64(ptr %kept.rates, ptr %slope, i64 %bytes, i1 false)
+  %following = add i64 %i, 1
+  %is.done = icmp sgt i64 %following, {PARTS}
+  br i1 %is.done, label %good, label %part
+good:
+  ret i32 0
+bad:
+  ret i32 1
+}}"""

@@ -1,4 +1,4 @@
-"""Which runs have steps that laws could slip through, and what judges their steps (`atwood.forms.watched`)."""
+"""Which runs have steps that laws could slip through, and what judges their steps (`atwood.simulation.problem.curved_laws`)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.loops.closed_form import ClosedForm
 from atwood.forms.program import state_groups
-from atwood.forms.watched import find_curved, is_needed, watched_program
 from atwood.integrators.compiled_functions import StepGuard
+from atwood.simulation.problem.curved_laws import find_curved, is_needed, watched_program
 
 __all__ = ["REACHES", "step_guard"]
 

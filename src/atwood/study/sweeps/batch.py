@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
-from atwood.forms.watched import find_curved
 from atwood.integrators.ensemble.batch import BatchPlaces
 from atwood.late import dataclass
 from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.initialization.start import find_start
+from atwood.simulation.problem.curved_laws import find_curved
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_starts
 from atwood.study.sweeps.modes import find_mode
 from atwood.study.sweeps.motions import METHODS, Way, find_way, open_places
