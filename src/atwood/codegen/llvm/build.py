@@ -22,6 +22,7 @@ from atwood.codegen.llvm.engine import (
     target_description,
 )
 from atwood.codegen.llvm.module import CodeOptions, ModuleText, Part, write_module
+from atwood.codegen.routines.source import RoutineSource
 from atwood.errors import UnsupportedError
 from atwood.expr.core.operations import ExternalFunction
 from atwood.late import dataclass
@@ -39,8 +40,11 @@ GENERATORS = (
     "llvm/linear_systems.py",
     "llvm/module.py",
     "llvm/routine.py",
+    "llvm/routines.py",
     "llvm/text.py",
     "llvm/unit.py",
+    "routines/kinds.py",
+    "routines/language.py",
 )
 """The files, by their place in the room of the code generators, on which the machine code of a program depends.
 
@@ -117,6 +121,7 @@ def build_code(
     more: str = "",
     exports: Sequence[str] = (),
     library: Sequence[str] = (),
+    routines: RoutineSource | None = None,
     cached: bool = True,
 ) -> Built:
     """Compile programs, or take them from the cache.
@@ -133,12 +138,14 @@ def build_code(
         The names of those functions.
     library
         The functions of the C library that they call.
+    routines
+        What writes routines that call these, or stand alone.
     cached
         Whether to use the cache.  Programs that call functions in Python are never kept: their names do not say
         what they do.
     """
     with stage("code"):
-        return within_time(lambda: _build(parts, options, more, exports, library, cached))
+        return within_time(lambda: _build(parts, options, more, exports, library, routines, cached))
 
 
 def _build(
@@ -147,19 +154,24 @@ def _build(
     more: str,
     exports: Sequence[str],
     library: Sequence[str],
+    routines: RoutineSource | None,
     cached: bool,
 ) -> Built:
     names = [*exports, *(name for part in parts for name in (part.name, f"{part.name}_prologue"))]
     has_externals = any(node.operation == "external" for part in parts for node in part.program.nodes)
     store = default_cache() if cached and not has_externals else None
-    key = _key(parts, options, more) if store else ""
+    key = _key(parts, options, more, routines) if store else ""
     if store is not None:
         found = _from_cache(store, key, names)
         if found is not None:
             return found
+    if routines is not None:
+        from atwood.codegen.llvm.routines import print_routines
+
+        more = f"{more}\n{print_routines(routines.write())}"
     module = write_module(parts, options, more)
     functions = (*module.library, *library)
-    code = compile_text(module.text, options.level)
+    code = compile_text(module.text, options.level, has_variables=routines is not None)
     failures = Failures() if module.externals else None
     callbacks = _callbacks(module, failures) if failures is not None else {}
     addresses = {name: ctypes.cast(call, ctypes.c_void_p).value or 0 for name, call in callbacks.items()}
@@ -184,9 +196,10 @@ def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
         return None
 
 
-def _key(parts: Sequence[Part], options: CodeOptions, more: str) -> str:
+def _key(parts: Sequence[Part], options: CodeOptions, more: str, routines: RoutineSource | None) -> str:
+    written = routines.key if routines is not None else ()
     programs = [(part.name, part.program.digest, part.positions, part.lanes, part.packed) for part in parts]
-    return make_key([_GENERATOR, hash_of_generators(), programs, options, more, target_description()])
+    return make_key([_GENERATOR, hash_of_generators(), programs, options, more, written, target_description()])
 
 
 @cache

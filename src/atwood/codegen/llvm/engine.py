@@ -89,7 +89,7 @@ def _unload_dead() -> None:
         grave.tracker.close()
 
 
-def compile_text(text: str, level: int) -> bytes:
+def compile_text(text: str, level: int, has_variables: bool = False) -> bytes:
     """Return the object code of a module.
 
     Parameters
@@ -98,9 +98,15 @@ def compile_text(text: str, level: int) -> bytes:
         The module in LLVM's language.
     level
         How hard LLVM works on the machine code, from 0 to 3.
+    has_variables
+        Whether functions keep variables in memory, of which registers are made.
     """
     with _lock:
         with binding.create_context() as context, binding.parse_assembly(text, context) as module:
+            if has_variables:
+                passes = binding.create_new_module_pass_manager()
+                passes.add_sroa_pass()
+                passes.run(module, binding.create_pass_builder(_machine(level), binding.create_pipeline_tuning_options()))
             found: bytes = _machine(level).emit_object(module)
         return found
 

@@ -20,11 +20,12 @@ from numpy.typing import ArrayLike
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.once import once
+from atwood.codegen.routines.source import RoutineSource
 from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.expr import Program
 from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.dop853.code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
-from atwood.integrators.dop853.stepping_code import ROWS
+from atwood.integrators.dop853.memory import COUNTS, LANES, NUMBERS, POINTERS, ROWS
+from atwood.integrators.dop853.rates import rates_source
 from atwood.integrators.event_location import State
 from atwood.integrators.explicit_problem import (
     CompiledEvents,
@@ -35,14 +36,13 @@ from atwood.integrators.explicit_problem import (
     absolute_tolerances,
     no_interpolation,
 )
-from atwood.integrators.machine_text import WIDTH
 from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.late import dataclass, names_of
 
 if TYPE_CHECKING:
     from atwood.integrators.ensemble.batch import BatchPlaces
 
-__all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates", "rates_code"]
+__all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates"]
 
 _RATES = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
 _UNLIMITED = 2**62
@@ -70,8 +70,8 @@ class CompiledAccelerations:
         part = Part("kernel", program)
         _, q, u = (len(group.symbols) for group in program.inputs)
         self.program, self.size = program, q + u
-        more = rates_code(q, u, given=len(program.outputs) == 2)
-        self._built = build_code([part], default_options([part]), more=more, exports=["rates"])
+        routines = rates_source(q, u, given=len(program.outputs) == 2)
+        self._built = build_code([part], default_options([part]), exports=["rates"], routines=routines)
         self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
 
     def bind(self, parameter_values: ArrayLike) -> Callable[[], CompiledRates]:
@@ -313,7 +313,7 @@ _COUNTED = len(names_of(Counts))
 @cache
 def _layout(size: int) -> tuple[int, tuple[int, ...]]:
     """Return how long rows are, and where each array of a session ends, for so many unknowns."""
-    padded = -(-size // WIDTH) * WIDTH
+    padded = -(-size // LANES) * LANES
     lengths = ROWS["all"] * padded, len(NUMBERS), len(COUNTS), len(POINTERS), size, size
     return padded, tuple(accumulate(lengths))
 
@@ -325,10 +325,22 @@ _EVENTS, _HEEDS, _SEEN = map(COUNTS.index, ("event_count", "heeds", "seen"))
 _PROJECT, _WATCH, _GUARD = map(POINTERS.index, ("project", "watch", "guard"))
 
 
+_ROUTINES = RoutineSource(
+    "integrators.dop853.steps",
+    (
+        "integrators/dop853/memory.py",
+        "integrators/dop853/reference.py",
+        "integrators/dop853/steps.py",
+        "integrators/dop853/tableau.py",
+        "integrators/explicit_problem.py",
+    ),
+)
+
+
 @once
 def _code() -> Built:
     """Return the code of the steps."""
-    return build_code([], CodeOptions(level=2), more=step_code(), exports=FUNCTIONS)
+    return build_code([], CodeOptions(level=2), exports=("run", "interpolate", "sample", "begin"), routines=_ROUTINES)
 
 
 @once
@@ -343,39 +355,3 @@ def functions() -> tuple[Callable[..., int], ...]:
     }
     return tuple(ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items())
 
-
-def rates_code(coordinates: int, speeds: int, given: bool) -> str:
-    """Return the function that gives ``(q', u')`` from ``(q, u)``; its data: derived values and scratch.
-
-    Parameters
-    ----------
-    coordinates, speeds
-        Their numbers.
-    given
-        Whether the kernel gives both, or ``q'`` is u.
-    """
-    copied = f"call void @llvm.memcpy.p0.p0.i64(ptr %yp, ptr %u, i64 {8 * speeds}, i1 false)"
-    written = """store ptr %yp, ptr %outputs
-  %behind = getelementptr ptr, ptr %outputs, i64 1
-  store ptr %a, ptr %behind"""
-    return f"""define i32 @rates(double %t, ptr %y, ptr %yp, ptr %data) #0 {{
-  %time = alloca double
-  %inputs = alloca [3 x ptr]
-  %outputs = alloca [2 x ptr]
-  store double %t, ptr %time
-  %u = getelementptr double, ptr %y, i64 {coordinates}
-  %a = getelementptr double, ptr %yp, i64 {coordinates}
-  %second = getelementptr ptr, ptr %inputs, i64 1
-  %third = getelementptr ptr, ptr %inputs, i64 2
-  store ptr %time, ptr %inputs
-  store ptr %y, ptr %second
-  store ptr %u, ptr %third
-  {written if given else "store ptr %a, ptr %outputs"}
-  %derived = load ptr, ptr %data
-  %scratch.at = getelementptr ptr, ptr %data, i64 1
-  %scratch = load ptr, ptr %scratch.at
-  {"" if given else copied}
-  %code = call i32 @kernel(ptr %inputs, ptr %derived, ptr %scratch, ptr %outputs)
-  ret i32 %code
-}}
-declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"""

@@ -1,0 +1,206 @@
+"""Routines in LLVM's language.
+
+Variables lie in memory; LLVM makes registers of them (`atwood.codegen.llvm.engine.compile_text`), so no phi node is
+written by hand.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes
+from atwood.codegen.routines.language import Block, Branch, Call, Instruction, Jump, Loop, Routine, Value
+
+__all__ = ["print_routines"]
+
+_TYPES: dict[Kind, str] = {NUMBER: "double", INTEGER: "i64", CODE: "i32", BOOLEAN: "i1", ADDRESS: "ptr"}
+_FLOATING = {"add": "fadd", "subtract": "fsub", "multiply": "fmul", "divide": "fdiv"}
+_WHOLE = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "sdiv", "and": "and", "or": "or"}
+_COMPARED = {
+    "less": ("olt", "slt"),
+    "less or equal": ("ole", "sle"),
+    "greater": ("ogt", "sgt"),
+    "greater or equal": ("oge", "sge"),
+    "equal": ("oeq", "eq"),
+    "unequal": ("une", "ne"),
+}
+_MATH = {"sqrt": "sqrt", "size": "fabs"}
+
+
+def print_routines(routines: Sequence[Routine]) -> str:
+    """Return the functions of a module, and the declarations of LLVM's own functions that they call.
+
+    Parameters
+    ----------
+    routines
+        The routines; those that are called by name come from here or from elsewhere in the module.
+    """
+    printer = _Printer()
+    parts = [printer.function(one) for one in routines]
+    return "\n".join([*parts, *sorted(printer.declared)])
+
+
+class _Printer:
+    """The lines of the function that is being printed, and the declarations of all."""
+
+    def __init__(self) -> None:
+        self.declared: set[str] = set()
+        self.lines: list[str] = []
+        self._labels = 0
+        self._loops: dict[Loop, int] = {}
+
+    def function(self, routine: Routine) -> str:
+        """Return a whole function."""
+        given = ", ".join(f"{_type(one.kind)} %{one.name}" for one in routine.arguments)
+        result = "void" if routine.result is None else _type(routine.result)
+        scope = "" if routine.exported else "internal "
+        self.lines = [f"define {scope}{result} @{routine.name}({given}) #0 {{", "entry:"]
+        for place, kind in routine.variables:
+            length = getattr(kind, "length", None)
+            room = _type(kind) if length is None else f"[{length} x i64]"
+            self.lines.append(f"  {_name(place)} = alloca {room}")
+        self.block(routine.body)
+        self.lines += ["  ret void" if routine.result is None else "  unreachable", "}"]
+        return "\n".join(self.lines)
+
+    def block(self, block: Block) -> None:
+        """Write what stands in a block."""
+        for one in block:
+            match one:
+                case Instruction():
+                    self.instruction(one)
+                case Call():
+                    self.call(one)
+                case Branch():
+                    self.branch(one)
+                case Loop():
+                    self.loop(one)
+                case Jump():
+                    label = f"{'end' if one.leaves else 'turn'}{self._loops[one.loop]}"
+                    self.end_of_block(f"br label %{label}")
+
+    def end_of_block(self, jump: str) -> None:
+        """Write a jump; what follows in the text, if anything does, is never reached."""
+        self._labels += 1
+        self.lines += [f"  {jump}", f"after{self._labels}:"]
+
+    def branch(self, branch: Branch) -> None:
+        """Write a branch."""
+        self._labels += 1
+        k = self._labels
+        other = "else" if branch.otherwise else "end"
+        self.lines += [f"  br i1 {_name(branch.condition)}, label %then{k}, label %{other}{k}", f"then{k}:"]
+        self.block(branch.then)
+        self.lines.append(f"  br label %end{k}")
+        if branch.otherwise:
+            self.lines.append(f"else{k}:")
+            self.block(branch.otherwise)
+            self.lines.append(f"  br label %end{k}")
+        self.lines.append(f"end{k}:")
+
+    def loop(self, loop: Loop) -> None:
+        """Write a loop."""
+        self._labels += 1
+        k = self._loops[loop] = self._labels
+        self.lines += [f"  br label %turn{k}", f"turn{k}:"]
+        self.block(loop.body)
+        self.lines += [f"  br label %turn{k}", f"end{k}:"]
+
+    def call(self, call: Call) -> None:
+        """Write a call."""
+        given = ", ".join(map(_typed, call.arguments))
+        target = f"@{call.function}" if isinstance(call.function, str) else _name(call.function)
+        if call.result is None:
+            self.lines.append(f"  call void {target}({given})")
+        else:
+            self.lines.append(f"  {_name(call.result)} = call {_type(call.result.kind)} {target}({given})")
+
+    def instruction(self, one: Instruction) -> None:
+        """Write an operation."""
+        result, operation, values = one.result, one.operation, one.arguments
+        if operation == "return":
+            self.end_of_block(f"ret {_typed(values[0])}" if values else "ret void")
+        elif operation in ("store", "set"):
+            align = ", align 8" if isinstance(values[0].kind, Lanes) else ""
+            self.lines.append(f"  store {_typed(values[0])}, {_typed(values[1])}{align}")
+        elif operation == "copy":
+            self._copy(*values)
+        else:
+            assert result is not None
+            self.lines.append(f"  {_name(result)} = {self._expression(operation, result, values)}")
+
+    def _expression(self, operation: str, result: Value, values: tuple[Value, ...]) -> str:
+        a, kind = values[0], _type(values[0].kind)
+        if operation in _COMPARED:
+            word = ("fcmp " if a.kind.is_float else "icmp ") + _COMPARED[operation][not a.kind.is_float]
+            return f"{word} {kind} {_name(a)}, {_name(values[1])}"
+        if operation in _WHOLE:
+            word = (_FLOATING if a.kind.is_float else _WHOLE)[operation]
+            return f"{word} {kind} {_name(a)}, {_name(values[1])}"
+        match operation:
+            case "load" | "get":
+                align = ", align 8" if isinstance(result.kind, Lanes) else ""
+                return f"load {_type(result.kind)}, {_typed(a)}{align}"
+            case "offset":
+                return f"getelementptr double, {_typed(a)}, {_typed(values[1])}"
+            case "choose":
+                return f"select {', '.join(map(_typed, values))}"
+            case "not":
+                return f"xor i1 {_name(a)}, true"
+            case "is null":
+                return f"icmp eq ptr {_name(a)}, null"
+            case "to number":
+                return f"sitofp i64 {_name(a)} to double"
+            case "to code" | "to integer":
+                return f"{'sext' if a.kind is CODE else 'zext'} {_typed(a)} to {_type(result.kind)}"
+            case "spread":
+                return self._spread(result, a)
+            case "sum of lanes":
+                assert isinstance(a.kind, Lanes)
+                name = f"llvm.vector.reduce.fadd.v{a.kind.count}f64"
+                self.declared.add(f"declare double @{name}(double, {kind})")
+                return f"call double @{name}(double -0.0, {_typed(a)})"
+            case _:
+                lanes = f"v{a.kind.count}" if isinstance(a.kind, Lanes) else ""
+                name = f"llvm.{_MATH[operation]}.{lanes}f64"
+                if lanes:  # those of plain numbers every module declares
+                    self.declared.add(f"declare {kind} @{name}({kind})")
+                return f"call {kind} @{name}({_typed(a)})"
+
+    def _spread(self, result: Value, a: Value) -> str:
+        assert isinstance(result.kind, Lanes)
+        kind, count = _type(result.kind), result.kind.count
+        first = f"{_name(result)}.first"
+        self.lines.append(f"  {first} = insertelement {kind} poison, {_typed(a)}, i32 0")
+        return f"shufflevector {kind} {first}, {kind} poison, <{count} x i32> zeroinitializer"
+
+    def _copy(self, target: Value, source: Value, count: Value) -> None:
+        self._labels += 1
+        size = f"%size{self._labels}"
+        self.declared.add("declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)")
+        self.lines.append(f"  {size} = mul i64 {_name(count)}, 8")
+        self.lines.append(f"  call void @llvm.memcpy.p0.p0.i64({_typed(target)}, {_typed(source)}, i64 {size}, i1 false)")
+
+
+def _type(kind: Kind) -> str:
+    if isinstance(kind, Lanes):
+        return f"<{kind.count} x {'double' if kind.is_float else 'i1'}>"
+    return _TYPES[kind]
+
+
+def _name(value: Value) -> str:
+    name = value.name
+    if isinstance(name, str):
+        return f"%{name}"
+    if isinstance(value.kind, Lanes) and isinstance(name, float):
+        return f"<{', '.join([f'double {_exact(name)}'] * value.kind.count)}>"
+    return _exact(name) if isinstance(name, float) else str(name)
+
+
+def _typed(value: Value) -> str:
+    return f"{_type(value.kind)} {_name(value)}"
+
+
+def _exact(value: float) -> str:
+    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"

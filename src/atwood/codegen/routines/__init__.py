@@ -1,0 +1,1 @@
+"""Routines with loops and branches, written once and printed for each target."""

@@ -1,0 +1,37 @@
+"""Calls of a program's functions from a routine (`atwood.codegen.llvm.module` says what these take)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from atwood.codegen.routines.kinds import ADDRESS
+from atwood.codegen.routines.language import Routine, Value
+
+__all__ = ["addresses", "call_kernel"]
+
+
+def addresses(r: Routine, places: Sequence[Value]) -> Value:
+    """Return an array of this call's own that holds addresses."""
+    table = r.array(len(places))
+    for k, place in enumerate(places):
+        table.write(k, place, ADDRESS)
+    return table
+
+
+def call_kernel(
+    r: Routine, name: str, inputs: Sequence[Value], derived: Value, scratch: Value, outputs: Sequence[Value]
+) -> Value:
+    """Call a program; return 0, or 1 where a result is not finite.
+
+    Parameters
+    ----------
+    r
+        The routine that calls.
+    name
+        The name of the program in the module.
+    inputs, outputs
+        The array of each group.
+    derived, scratch
+        What depends on parameters alone, and room.
+    """
+    return r.call(name, addresses(r, inputs), derived, scratch, addresses(r, outputs))

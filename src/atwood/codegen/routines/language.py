@@ -1,0 +1,393 @@
+"""A small imperative language: typed values, variables, arrays, records, loops, branches and calls.
+
+A routine is written with Python's operators on values, and becomes a tree of instructions that says nothing of the
+target.  Each operation is an instruction of its own, in the order in which it was written, so that a value that was read
+from memory stays what it was.  Control flow is structured: printers for other languages need no jumps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes
+from atwood.late import dataclass
+
+__all__ = ["Block", "Call", "Branch", "Instruction", "Jump", "Loop", "Record", "Routine", "Value", "Variable"]
+
+
+@dataclass(frozen=True, eq=False)
+class Instruction:
+    """An operation on values; `result` is None where it has none."""
+
+    operation: str
+    result: Value | None
+    arguments: tuple[Any, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Call:
+    """A call of a routine by its name, or of a function by its address."""
+
+    result: Value | None
+    function: str | Value
+    arguments: tuple[Value, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """What is done where a condition holds, and what otherwise."""
+
+    condition: Value
+    then: Block
+    otherwise: Block
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """What is done again and again until a jump leaves it."""
+
+    number: int
+    body: Block
+
+
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """To the end of a loop, or to its next turn."""
+
+    loop: Loop
+    leaves: bool
+
+
+Block = list["Instruction | Call | Branch | Loop | Jump"]
+
+
+class Value:
+    """A value of the routine that is being written.
+
+    Parameters
+    ----------
+    routine
+        The routine.
+    kind
+        What it is.
+    name
+        Its name among the values and arguments of the routine, or the constant.
+    """
+
+    __slots__ = ("kind", "name", "routine")
+    __hash__ = object.__hash__
+
+    def __init__(self, routine: Routine, kind: Kind, name: str | int | float) -> None:
+        self.routine, self.kind, self.name = routine, kind, name
+
+    def _two(self, operation: str, other: Operand, swapped: bool = False, kind: Kind | None = None) -> Value:
+        a, b = self.routine.alike(self, other)
+        a, b = (b, a) if swapped else (a, b)
+        if kind is BOOLEAN and isinstance(a.kind, Lanes):
+            kind = Lanes(a.kind.count, is_float=False)
+        return self.routine.put(operation, kind or a.kind, a, b)
+
+    def __add__(self, other: Operand) -> Value:
+        return self._two("add", other)
+
+    def __radd__(self, other: Operand) -> Value:
+        return self._two("add", other, swapped=True)
+
+    def __sub__(self, other: Operand) -> Value:
+        return self._two("subtract", other)
+
+    def __rsub__(self, other: Operand) -> Value:
+        return self._two("subtract", other, swapped=True)
+
+    def __mul__(self, other: Operand) -> Value:
+        return self._two("multiply", other)
+
+    def __rmul__(self, other: Operand) -> Value:
+        return self._two("multiply", other, swapped=True)
+
+    def __truediv__(self, other: Operand) -> Value:
+        return self._two("divide", other)
+
+    def __rtruediv__(self, other: Operand) -> Value:
+        return self._two("divide", other, swapped=True)
+
+    def __lt__(self, other: Operand) -> Value:
+        return self._two("less", other, kind=BOOLEAN)
+
+    def __le__(self, other: Operand) -> Value:
+        return self._two("less or equal", other, kind=BOOLEAN)
+
+    def __gt__(self, other: Operand) -> Value:
+        return self._two("greater", other, kind=BOOLEAN)
+
+    def __ge__(self, other: Operand) -> Value:
+        return self._two("greater or equal", other, kind=BOOLEAN)
+
+    def __eq__(self, other: Operand) -> Value:  # type: ignore[override]
+        return self._two("equal", other, kind=BOOLEAN)
+
+    def __ne__(self, other: Operand) -> Value:  # type: ignore[override]
+        return self._two("unequal", other, kind=BOOLEAN)
+
+    def __and__(self, other: Value) -> Value:
+        return self._two("and", other)
+
+    def __or__(self, other: Value) -> Value:
+        return self._two("or", other)
+
+    def __invert__(self) -> Value:
+        return self.routine.put("not", BOOLEAN, self)
+
+    def __bool__(self) -> bool:
+        raise TypeError("a value of a routine is not known while the routine is written: use `when` or `choose`")
+
+    def at(self, offset: Operand) -> Value:
+        """Return the address of an element of this array."""
+        return self.routine.put("offset", ADDRESS, self, self.routine.value(offset, INTEGER))
+
+    def read(self, offset: Operand, kind: Kind = NUMBER) -> Value:
+        """Return an element of this array, or the lanes that begin there."""
+        return self.routine.put("load", kind, self.at(offset))
+
+    def write(self, offset: Operand, value: Operand, kind: Kind = NUMBER) -> None:
+        """Set an element of this array, or the lanes that begin there."""
+        given = value if isinstance(value, Value) else self.routine.value(value, kind)
+        self.routine.do("store", given, self.at(offset))
+
+    def __getitem__(self, offset: Operand) -> Value:
+        return self.read(offset)
+
+    def __setitem__(self, offset: Operand, value: Operand) -> None:
+        self.write(offset, value)
+
+    def number(self) -> Value:
+        """Return an integer as a number."""
+        return self.routine.put("to number", NUMBER, self)
+
+    def integer(self) -> Value:
+        """Return a condition or a code as an integer."""
+        return self.routine.put("to integer", INTEGER, self)
+
+    def code(self) -> Value:
+        """Return a condition as a code: 1 where it holds."""
+        return self.routine.put("to code", CODE, self)
+
+
+Operand = Value | float | int
+
+
+class Variable:
+    """A value that can be set anew."""
+
+    __slots__ = ("_address", "_kind")
+
+    def __init__(self, address: Value, kind: Kind) -> None:
+        self._address, self._kind = address, kind
+
+    @property
+    def now(self) -> Value:
+        """The present value."""
+        return self._address.routine.put("get", self._kind, self._address)
+
+    @now.setter
+    def now(self, value: Operand) -> None:
+        routine = self._address.routine
+        routine.do("set", routine.value(value, self._kind), self._address)
+
+
+class Record:
+    """Named fields of 8 bytes each that follow each other in memory, read and set as attributes.
+
+    Parameters
+    ----------
+    base
+        Where they begin.
+    fields
+        Their names and kinds, in their order.
+    """
+
+    def __init__(self, base: Value, fields: Mapping[str, Kind]) -> None:
+        self.__dict__.update(base=base, fields=fields, places={name: k for k, name in enumerate(fields)})
+
+    def __getattr__(self, name: str) -> Value:
+        found: Value = self.base.read(self.places[name], self.fields[name])
+        return found
+
+    def __setattr__(self, name: str, value: Operand) -> None:
+        self.base.write(self.places[name], value, self.fields[name])
+
+
+class Routine:
+    """A function while it is being written.
+
+    Parameters
+    ----------
+    name
+        Its name in the module.
+    arguments
+        Their names and kinds.
+    result
+        What it returns; None for nothing.
+    exported
+        Whether it is called from outside the module.
+    """
+
+    def __init__(
+        self, name: str, arguments: Mapping[str, Kind], result: Kind | None = CODE, exported: bool = False
+    ) -> None:
+        self.name, self.result, self.exported = name, result, exported
+        self.arguments = [Value(self, kind, one) for one, kind in arguments.items()]
+        self.body: Block = []
+        self.variables: list[tuple[Value, Kind]] = []
+        self._blocks = [self.body]
+        self._count = 0
+        self._last: Branch | None = None
+
+    def put(self, operation: str, kind: Kind, *arguments: Any) -> Value:
+        """Add an operation, and return its value."""
+        self._count += 1
+        result = Value(self, kind, f"v{self._count}")
+        self._blocks[-1].append(Instruction(operation, result, arguments))
+        return result
+
+    def do(self, operation: str, *arguments: Any) -> None:
+        """Add an operation without a value."""
+        self._blocks[-1].append(Instruction(operation, None, arguments))
+
+    def value(self, one: Operand, kind: Kind) -> Value:
+        """Return a value, from a constant where it is one; a number is spread over lanes where these are asked for."""
+        if isinstance(one, Value):
+            spreads = isinstance(kind, Lanes) and not isinstance(one.kind, Lanes)
+            return self.put("spread", kind, one) if spreads else one
+        return Value(self, kind, float(one) if kind.is_float else int(one))
+
+    def alike(self, a: Value, b: Operand) -> tuple[Value, Value]:
+        """Return two operands as values of one kind."""
+        if isinstance(b, Value) and isinstance(b.kind, Lanes):
+            return self.value(a, b.kind), b
+        return a, self.value(b, a.kind)
+
+    def variable(self, value: Operand, kind: Kind = NUMBER) -> Variable:
+        """Return a variable with its first value."""
+        self._count += 1
+        place = Value(self, ADDRESS, f"v{self._count}")
+        self.variables.append((place, kind))
+        made = Variable(place, kind)
+        made.now = value
+        return made
+
+    def array(self, length: int) -> Value:
+        """Return an array of this call's own, with elements of 8 bytes each."""
+        self._count += 1
+        place = Value(self, ADDRESS, f"v{self._count}")
+        self.variables.append((place, _Room(length)))
+        return place
+
+    def give(self, value: Operand | None = None) -> None:
+        """Return from the routine."""
+        self.do("return", *(() if value is None or self.result is None else (self.value(value, self.result),)))
+
+    @contextmanager
+    def when(self, condition: Value) -> Iterator[None]:
+        """Do what follows only where a condition holds."""
+        branch = Branch(condition, [], [])
+        self._blocks[-1].append(branch)
+        yield from self._inside(branch.then)
+        self._last = branch
+
+    @contextmanager
+    def otherwise(self) -> Iterator[None]:
+        """Do what follows where the condition of the `when` before did not hold."""
+        assert self._last is not None and self._blocks[-1][-1] is self._last, "`otherwise` follows a `when`"
+        yield from self._inside(self._last.otherwise)
+
+    @contextmanager
+    def forever(self) -> Iterator[Loop]:
+        """Do what follows until `leave`."""
+        self._count += 1
+        loop = Loop(self._count, [])
+        self._blocks[-1].append(loop)
+        self._blocks.append(loop.body)
+        yield loop
+        self._blocks.pop()
+
+    @contextmanager
+    def count(self, end: Operand, start: Operand = 0, step: int = 1) -> Iterator[Value]:
+        """Do what follows for ``start <= i < end``; the value is i."""
+        i = self.variable(start, INTEGER)
+        with self.forever() as loop:
+            now = i.now
+            with self.when(now >= end):
+                self.leave(loop)
+            yield now
+            i.now = now + step
+
+    def leave(self, loop: Loop) -> None:
+        """Go on behind a loop."""
+        self._blocks[-1].append(Jump(loop, leaves=True))
+
+    def repeat(self, loop: Loop) -> None:
+        """Go on with the next turn of a loop."""
+        self._blocks[-1].append(Jump(loop, leaves=False))
+
+    def call(self, function: Routine | str | Value, *arguments: Operand, result: Kind | None = CODE) -> Value:
+        """Call a routine of the module, or a function by its address; return its value, for what it is worth."""
+        kinds: Sequence[Kind | None] = [None] * len(arguments)
+        if isinstance(function, Routine):
+            kinds, result = [one.kind for one in function.arguments], function.result
+        given = tuple(self.value(one, kind or NUMBER) for one, kind in zip(arguments, kinds, strict=True))
+        self._count += 1
+        value = Value(self, result or CODE, f"v{self._count}")
+        target = function.name if isinstance(function, Routine) else function
+        self._blocks[-1].append(Call(value if result else None, target, given))
+        return value
+
+    def choose(self, condition: Value, a: Operand, b: Operand, kind: Kind = NUMBER) -> Value:
+        """Return the first value where a condition holds, and else the second."""
+        first, second = self.value(a, kind), self.value(b, kind)
+        return self.put("choose", first.kind, condition, first, second)
+
+    def least(self, a: Value, b: Operand) -> Value:
+        """Return the smaller of two values; the second where one is no number."""
+        first, second = self.alike(a, b)
+        return self.choose(first < second, first, second, first.kind)
+
+    def most(self, a: Value, b: Operand) -> Value:
+        """Return the larger of two values; the second where one is no number."""
+        first, second = self.alike(a, b)
+        return self.choose(first > second, first, second, first.kind)
+
+    def sqrt(self, a: Value) -> Value:
+        """Return the square root."""
+        return self.put("sqrt", a.kind, a)
+
+    def size(self, a: Value) -> Value:
+        """Return the absolute value."""
+        return self.put("size", a.kind, a)
+
+    def sum_of_lanes(self, a: Value) -> Value:
+        """Return the sum of the lanes, from the first to the last."""
+        return self.put("sum of lanes", NUMBER, a)
+
+    def copy(self, target: Value, source: Value, count: Operand) -> None:
+        """Copy so many elements of 8 bytes each."""
+        self.do("copy", target, source, self.value(count, INTEGER))
+
+    def is_null(self, address: Value) -> Value:
+        """Tell whether an address leads nowhere."""
+        return self.put("is null", BOOLEAN, address)
+
+    def _inside(self, block: Block) -> Iterator[None]:
+        self._blocks.append(block)
+        yield
+        self._blocks.pop()
+
+
+@dataclass(frozen=True)
+class _Room:
+    """The kind of an array of a call's own."""
+
+    length: int
+    is_float: bool = False

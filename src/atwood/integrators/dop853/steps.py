@@ -1,0 +1,413 @@
+"""Steps of the explicit method of order 8(5,3), for any number of unknowns and any right-hand side.
+
+The routines take the steps of `atwood.integrators.dop853.reference`.  All that they know of a problem comes in through
+addresses, so that they are compiled once and kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from math import inf
+
+from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Lanes
+from atwood.codegen.routines.language import Routine, Value
+from atwood.integrators.dop853.memory import LANES, Memory, open_routine
+from atwood.integrators.dop853.reference import GROWTH, RETREAT, SAFETY, SHRINKAGE
+from atwood.integrators.dop853.tableau import DENSE, ERROR_3, ERROR_5, NODES, STAGES
+from atwood.integrators.explicit_problem import CALM, EDGE, STIFF
+
+__all__ = ["write_routines"]
+
+_END = 12
+"""The slope at the end of a step, with which the next one begins."""
+
+_STRETCH = 1.5
+"""The end of a step takes the place of a look that was wanted before, if that makes the way to it longer by no more."""
+
+_PATIENCE = 32
+"""After so many steps without a look the motion is looked at, however little it has moved: perhaps what keeps steps
+short is what is looked for."""
+
+_REACHED, _USED_UP, _TOO_SMALL, _NO_VALUE, _NO_RATES, _NOTICED = range(6)
+"""How a routine ends; `_NOTICED` after a step in which an event may have happened, after which the problem seems stiff
+and that is heeded, or in which something was seen by what watches the motion."""
+
+
+def _weighted(m: Memory, weights: Mapping[int, float], j: Value) -> Value:
+    """Return a weighted sum of slopes."""
+    terms = [m.lanes(m.row(row), j) * weight for row, weight in weights.items()]
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def _stage(stage: int) -> Routine:
+    """Write the values at which a slope is taken, or the new values."""
+    r, m, (h,) = open_routine(f"stage{stage}", {"h": NUMBER})
+    base, trial, last = m.row("y_old" if stage > _END else "y"), m.row("trial"), m.row("last")
+    with r.count(m.padded, step=LANES) as j:
+        value = m.lanes(base, j) + _weighted(m, STAGES[stage - 1], j) * h
+        trial[j] = value
+        if stage == 11:
+            last[j] = value
+    r.give(0)
+    return r
+
+
+def _sum(r: Routine, m: Memory, square: Callable[[Value], Value]) -> Value:
+    """Return the sum of squares over all unknowns."""
+    total = r.variable(0.0, Lanes(LANES))
+    with r.count(m.padded, step=LANES) as j:
+        total.now = total.now + square(j)
+    return r.sum_of_lanes(total.now)
+
+
+def _squares(r: Routine, m: Memory, weights: Mapping[int, float]) -> Value:
+    """Return the sum of the squares of an error estimate in units of the tolerances."""
+    y, trial, absolute, relative = m.row("y"), m.row("trial"), m.row("absolute"), m.numbers.relative
+
+    def square(j: Value) -> Value:
+        size = r.most(r.size(m.lanes(y, j)), r.size(m.lanes(trial, j)))
+        error = _weighted(m, weights, j) / (size * relative + m.lanes(absolute, j))
+        return error * error
+
+    return _sum(r, m, square)
+
+
+def _size(r: Routine, m: Memory, row: int | str, less: int | str | None = None) -> Value:
+    """Return the root of the mean square of a row, or of a difference, in units of what is allowed at y."""
+    y, absolute, relative, a = m.row("y"), m.row("absolute"), m.numbers.relative, m.row(row)
+    b = None if less is None else m.row(less)
+
+    def square(j: Value) -> Value:
+        value = m.lanes(a, j) if b is None else m.lanes(a, j) - m.lanes(b, j)
+        scaled = value / (r.size(m.lanes(y, j)) * relative + m.lanes(absolute, j))
+        return scaled * scaled
+
+    return r.sqrt(_sum(r, m, square) / m.size.number())
+
+
+def _distance(r: Routine, m: Memory, a: int | str, b: int | str) -> Value:
+    """Return the square of the distance between two rows."""
+    first, second = m.row(a), m.row(b)
+
+    def square(j: Value) -> Value:
+        apart = m.lanes(first, j) - m.lanes(second, j)
+        return apart * apart
+
+    return _sum(r, m, square)
+
+
+def _evaluate() -> Routine:
+    """Take a slope from a row to a row, and count it; what the right-hand side returned."""
+    r, m, (t, source, target) = open_routine("evaluate", {"t": NUMBER, "source": ADDRESS, "target": ADDRESS})
+    code = r.call(m.at.function, t, source, target, m.at.data)
+    m.counts.evaluations = m.counts.evaluations + 1
+    m.counts.undefined = m.counts.undefined + (code != 0).integer()
+    r.give(code)
+    return r
+
+
+def _slopes(r: Routine, m: Memory, stages: Iterable[int], t: Value, h: Value, failed: Callable[[], None]) -> None:
+    """Take the slopes of stages one after the other."""
+    for stage in stages:
+        r.call(f"stage{stage}", m.session, h)
+        code = r.call("evaluate", m.session, t + h * NODES[stage], m.row("trial"), m.row(stage))
+        with r.when(code != 0):
+            failed()
+
+
+def _first_step(r: Routine, m: Memory, t: Value) -> None:
+    """Choose the first step by the size of the first two derivatives (Hairer, Norsett and Wanner, section II.4)."""
+    longest = m.numbers.longest
+    bound = r.least(m.numbers.horizon, longest)
+    given = m.numbers.first
+    with r.when(given > 0.0):
+        m.numbers.next = r.least(given, longest)
+        r.give(_REACHED)
+    y, trial, end, probe = m.row("y"), m.row("trial"), m.row(_END), m.row(1)
+    d0, d1 = _size(r, m, "y"), _size(r, m, _END)
+    usual = (d0 >= 1e-5) & (d1 >= 1e-5) & (d0 / d1 < inf)
+    h0 = r.least(r.choose(usual, d0 * 0.01 / d1, 1e-6), bound)
+    m.numbers.next = h0
+    with r.count(m.padded, step=LANES) as j:
+        trial[j] = m.lanes(y, j) + m.lanes(end, j) * h0
+    code = r.call("evaluate", m.session, t + h0, trial, probe)
+    d2 = _size(r, m, 1, _END) / h0
+    with r.when((code == 0) & (d2 < inf)):
+        steepest = r.most(d2, d1)
+        root = r.sqrt(r.sqrt(r.sqrt(0.01 / steepest)))
+        h1 = r.choose(steepest <= 1e-15, r.most(h0 * 1e-3, 1e-6), root)
+        m.numbers.next = r.least(r.least(h0 * 100.0, h1), bound)
+
+
+def _begin() -> Routine:
+    """Start anew from a state."""
+    r, m, (t, start) = open_routine("begin", {"t": NUMBER, "start": ADDRESS}, exported=True)
+    m.numbers.t, m.numbers.t_old, m.numbers.looked = t, t, t
+    m.counts.edgy, m.counts.calm, m.counts.looks = 0, 0, m.counts.steps
+    r.copy(m.row("y"), start, m.size)
+    r.copy(m.row("y_old"), start, m.size)
+    with r.when(r.call("evaluate", m.session, t, m.row("y"), m.row(_END)) != 0):
+        r.give(_NO_RATES)
+    _first_step(r, m, t)
+    r.give(_REACHED)
+    return r
+
+
+def _look() -> Routine:
+    """Tell whether an event may have happened in the last step."""
+    r, m, (t,) = open_routine("look", {"t": NUMBER})
+    count, values, signs = m.counts.event_count, m.at.values, m.at.signs
+    with r.when(count > 0):
+        code = r.call(m.at.events, t, m.row("y"), m.row(_END), values, m.at.events_data)
+        with r.when(code != 0):
+            r.give(1)
+        with r.count(count) as i:
+            with r.when(~(values[i] * signs[i] > 0.0)):
+                r.give(1)
+    r.give(0)
+    return r
+
+
+def _watched() -> Routine:
+    """Look at the motion in the last step at the times that what watches it wants; 1 where something is seen.
+
+    The end of a step is looked at instead where it is not much later: its state is there already.  It is looked at, too,
+    after many steps that were not.  What is seen stays in `seen` until somebody asks; the looks that are then left in the
+    step are taken when the steps go on.
+    """
+    r, m, (t_new,) = open_routine("watched", {"t_new": NUMBER})
+    watch, t, steps = m.at.watch, m.numbers.t_old, m.counts.steps
+    with r.when(r.is_null(watch)):
+        r.give(0)
+    with r.when(~(t < t_new)):
+        r.give(0)
+    y, end, trial, last = m.row("y"), m.row(_END), m.row("trial"), m.row("last")
+    with r.forever():
+        due = m.at.due[0]
+        is_within = due <= t_new
+        with r.when(~is_within & (steps - m.counts.looks < _PATIENCE)):
+            r.give(0)
+        looked, inside = m.numbers.looked, r.variable(False, BOOLEAN)
+        with r.when(is_within & ~(t_new - looked <= (due - looked) * _STRETCH)):
+            with r.when(r.call("densify", m.session) == 0):
+                share = (due - t) / m.numbers.h
+                r.call("polynomial", m.session, share)
+                r.call("slope", m.session, share)
+                inside.now = True
+        is_inside = inside.now
+        moment = r.choose(is_inside, due, t_new)
+        m.numbers.looked, m.counts.looks = moment, steps
+        places = r.choose(is_inside, trial, y), r.choose(is_inside, last, end)
+        with r.when(r.call(watch, moment, *places, m.at.watch_data) != 0):
+            m.counts.seen = 1
+            r.give(1)
+    return r
+
+
+def _held() -> Routine:
+    """Take the values at the end of a step onto the constraints; 0, or another number where that fails.
+
+    It comes before the last slope is taken, so that the next step begins with the slope of the state that is kept, and
+    the dense output meets the constraints at both ends.
+    """
+    r, m, (t,) = open_routine("held", {"t": NUMBER})
+    project = m.at.project
+    with r.when(r.is_null(project)):
+        r.give(0)
+    r.give(r.call(project, t, m.row("trial"), m.at.project_data))
+    return r
+
+
+def _error() -> Routine:
+    """Return the error of a step in units of what is allowed (Hairer, Norsett and Wanner, section II.10)."""
+    r, m, (h,) = open_routine("error", {"h": NUMBER}, result=NUMBER)
+    fifth, third = _squares(r, m, ERROR_5), _squares(r, m, ERROR_3)
+    both = fifth + third * 0.01
+    error = h * fifth / r.sqrt(both * m.size.number())
+    r.give(r.choose(both == 0.0, 0.0, error))
+    return r
+
+
+def _stability() -> Routine:
+    """Count steps at the edge of stability; 1 where the problem has just turned out stiff."""
+    r, m, (h,) = open_routine("stability", {"h": NUMBER})
+    turned, apart = _distance(r, m, _END, 11), _distance(r, m, "trial", "last")
+    is_edgy = (h * r.sqrt(turned / apart) > EDGE) & (apart > 0.0)
+    edgy = r.choose(is_edgy, m.counts.edgy + 1, m.counts.edgy)
+    calm = r.choose(is_edgy, 0, m.counts.calm + 1, INTEGER)
+    found = is_edgy & (edgy == STIFF)
+    m.counts.stiff, m.counts.calm = m.counts.stiff + found.integer(), calm
+    m.counts.edgy = r.choose((calm == CALM) | found, 0, edgy, INTEGER)
+    r.give(found.code())
+    return r
+
+
+def _attempt() -> Routine:
+    """Try steps until one is good enough, and keep it; `_TOO_SMALL` where none is."""
+    r, m, () = open_routine("attempt")
+    t, h, shortened = m.numbers.t, r.variable(m.numbers.next), r.variable(False, BOOLEAN)
+    least, longest = r.size(t) * (10.0 * 2.0**-52), m.numbers.longest
+    with r.forever() as attempts:
+        h.now = r.least(h.now, longest)
+        step = h.now
+        with r.when(~((step > least) & (step >= 1e-300))):
+            r.give(_TOO_SMALL)
+
+        def retreat() -> None:
+            h.now, shortened.now = step * RETREAT, True
+            m.counts.failures = m.counts.failures + 1
+            r.repeat(attempts)
+
+        _slopes(r, m, range(1, _END), t, step, retreat)
+        r.call(f"stage{_END}", m.session, step)
+        error = r.call("error", m.session, step, result=NUMBER)
+        factor = r.sqrt(r.sqrt(r.sqrt(error))) / SAFETY
+        with r.when(~(error <= 1.0)):
+            with r.when(~(error < inf)):
+                retreat()
+            h.now, shortened.now = step * (1.0 / r.least(factor, SHRINKAGE)), True
+            m.counts.failures = m.counts.failures + 1
+            r.repeat(attempts)
+        t_new = t + step
+        with r.when(r.call("held", m.session, t_new) != 0):
+            retreat()
+        with r.when(r.call("evaluate", m.session, t_new, m.row("trial"), m.row(_END)) != 0):
+            retreat()
+        within = r.least(r.choose(factor < 1.0 / GROWTH, 1.0 / GROWTH, factor), SHRINKAGE)
+        grown = step / within
+        m.numbers.next = r.choose((grown > step) & shortened.now, step, grown)
+        m.numbers.h, m.numbers.t_old, m.numbers.t = step, t, t_new
+        m.counts.steps = m.counts.steps + 1
+        r.give(0)
+    return r
+
+
+def _run() -> Routine:
+    """Take steps until one ends at or after the time to stop at."""
+    r, m, () = open_routine("run", exported=True)
+    with r.forever():
+        t = m.numbers.t
+        with r.when(t >= m.numbers.stop):
+            r.give(_REACHED)
+        with r.when(m.counts.steps >= m.counts.limit):
+            r.give(_USED_UP)
+        with r.when(r.call("watched", m.session, t) != 0):
+            r.give(_NOTICED)
+        begin, end = m.row(0), m.row(_END)
+        r.copy(begin, end, m.padded)
+        m.counts.is_dense = 0
+        with r.when(r.call("attempt", m.session) != 0):
+            r.copy(end, begin, m.padded)
+            r.give(_TOO_SMALL)
+        stiffens = (r.call("stability", m.session, m.numbers.h) != 0) & (m.counts.heeds != 0)
+        r.copy(m.row("y_old"), m.row("y"), m.padded)
+        r.copy(m.row("y"), m.row("trial"), m.padded)
+        t_new = m.numbers.t
+        is_seen = r.call("watched", m.session, t_new) != 0
+        happens = r.call("look", m.session, t_new) != 0
+        with r.when(happens | stiffens | is_seen):
+            r.give(_NOTICED)
+    return r
+
+
+def _densify() -> Routine:
+    """Make the dense output of the last step, unless it is there; 1 where there is none."""
+    r, m, () = open_routine("densify")
+    with r.when(m.counts.is_dense != 0):
+        r.give(0)
+    h, dense = m.numbers.h, m.row("dense")
+    _slopes(r, m, (13, 14, 15), m.numbers.t_old, h, lambda: r.give(1))
+    y, y_old, begin, end = m.row("y"), m.row("y_old"), m.row(0), m.row(_END)
+    with r.count(m.padded, step=LANES) as j:
+        step = m.lanes(y, j) - m.lanes(y_old, j)
+        rise, fall = m.lanes(begin, j) * h, m.lanes(end, j) * h
+        rows = [step, rise - step, (step + step) - (rise + fall)]
+        rows += [_weighted(m, weights, j) * h for weights in DENSE]
+        for number, row in enumerate(rows):
+            dense[j + m.padded * number] = row
+    m.counts.is_dense = 1
+    r.give(0)
+    return r
+
+
+def _polynomial() -> Routine:
+    """Write the dense output at a share of the last step to `trial`."""
+    r, m, (x,) = open_routine("polynomial", {"x": NUMBER})
+    rows = [m.row("dense").at(m.padded * k) for k in range(7)]
+    below, trial, rest = [m.row("y_old"), *rows[:-1]], m.row("trial"), 1.0 - x
+    with r.count(m.padded, step=LANES) as j:
+        value = m.lanes(rows[-1], j)
+        for power, row in enumerate(reversed(below)):
+            value = value * (rest if power % 2 else x) + m.lanes(row, j)
+        trial[j] = value
+    r.give(0)
+    return r
+
+
+def _slope() -> Routine:
+    """Write the slope of the cubic through both ends of the last step, at a share of it, to `last`."""
+    r, m, (x,) = open_routine("slope", {"x": NUMBER})
+    rest = 1.0 - x
+    both, begin, end = x * rest * 6.0 / m.numbers.h, rest * (1.0 - x * 3.0), x * (x * 3.0 - 2.0)
+    y, y_old, first, second, last = m.row("y"), m.row("y_old"), m.row(0), m.row(_END), m.row("last")
+    with r.count(m.padded, step=LANES) as j:
+        step = m.lanes(y, j) - m.lanes(y_old, j)
+        last[j] = step * both + m.lanes(first, j) * begin + m.lanes(second, j) * end
+    r.give(0)
+    return r
+
+
+def _interpolate() -> Routine:
+    """Write values and rates at a time within the last step."""
+    arguments = {"time": NUMBER, "y_out": ADDRESS, "yp_out": ADDRESS}
+    r, m, (time, y_out, yp_out) = open_routine("interpolate", arguments, exported=True)
+    with r.when(time == m.numbers.t):
+        r.copy(y_out, m.row("y"), m.size)
+        r.copy(yp_out, m.row(_END), m.size)
+        r.give(0)
+    with r.when(r.call("densify", m.session) != 0):
+        r.give(_NO_VALUE)
+    r.call("polynomial", m.session, (time - m.numbers.t_old) / m.numbers.h)
+    trial = m.row("trial")
+    r.copy(y_out, trial, m.size)
+    code = r.call(m.at.function, time, trial, yp_out, m.at.data)
+    m.counts.evaluations = m.counts.evaluations + 1
+    r.give(r.choose(code == 0, 0, _NO_VALUE, CODE))
+    return r
+
+
+def _sample() -> Routine:
+    """Go through output times and fill a table; it ends as `run` does."""
+    arguments = {"times": ADDRESS, "wanted": INTEGER, "ys": ADDRESS, "yps": ADDRESS}
+    r, m, (times, wanted, ys, yps) = open_routine("sample", arguments, exported=True)
+    i = r.variable(0, INTEGER)
+    with r.forever():
+        now = i.now
+        m.counts.filled = now
+        with r.when(now >= wanted):
+            r.give(_REACHED)
+        moment, place = times[now], now * m.size
+        m.numbers.stop = moment
+        for code in (
+            lambda: r.call("run", m.session),
+            lambda: r.call("interpolate", m.session, moment, ys.at(place), yps.at(place)),
+        ):
+            ended = code()
+            with r.when(ended != 0):
+                r.give(ended)
+        i.now = now + 1
+    return r
+
+
+def write_routines() -> list[Routine]:
+    """Return the routines of the method.
+
+    They take a pointer to the pointers of a session; numbers and counts are behind two of these
+    (`atwood.integrators.dop853.memory`).
+    """
+    ends = [_begin(), _run(), _interpolate(), _sample()]
+    inner = [_evaluate(), _attempt(), _error(), _stability(), _held(), _look(), _watched()]
+    return [*ends, *inner, *map(_stage, range(1, 16)), _densify(), _polynomial(), _slope()]
