@@ -209,14 +209,14 @@ class Record:
     """
 
     def __init__(self, base: Value, fields: Mapping[str, Kind]) -> None:
-        self.__dict__.update(base=base, fields=fields, places={name: k for k, name in enumerate(fields)})
+        self.__dict__.update(_base=base, _fields=fields, _places={name: k for k, name in enumerate(fields)})
 
     def __getattr__(self, name: str) -> Value:
-        found: Value = self.base.read(self.places[name], self.fields[name])
+        found: Value = self._base.read(self._places[name], self._fields[name])
         return found
 
     def __setattr__(self, name: str, value: Operand) -> None:
-        self.base.write(self.places[name], value, self.fields[name])
+        self._base.write(self._places[name], value, self._fields[name])
 
 
 class Routine:

@@ -333,6 +333,7 @@ _ROUTINES = RoutineSource(
         "integrators/dop853/steps.py",
         "integrators/dop853/tableau.py",
         "integrators/explicit_problem.py",
+        "integrators/output_times.py",
     ),
 )
 

@@ -15,6 +15,7 @@ from atwood.integrators.dop853.memory import LANES, Memory, open_routine
 from atwood.integrators.dop853.reference import GROWTH, RETREAT, SAFETY, SHRINKAGE
 from atwood.integrators.dop853.tableau import DENSE, ERROR_3, ERROR_5, NODES, STAGES
 from atwood.integrators.explicit_problem import CALM, EDGE, STIFF
+from atwood.integrators.output_times import SAMPLE_ARGUMENTS, write_sample
 
 __all__ = ["write_routines"]
 
@@ -381,25 +382,8 @@ def _interpolate() -> Routine:
 
 def _sample() -> Routine:
     """Go through output times and fill a table; it ends as `run` does."""
-    arguments = {"times": ADDRESS, "wanted": INTEGER, "ys": ADDRESS, "yps": ADDRESS}
-    r, m, (times, wanted, ys, yps) = open_routine("sample", arguments, exported=True)
-    i = r.variable(0, INTEGER)
-    with r.forever():
-        now = i.now
-        m.counts.filled = now
-        with r.when(now >= wanted):
-            r.give(_REACHED)
-        moment, place = times[now], now * m.size
-        m.numbers.stop = moment
-        for code in (
-            lambda: r.call("run", m.session),
-            lambda: r.call("interpolate", m.session, moment, ys.at(place), yps.at(place)),
-        ):
-            ended = code()
-            with r.when(ended != 0):
-                r.give(ended)
-        i.now = now + 1
-    return r
+    r, m, _ = open_routine("sample", SAMPLE_ARGUMENTS, exported=True)
+    return write_sample(r, m.numbers, m.counts, m.size)
 
 
 def write_routines() -> list[Routine]:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from atwood.codegen.llvm.build import Built, build_code
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.once import once
-from atwood.integrators.ensemble.code import FIELDS, batch_code
+from atwood.codegen.routines.source import RoutineSource
+from atwood.integrators.ensemble.code import FIELDS
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 
@@ -183,9 +184,12 @@ class Batch:
 _RUN, _BUDGET = FIELDS.index("run"), FIELDS.index("budget")
 
 
+_ROUTINES = RoutineSource("integrators.ensemble.code", ("integrators/ensemble/code.py",))
+
+
 @once
 def _code() -> Built:
-    return build_code([], CodeOptions(), more=batch_code(), exports=["batch"])
+    return build_code([], CodeOptions(), exports=["batch"], routines=_ROUTINES)
 
 
 @once
