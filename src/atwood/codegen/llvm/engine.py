@@ -106,7 +106,9 @@ def compile_text(text: str, level: int, has_variables: bool = False) -> bytes:
             if has_variables:
                 passes = binding.create_new_module_pass_manager()
                 passes.add_sroa_pass()
-                passes.run(module, binding.create_pass_builder(_machine(level), binding.create_pipeline_tuning_options()))
+                passes.run(
+                    module, binding.create_pass_builder(_machine(level), binding.create_pipeline_tuning_options())
+                )
             found: bytes = _machine(level).emit_object(module)
         return found
 

@@ -57,8 +57,7 @@ class _Printer:
         scope = "" if routine.exported else "internal "
         self.lines = [f"define {scope}{result} @{routine.name}({given}) #0 {{", "entry:"]
         for place, kind in routine.variables:
-            length = getattr(kind, "length", None)
-            room = _type(kind) if length is None else f"[{length} x i64]"
+            room = f"[{kind} x i64]" if isinstance(kind, int) else _type(kind)
             self.lines.append(f"  {_name(place)} = alloca {room}")
         self.block(routine.body)
         self.lines += ["  ret void" if routine.result is None else "  unreachable", "}"]
@@ -180,7 +179,9 @@ class _Printer:
         size = f"%size{self._labels}"
         self.declared.add("declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)")
         self.lines.append(f"  {size} = mul i64 {_name(count)}, 8")
-        self.lines.append(f"  call void @llvm.memcpy.p0.p0.i64({_typed(target)}, {_typed(source)}, i64 {size}, i1 false)")
+        self.lines.append(
+            f"  call void @llvm.memcpy.p0.p0.i64({_typed(target)}, {_typed(source)}, i64 {size}, i1 false)"
+        )
 
 
 def _type(kind: Kind) -> str:

@@ -1,8 +1,8 @@
 """A small imperative language: typed values, variables, arrays, records, loops, branches and calls.
 
 A routine is written with Python's operators on values, and becomes a tree of instructions that says nothing of the
-target.  Each operation is an instruction of its own, in the order in which it was written, so that a value that was read
-from memory stays what it was.  Control flow is structured: printers for other languages need no jumps.
+target.  Each operation is an instruction of its own, in the order of writing: a value that was read from memory stays
+what it was.  Control flow is structured: printers for other languages need no jumps.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes
 from atwood.late import dataclass
 
-__all__ = ["Block", "Call", "Branch", "Instruction", "Jump", "Loop", "Record", "Routine", "Value", "Variable"]
+__all__ = ["Block", "Branch", "Call", "Instruction", "Jump", "Loop", "Record", "Routine", "Value", "Variable"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,15 +212,19 @@ class Record:
         self.__dict__.update(_base=base, _fields=fields, _places={name: k for k, name in enumerate(fields)})
 
     def __getattr__(self, name: str) -> Value:
-        found: Value = self._base.read(self._places[name], self._fields[name])
-        return found
+        inside = self.__dict__
+        base: Value = inside["_base"]
+        return base.read(inside["_places"][name], inside["_fields"][name])
 
     def __setattr__(self, name: str, value: Operand) -> None:
-        self._base.write(self._places[name], value, self._fields[name])
+        inside = self.__dict__
+        inside["_base"].write(inside["_places"][name], value, inside["_fields"][name])
 
 
 class Routine:
     """A function while it is being written.
+
+    `variables` are its own places in memory: each with its kind, or the length of an array.
 
     Parameters
     ----------
@@ -240,7 +244,7 @@ class Routine:
         self.name, self.result, self.exported = name, result, exported
         self.arguments = [Value(self, kind, one) for one, kind in arguments.items()]
         self.body: Block = []
-        self.variables: list[tuple[Value, Kind]] = []
+        self.variables: list[tuple[Value, Kind | int]] = []
         self._blocks = [self.body]
         self._count = 0
         self._last: Branch | None = None
@@ -282,7 +286,7 @@ class Routine:
         """Return an array of this call's own, with elements of 8 bytes each."""
         self._count += 1
         place = Value(self, ADDRESS, f"v{self._count}")
-        self.variables.append((place, _Room(length)))
+        self.variables.append((place, length))
         return place
 
     def give(self, value: Operand | None = None) -> None:
@@ -300,7 +304,8 @@ class Routine:
     @contextmanager
     def otherwise(self) -> Iterator[None]:
         """Do what follows where the condition of the `when` before did not hold."""
-        assert self._last is not None and self._blocks[-1][-1] is self._last, "`otherwise` follows a `when`"
+        assert self._last is not None
+        assert self._blocks[-1][-1] is self._last, "`otherwise` follows a `when`"
         yield from self._inside(self._last.otherwise)
 
     @contextmanager
@@ -383,11 +388,3 @@ class Routine:
         self._blocks.append(block)
         yield
         self._blocks.pop()
-
-
-@dataclass(frozen=True)
-class _Room:
-    """The kind of an array of a call's own."""
-
-    length: int
-    is_float: bool = False

@@ -10,11 +10,10 @@ import numpy as np
 from atwood.codegen.llvm.build import build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.expr import Program
-from atwood.integrators.composition.code import composition_code
-from atwood.integrators.composition.coefficients import steps_of
-from atwood.integrators.gauss.code import FUNCTIONS
+from atwood.integrators.composition.steps import composition_source
 from atwood.integrators.gauss.layout import POINTERS, Layout
 from atwood.integrators.gauss.native import bind_functions
+from atwood.integrators.gauss.steps import FUNCTIONS
 from atwood.integrators.protocol import FloatArray
 
 __all__ = ["CompiledComposition"]
@@ -38,8 +37,8 @@ class CompiledComposition:
         self.order, self.layout = order, Layout(n, n, 1, False, False)
         parts = [Part("kernel", forces), Part("flow", velocities)]
         options = CodeOptions(level=2, sincos=default_options(parts).sincos)
-        code = composition_code(self.layout, steps_of(order))
-        self._built = build_code(parts, options, more=code, exports=FUNCTIONS)
+        routines = composition_source(self.layout, order)
+        self._built = build_code(parts, options, exports=FUNCTIONS, routines=routines)
         self.functions = bind_functions(self._built)
         prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
         self._prologues = [prologue(self._built.code.addresses[f"{name}_prologue"]) for name in ("kernel", "flow")]

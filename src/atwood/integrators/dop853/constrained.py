@@ -73,4 +73,3 @@ class CompiledConstraints:
             return CompiledRates(addresses["rates"], data, keep, project, data + 16)
 
         return rates
-

@@ -12,7 +12,17 @@ __all__ = ["COUNTS", "LANES", "NUMBERS", "POINTERS", "ROWS", "Memory", "open_rou
 LANES = 4
 """How many unknowns a loop works on at a time; rows are padded to a multiple of it with finite numbers."""
 
-ROWS = {"slope": 0, "end slope": 12, "y": 16, "y_old": 17, "trial": 18, "absolute": 19, "dense": 20, "last": 27, "all": 28}
+ROWS = {
+    "slope": 0,
+    "end slope": 12,
+    "y": 16,
+    "y_old": 17,
+    "trial": 18,
+    "absolute": 19,
+    "dense": 20,
+    "last": 27,
+    "all": 28,
+}
 """Rows of the table of arrays. `last` is the value at which the slope before that of the end was taken."""
 
 NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked")

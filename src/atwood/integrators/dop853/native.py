@@ -355,4 +355,3 @@ def functions() -> tuple[Callable[..., int], ...]:
         "begin": (c_void_p, c_double, c_void_p),
     }
     return tuple(ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items())
-

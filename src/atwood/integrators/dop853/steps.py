@@ -165,9 +165,8 @@ def _look() -> Routine:
         code = r.call(m.at.events, t, m.row("y"), m.row(_END), values, m.at.events_data)
         with r.when(code != 0):
             r.give(1)
-        with r.count(count) as i:
-            with r.when(~(values[i] * signs[i] > 0.0)):
-                r.give(1)
+        with r.count(count) as i, r.when(~(values[i] * signs[i] > 0.0)):
+            r.give(1)
     r.give(0)
     return r
 
@@ -175,9 +174,9 @@ def _look() -> Routine:
 def _watched() -> Routine:
     """Look at the motion in the last step at the times that what watches it wants; 1 where something is seen.
 
-    The end of a step is looked at instead where it is not much later: its state is there already.  It is looked at, too,
-    after many steps that were not.  What is seen stays in `seen` until somebody asks; the looks that are then left in the
-    step are taken when the steps go on.
+    The end of a step is looked at instead where it is not much later: its state is there already.  It is looked at,
+    too, after many steps that were not.  What is seen stays in `seen` until somebody asks; the looks that are then left
+    in the step are taken when the steps go on.
     """
     r, m, (t_new,) = open_routine("watched", {"t_new": NUMBER})
     watch, t, steps = m.at.watch, m.numbers.t_old, m.counts.steps
@@ -193,7 +192,8 @@ def _watched() -> Routine:
             r.give(0)
         looked, inside = m.numbers.looked, r.variable(False, BOOLEAN)
         with r.when(is_within & ~(t_new - looked <= (due - looked) * _STRETCH)):
-            with r.when(r.call("densify", m.session) == 0):
+            is_dense = r.call("densify", m.session) == 0
+            with r.when(is_dense):
                 share = (due - t) / m.numbers.h
                 r.call("polynomial", m.session, share)
                 r.call("slope", m.session, share)

@@ -58,7 +58,7 @@ def write_routines() -> list[Routine]:
     r = Routine("batch", {"job": ADDRESS}, exported=True)
     kinds = {name: ADDRESS if name in _ADDRESSES else NUMBER if name == "t" else INTEGER for name in FIELDS}
     job = Record(r.arguments[0], kinds)
-    size, steps = job.size, job.steps
+    steps = job.steps
     call_limit = steps.read(0, INTEGER) + job.budget
     with r.forever():
         k = job.run

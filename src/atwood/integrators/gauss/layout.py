@@ -1,12 +1,15 @@
-"""Where a session of a method of Gauss keeps its numbers: what the compiled code and Python agree on."""
+"""Memory of a session of fixed steps: what routines and Python agree on."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import accumulate
 
+from atwood.codegen.routines.kinds import ADDRESS, INTEGER, NUMBER, Kind
+from atwood.codegen.routines.language import Record, Routine, Value
 from atwood.late import dataclass
 
-__all__ = ["COUNTS", "NUMBERS", "POINTERS", "Layout"]
+__all__ = ["COUNTS", "NUMBERS", "POINTERS", "Layout", "Memory", "open_routine"]
 
 POINTERS = ("derived", "scratch", "rates", "rates_data", "derived_2")
 NUMBERS = ("t", "t_old", "stop", "step", "origin")
@@ -54,3 +57,28 @@ class Layout:
         """Return where a group of a work area begins in it."""
         places = self.places
         return places[f"main.{key}"] - places["main.L"]
+
+
+class Memory:
+    """The memory of a session within a routine."""
+
+    def __init__(self, mem: Value, layout: Layout) -> None:
+        self.session, self._places = mem, layout.places
+        self.pointers = Record(mem.at(self._places["pointers"]), dict.fromkeys(POINTERS, ADDRESS))
+        self.numbers = Record(mem.at(self._places["numbers"]), dict.fromkeys(NUMBERS, NUMBER))
+        self.counts = Record(mem.at(self._places["counts"]), dict.fromkeys(COUNTS, INTEGER))
+
+    def at(self, group: str) -> Value:
+        """Return where a group of numbers begins."""
+        return self.session.at(self._places[group])
+
+
+def open_routine(
+    layout: Layout,
+    name: str,
+    more: Mapping[str, Kind] | None = None,
+    exported: bool = False,
+) -> tuple[Routine, Memory, list[Value]]:
+    """Return a new routine of a session, its memory, and its further arguments."""
+    routine = Routine(name, {"mem": ADDRESS, **(more or {})}, exported=exported)
+    return routine, Memory(routine.arguments[0], layout), routine.arguments[1:]

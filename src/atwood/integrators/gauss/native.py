@@ -17,9 +17,8 @@ from atwood.expr import Program
 from atwood.integrators.compiled_functions import StepGuard
 from atwood.integrators.event_location import State
 from atwood.integrators.explicit_problem import CompiledRates, Counts, Outcome, sample_one_by_one
-from atwood.integrators.gauss.code import FUNCTIONS, gauss_code
 from atwood.integrators.gauss.layout import COUNTS, NUMBERS, POINTERS, Layout
-from atwood.integrators.gauss.tableau import tableau
+from atwood.integrators.gauss.steps import FUNCTIONS, gauss_source
 from atwood.integrators.protocol import FloatArray
 
 __all__ = ["CompiledGauss", "CompiledMethod", "GaussStepper", "bind_functions"]
@@ -90,7 +89,7 @@ class CompiledGauss:
         part = Part("kernel", equations)
         level = max(2, default_options([part]).level) if equations.size < _LARGE else default_options([part]).level
         options = CodeOptions(level=level, sincos=default_options([part]).sincos)
-        self._built = build_code([part], options, more=gauss_code(self.layout, tableau(order)), exports=FUNCTIONS)
+        self._built = build_code([part], options, exports=FUNCTIONS, routines=gauss_source(self.layout, order))
         self.functions = bind_functions(self._built)
         self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
         self._derived = len(equations.prologue)

@@ -1,0 +1,138 @@
+"""Steps of a composition, for one scene and one order.
+
+A step of second order is half a step along the velocities, one along the forces there, and half a step along the new
+velocities; half steps that follow each other are one. Increments are added with compensation.
+"""
+
+from __future__ import annotations
+
+from atwood.codegen.routines.kernels import call_kernel
+from atwood.codegen.routines.kinds import ADDRESS, NUMBER
+from atwood.codegen.routines.language import Routine, Value
+from atwood.codegen.routines.source import RoutineSource
+from atwood.integrators.composition.coefficients import steps_of
+from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, run, sample
+from atwood.integrators.gauss.layout import Layout, Memory, open_routine
+
+__all__ = ["composition_source", "write_routines"]
+
+
+def composition_source(layout: Layout, order: int) -> RoutineSource:
+    """Return what writes the routines, for a module with forces as ``kernel`` and velocities as ``flow``.
+
+    They are those of `atwood.integrators.gauss.steps`, on the same memory.
+    """
+    own = ("integrators/composition/steps.py", "integrators/composition/coefficients.py", "codegen/routines/kernels.py")
+    return RoutineSource("integrators.composition.steps", (*own, *FILES), (layout, order))
+
+
+def write_routines(layout: Layout, order: int) -> list[Routine]:
+    """Write the routines; see `composition_source`."""
+    parts = [_drift(layout), _kick(layout), _compose(layout, steps_of(order)), _begin(layout), _run(layout)]
+    return [*parts, _trial(layout), _speeds(layout), interpolate(layout), sample(layout)]
+
+
+def _unless_found(r: Routine, code: Value, given: int = 1) -> None:
+    """Return where a call failed."""
+    with r.when(code != 0):
+        r.give(given)
+
+
+def _velocities(r: Routine, m: Memory, momenta: Value) -> Value:
+    """Write velocities to the F of the main work area."""
+    return call_kernel(r, "flow", [momenta], m.pointers.derived_2, m.pointers.scratch, [m.at("main.F")])
+
+
+def _add(r: Routine, m: Memory, y: Value, rest: Value, amount: Value, count: int) -> None:
+    """Add F times an amount to a half of the state, with what rounding has left."""
+    rates = m.at("main.F")
+    with r.count(count) as i:
+        increment = amount * rates[i]
+        total = rest[i] + increment
+        old = y[i]
+        new = old + total
+        y[i], rest[i] = new, (old - new) + total
+
+
+def _drift(layout: Layout) -> Routine:
+    """Move the coordinates along the velocities."""
+    r, m, (y, rest, amount) = open_routine(layout, "drift", {"y": ADDRESS, "rest": ADDRESS, "amount": NUMBER})
+    _unless_found(r, _velocities(r, m, y.at(layout.coordinates)))
+    _add(r, m, y, rest, amount, layout.coordinates)
+    r.give(0)
+    return r
+
+
+def _kick(layout: Layout) -> Routine:
+    """Change the momenta by the forces."""
+    arguments = {"y": ADDRESS, "rest": ADDRESS, "t": NUMBER, "amount": NUMBER}
+    r, m, (y, rest, t, amount) = open_routine(layout, "kick", arguments)
+    n, time = layout.coordinates, r.array(1)
+    time[0] = t
+    m.counts.evaluations = m.counts.evaluations + 1
+    derived, scratch = m.pointers.derived, m.pointers.scratch
+    _unless_found(r, call_kernel(r, "kernel", [time, y], derived, scratch, [m.at("main.F")]))
+    _add(r, m, y.at(n), rest.at(n), amount, n)
+    r.give(0)
+    return r
+
+
+def _compose(layout: Layout, steps: tuple[float, ...]) -> Routine:
+    """Take a state one step on, in its place; 1 where there is no force."""
+    arguments = {"y": ADDRESS, "rest": ADDRESS, "t": NUMBER, "h": NUMBER}
+    r, m, (y, rest, t, h) = open_routine(layout, "compose", arguments)
+    before, done = 0.0, 0.0
+    for step in (*steps, 0.0):
+        share = 0.5 * (before + step)
+        _unless_found(r, r.call("drift", m.session, y, rest, h * share))
+        done, before = done + share, step
+        if step == 0.0:
+            break
+        _unless_found(r, r.call("kick", m.session, y, rest, t + h * done, h * step))
+    r.give(0)
+    return r
+
+
+def _begin(layout: Layout) -> Routine:
+    """Start at the y of a session; 1 where there is no force."""
+    r, m, _ = open_routine(layout, "begin", exported=True)
+    y, rest, y_old, t = m.at("y"), m.at("rest"), m.at("y_old"), m.numbers.t
+    with r.count(layout.size) as i:
+        rest[i], y_old[i] = 0.0, y[i]
+    m.numbers.t_old, m.numbers.origin, m.counts.since = t, t, 0
+    r.give(r.call("kick", m.session, y, rest, t, r.value(0.0, NUMBER)))
+    return r
+
+
+def _run(layout: Layout) -> Routine:
+    def attempt(r: Routine, m: Memory, t: Value, h: Value) -> Value:
+        copy_numbers(r, m.at("y_old"), m.at("y"), layout.size)
+        return r.call("compose", m.session, m.at("y"), m.at("rest"), t, h)
+
+    def failed(r: Routine, m: Memory) -> None:
+        copy_numbers(r, m.at("y"), m.at("y_old"), layout.size)
+
+    return run(layout, attempt, failed=failed)
+
+
+def _trial(layout: Layout) -> Routine:
+    """Make one step of any length from a state to another; 3 where it fails."""
+    arguments = {"t": NUMBER, "h": NUMBER, "source": ADDRESS, "target": ADDRESS}
+    r, m, (t, h, source, target) = open_routine(layout, "trial", arguments, exported=True)
+    rest = m.at("aside.L")
+    with r.count(layout.size) as i:
+        target[i], rest[i] = source[i], 0.0
+    _unless_found(r, r.call("compose", m.session, target, rest, t, h), 3)
+    r.give(0)
+    return r
+
+
+def _speeds(layout: Layout) -> Routine:
+    """Write coordinates and velocities; 1 where there are none."""
+    r, m, (_, y, out) = open_routine(layout, "speeds", {"t": NUMBER, "y": ADDRESS, "out": ADDRESS}, exported=True)
+    n = layout.coordinates
+    _unless_found(r, _velocities(r, m, y.at(n)))
+    copy_numbers(r, out, y, n)
+    copy_numbers(r, out.at(n), m.at("main.F"), n)
+    r.give(0)
+    return r

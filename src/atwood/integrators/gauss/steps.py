@@ -1,0 +1,236 @@
+"""Steps of the methods of Gauss, for one set of equations and one order.
+
+Stages are found by fixed-point iteration, each with those before it that are known already, from what the polynomial of
+the last step gives; it ends where changes are rounding, since what is left of the iteration's error would not be
+symplectic. Increments are added with compensation (Hairer, Lubich and Wanner, Geometric Numerical Integration, sections
+VIII.5 and VIII.6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+
+from atwood.codegen.routines.kernels import call_kernel
+from atwood.codegen.routines.kinds import ADDRESS, CODE, INTEGER, NUMBER
+from atwood.codegen.routines.language import Routine, Value
+from atwood.codegen.routines.source import RoutineSource
+from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, run, sample
+from atwood.integrators.gauss.layout import Layout, Memory, open_routine
+from atwood.integrators.gauss.tableau import Tableau, tableau
+
+__all__ = ["FUNCTIONS", "gauss_source", "write_routines"]
+
+FUNCTIONS = ("run", "interpolate", "sample", "begin", "trial", "speeds")
+
+_ULP = 2.0**-53
+_ROUNDING, _IDLE, _SWEEPS = 1e-11, 3, 200
+"""Changes of this share of the sizes that so many sweeps do not make smaller are rounding; and the most sweeps."""
+
+_NEWTON = 6
+"""So many steps of Newton's method find speeds that the equations take as a guess, from near by."""
+
+_STEP = {"w": ADDRESS, "y": ADDRESS, "t": NUMBER, "h": NUMBER}
+
+
+def gauss_source(layout: Layout, order: int) -> RoutineSource:
+    """Return what writes the routines of a method, for a module with the equations as ``kernel``.
+
+    They take a session's array, which `atwood.integrators.gauss.layout` lays out.
+    """
+    files = ("integrators/gauss/steps.py", "integrators/gauss/tableau.py", "codegen/routines/kernels.py", *FILES)
+    return RoutineSource("integrators.gauss.steps", files, (layout, order))
+
+
+def write_routines(layout: Layout, order: int) -> list[Routine]:
+    """Write the routines; see `gauss_source`."""
+    method = tableau(order)
+    parts = [_evaluate(layout), *(_stage(layout, method, j) for j in range(layout.stages)), _solve(layout)]
+    parts += [_flat(layout, method), _ahead(layout, method), _advance(layout), _speeds(layout), _begin(layout)]
+    return [*parts, _run(layout), _trial(layout), interpolate(layout), sample(layout)]
+
+
+def _weighted(weights: Sequence[float], values: Sequence[Value]) -> Value:
+    total = weights[0] * values[0]
+    for weight, value in zip(weights[1:], values[1:], strict=True):
+        total = total + weight * value
+    return total
+
+
+def _unless_found(r: Routine, code: Value, given: int = 1) -> None:
+    """Return where a call failed."""
+    with r.when(code != 0):
+        r.give(given)
+
+
+def _evaluate(layout: Layout) -> Routine:
+    """Evaluate the equations at the Y of a work area: F, and speeds from those at `guess`."""
+    r, m, (w, t, guess) = open_routine(layout, "evaluate", {"w": ADDRESS, "t": NUMBER, "guess": ADDRESS})
+    n, time = layout.coordinates, r.array(1)
+    time[0] = t
+    y, f, v = (w.at(layout.within(key)) for key in ("Y", "F", "V"))
+    inputs = [time, y, y.at(n), guess][: 4 if layout.takes_speeds else 3]
+    outputs = [f, f.at(n), v][: 3 if layout.has_speeds else 2]
+    m.counts.evaluations = m.counts.evaluations + 1
+    r.give(call_kernel(r, "kernel", inputs, m.pointers.derived, m.pointers.scratch, outputs))
+    return r
+
+
+def _stage(layout: Layout, method: Tableau, j: int) -> Routine:
+    """Improve one stage; its largest change goes to `delta`, in units of what values were.
+
+    In units of the scene's sizes it goes to `coarse`: a value that should be zero is rounding for ever.
+    """
+    arguments = {**_STEP, "delta": ADDRESS, "coarse": ADDRESS}
+    r, m, (w, y, t, h, delta, coarse) = open_routine(layout, f"stage{j}", arguments)
+    n, increments = layout.size, w.at(j * layout.size)
+    place, f, scales = (w.at(layout.within(key)) for key in ("Y", "F", "scale"))
+    guess, per_size = w.at(layout.within("U") + j * layout.speeds), m.at("per_size")
+    with r.count(n) as i:
+        place[i] = y[i] + _weighted(method.shares[j], [w[i + k * n] for k in range(layout.stages)])
+    _unless_found(r, r.call("evaluate", m.session, w, t + h * method.nodes[j], guess))
+    weight = h * method.weights[j]
+    with r.count(n) as i:
+        new, old = weight * f[i], increments[i]
+        increments[i] = new
+        change, scale = r.size(new - old), r.most(r.size(place[i]), scales[i])
+        scales[i] = scale
+        delta[0] = r.most(r.choose(change == 0.0, 0.0, change / scale), delta[0])
+        coarse[0] = r.most(change * per_size[i], coarse[0])
+    if layout.takes_speeds:
+        copy_numbers(r, guess, w.at(layout.within("V")), layout.speeds)
+    r.give(0)
+    return r
+
+
+def _solve(layout: Layout) -> Routine:
+    """Find the stages of a step; 1 where they are not found."""
+    r, m, (w, y, t, h) = open_routine(layout, "solve", _STEP)
+    delta, coarse, best, idle = r.array(1), r.array(1), r.variable(inf), r.variable(0, INTEGER)
+    with r.count(_SWEEPS):
+        delta[0], coarse[0] = 0.0, 0.0
+        for j in range(layout.stages):
+            _unless_found(r, r.call(f"stage{j}", m.session, w, y, t, h, delta, coarse))
+        now = delta[0]
+        with r.when(now <= _ULP):
+            r.give(0)
+        better = now < best.now
+        idle.now = r.choose(better, 0, idle.now + 1, INTEGER)
+        best.now = r.choose(better, now, best.now)
+        with r.when((idle.now >= _IDLE) & (coarse[0] <= _ROUNDING)):
+            r.give(0)
+    r.give(1)
+    return r
+
+
+def _flat(layout: Layout, method: Tableau) -> Routine:
+    """Set all stages to the rates at `y`; 1 where there are none."""
+    r, m, (w, y, t, h) = open_routine(layout, "flat", _STEP)
+    f = w.at(layout.within("F"))
+    copy_numbers(r, w.at(layout.within("Y")), y, layout.size)
+    last = w.at(layout.within("U") + (layout.stages - 1) * layout.speeds)
+    _unless_found(r, r.call("evaluate", m.session, w, t, last))
+    with r.count(layout.size) as i:
+        increment = h * f[i]
+        for j, weight in enumerate(method.weights):
+            w[i + j * layout.size] = increment * weight
+    r.give(0)
+    return r
+
+
+def _ahead(layout: Layout, method: Tableau) -> Routine:
+    """Take the stages of a step on to the next one."""
+    r = Routine("ahead", {"w": ADDRESS}, result=None)
+    (w,) = r.arguments
+    with r.count(layout.size) as i:
+        places = [i + k * layout.size for k in range(layout.stages)]
+        old = [w[place] for place in places]
+        for place, weights in zip(places, method.ahead, strict=True):
+            w[place] = _weighted(weights, old)
+    return r
+
+
+def _advance(layout: Layout) -> Routine:
+    """Add the stages up: from `y` and what rounding has left of it, to both."""
+    r = Routine("advance", {"w": ADDRESS, "y": ADDRESS, "rest": ADDRESS}, result=None)
+    w, y, rest = r.arguments
+    with r.count(layout.size) as i:
+        total = rest[i]
+        for j in range(layout.stages):
+            total = total + w[i + j * layout.size]
+        old = y[i]
+        new = old + total
+        y[i], rest[i] = new, (old - new) + total
+    return r
+
+
+def _speeds(layout: Layout) -> Routine:
+    """Write coordinates and speeds at a state, by way of the area aside; 1 where there are none."""
+    r, m, (t, y, out) = open_routine(layout, "speeds", {"t": NUMBER, "y": ADDRESS, "out": ADDRESS}, exported=True)
+    n, w = layout.coordinates, m.at("aside.L")
+    guess, speeds = w.at(layout.within("U")), w.at(layout.within("V" if layout.has_speeds else "F"))
+    copy_numbers(r, w.at(layout.within("Y")), y, 2 * n)
+    for _ in range(_NEWTON if layout.takes_speeds else 1):
+        _unless_found(r, r.call("evaluate", m.session, w, t, guess))
+        if layout.takes_speeds:
+            copy_numbers(r, guess, w.at(layout.within("V")), layout.speeds)
+    copy_numbers(r, out, y, n)
+    copy_numbers(r, out.at(n), speeds, layout.speeds)
+    r.give(0)
+    return r
+
+
+def _begin(layout: Layout) -> Routine:
+    """Start at the y of a session; 1 where the equations have no value there."""
+    r, m, _ = open_routine(layout, "begin", exported=True)
+    y, w, t = m.at("y"), m.at("main.L"), m.numbers.t
+    rest, y_old, scales = m.at("rest"), m.at("y_old"), w.at(layout.within("scale"))
+    _unless_found(r, r.call("flat", m.session, w, y, t, m.numbers.step))
+    with r.count(layout.size) as i:
+        rest[i], y_old[i] = 0.0, y[i]
+        scale = r.size(y[i])
+        for j in range(layout.stages):
+            scale = scale + r.size(w[i + j * layout.size])
+        scales[i] = scale
+    m.numbers.t_old, m.numbers.origin, m.counts.since = t, t, 0
+    r.give(0)
+    return r
+
+
+def _run(layout: Layout) -> Routine:
+    def attempt(r: Routine, m: Memory, t: Value, h: Value) -> Value:
+        w, y = m.at("main.L"), m.at("y")
+        with r.when(m.counts.since != 0):
+            r.call("ahead", w, result=None)
+        code = r.variable(r.call("solve", m.session, w, y, t, h), CODE)
+        with r.when(code.now != 0):  # from a poor guess the iteration may lead where the equations have no value
+            _unless_found(r, r.call("flat", m.session, w, y, t, h), 2)
+            code.now = r.call("solve", m.session, w, y, t, h)
+        return code.now
+
+    def good(r: Routine, m: Memory) -> None:
+        copy_numbers(r, m.at("y_old"), m.at("y"), layout.size)
+        r.call("advance", m.at("main.L"), m.at("y"), m.at("rest"), result=None)
+
+    return run(layout, attempt, good=good)
+
+
+def _trial(layout: Layout) -> Routine:
+    """Make one step of any length aside, from a state to another; 3 where it fails."""
+    arguments = {"t": NUMBER, "h": NUMBER, "source": ADDRESS, "target": ADDRESS}
+    r, m, (t, h, source, target) = open_routine(layout, "trial", arguments, exported=True)
+    w, own = m.at("aside.L"), m.at("main.L")
+    copy_numbers(r, w.at(layout.within("scale")), own.at(layout.within("scale")), layout.size)
+    if layout.takes_speeds:
+        begin, count = layout.within("U"), layout.speeds
+        for j in range(layout.stages):
+            copy_numbers(r, w.at(begin + j * count), own.at(begin + (layout.stages - 1) * count), count)
+    for name in ("flat", "solve"):
+        _unless_found(r, r.call(name, m.session, w, source, t, h), 3)
+    with r.count(layout.size) as i:
+        total = w[i]
+        for j in range(1, layout.stages):
+            total = total + w[i + j * layout.size]
+        target[i] = source[i] + total
+    r.give(0)
+    return r
