@@ -1,0 +1,126 @@
+"""The size of the framework: what `python -m tests.size` prints.
+
+Code lines are lines with a token that is neither comment nor docstring.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import tokenize
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+SOURCE = Path(__file__).resolve().parents[1] / "src" / "atwood"
+
+_NO_CODE = {
+    tokenize.COMMENT,
+    tokenize.NL,
+    tokenize.NEWLINE,
+    tokenize.INDENT,
+    tokenize.DEDENT,
+    tokenize.ENDMARKER,
+}
+_LLVM = ("getelementptr", "define ", " phi ", "fadd ", "load double", "load ptr", "br i1", "br label")
+_ALGEBRA = {"svd", "matrix_rank", "lstsq", "pinv"}
+
+
+@dataclass(frozen=True)
+class Size:
+    """What is counted of a file, or of many."""
+
+    code: int = 0
+    lines: int = 0
+    files: int = 0
+    inner_imports: int = 0
+    exported: int = 0
+    llvm: int = 0
+    algebra: int = 0
+
+    def __add__(self, other: Size) -> Size:
+        return Size(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
+
+
+def code_lines(text: str) -> int:
+    """Return how many lines of a source have code."""
+    said = {
+        line
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
+    }
+    code: set[int] = set()
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type not in _NO_CODE:
+            code.update(range(token.start[0], token.end[0] + 1))
+    return len(code - said)
+
+
+def strings(tree: ast.AST) -> Iterator[str]:
+    """Yield the strings of a source that are no docstrings."""
+    said = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in said:
+            yield node.value
+
+
+def size(path: Path) -> Size:
+    """Return what is counted of a file."""
+    text = path.read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    functions = [node for node in ast.walk(tree) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    inner = {
+        id(node)
+        for function in functions
+        for node in ast.walk(function)
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+    }
+    listed = [
+        node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__"
+    ]
+    exported = sum(len(one.elts) for one in listed if isinstance(one, (ast.List, ast.Tuple)))
+    called = {
+        getattr(node.func, "attr", getattr(node.func, "id", ""))
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+    }
+    return Size(
+        code=code_lines(text),
+        lines=len(text.splitlines()),
+        files=1,
+        inner_imports=len(inner),
+        exported=exported,
+        llvm=int(any(word in one for one in strings(tree) for word in _LLVM)),
+        algebra=int(bool(called & _ALGEBRA)),
+    )
+
+
+def by_room() -> dict[str, Size]:
+    """Return the sizes of the rooms of the framework."""
+    rooms: dict[str, Size] = {}
+    for path in sorted(SOURCE.rglob("*.py")):
+        inside = path.relative_to(SOURCE).parts
+        room = inside[0] if len(inside) > 1 else "(files)"
+        rooms[room] = rooms.get(room, Size()) + size(path)
+    return rooms
+
+
+def main() -> None:
+    """Print the table."""
+    rooms = by_room()
+    total = sum(rooms.values(), Size())
+    print(
+        f"{'room':14}{'code':>8}{'lines':>8}{'files':>7}{'names':>7}{'inner imports':>15}{'LLVM text':>11}{'svd ...':>9}"
+    )
+    for room, one in [*sorted(rooms.items(), key=lambda pair: -pair[1].code), ("all", total)]:
+        numbers = (
+            f"{one.code:8}{one.lines:8}{one.files:7}{one.exported:7}{one.inner_imports:15}{one.llvm:11}{one.algebra:9}"
+        )
+        print(f"{room:14}{numbers}")
+
+
+if __name__ == "__main__":
+    main()
