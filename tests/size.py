@@ -112,9 +112,7 @@ def main() -> None:
     """Print the table."""
     rooms = by_room()
     total = sum(rooms.values(), Size())
-    print(
-        f"{'room':14}{'code':>8}{'lines':>8}{'files':>7}{'names':>7}{'inner imports':>15}{'LLVM text':>11}{'svd ...':>9}"
-    )
+    print(f"{'room':14}{'code':>8}{'lines':>8}{'files':>7}{'names':>7}{'inner imports':>15}{'LLVM':>11}{'svd':>9}")
     for room, one in [*sorted(rooms.items(), key=lambda pair: -pair[1].code), ("all", total)]:
         numbers = (
             f"{one.code:8}{one.lines:8}{one.files:7}{one.exported:7}{one.inner_imports:15}{one.llvm:11}{one.algebra:9}"

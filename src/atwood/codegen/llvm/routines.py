@@ -16,7 +16,10 @@ __all__ = ["print_routines"]
 
 _TYPES: dict[Kind, str] = {NUMBER: "double", INTEGER: "i64", CODE: "i32", BOOLEAN: "i1", ADDRESS: "ptr"}
 _FLOATING = {"add": "fadd", "subtract": "fsub", "multiply": "fmul", "divide": "fdiv"}
-_WHOLE = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "sdiv", "and": "and", "or": "or"}
+_WHOLE = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "sdiv", "and": "and", "or": "or"} | {
+    "shift right": "lshr",
+    "shift left": "shl",
+}
 _COMPARED = {
     "less": ("olt", "slt"),
     "less or equal": ("ole", "sle"),
@@ -25,7 +28,12 @@ _COMPARED = {
     "equal": ("oeq", "eq"),
     "unequal": ("une", "ne"),
 }
-_MATH = {"sqrt": "sqrt", "size": "fabs"}
+_MATH = {"sqrt": "sqrt", "size": "fabs", "floor": "floor", "fused": "fmuladd"}
+_REDUCED = {  # the function of LLVM, what it returns, and what it takes first
+    "sum of lanes": ("fadd", "double", "double -0.0, "),
+    "largest lane": ("fmax", "nnan double", ""),
+    "any lane": ("or", "i1", ""),
+}
 
 
 def print_routines(routines: Sequence[Routine]) -> str:
@@ -125,6 +133,8 @@ class _Printer:
             self.lines.append(f"  store {_typed(values[0])}, {_typed(values[1])}{align}")
         elif operation == "copy":
             self._copy(*values)
+        elif operation == "clear":
+            self._clear(*values)
         else:
             assert result is not None
             self.lines.append(f"  {_name(result)} = {self._expression(operation, result, values)}")
@@ -146,7 +156,11 @@ class _Printer:
             case "choose":
                 return f"select {', '.join(map(_typed, values))}"
             case "not":
-                return f"xor i1 {_name(a)}, true"
+                return f"xor {kind} {_name(a)}, {_name(Value(a.routine, a.kind, 1))}"
+            case "bits":
+                return f"bitcast {_typed(a)} to {_type(result.kind)}"
+            case "truncated":
+                return f"fptosi {_typed(a)} to i64"
             case "is null":
                 return f"icmp eq ptr {_name(a)}, null"
             case "to number":
@@ -155,17 +169,19 @@ class _Printer:
                 return f"{'sext' if a.kind is CODE else 'zext'} {_typed(a)} to {_type(result.kind)}"
             case "spread":
                 return self._spread(result, a)
-            case "sum of lanes":
+            case "sum of lanes" | "largest lane" | "any lane":
                 assert isinstance(a.kind, Lanes)
-                name = f"llvm.vector.reduce.fadd.v{a.kind.count}f64"
-                self.declared.add(f"declare double @{name}(double, {kind})")
-                return f"call double @{name}(double -0.0, {_typed(a)})"
+                word, made, first = _REDUCED[operation]
+                name = f"llvm.vector.reduce.{word}.v{a.kind.count}{'f64' if a.kind.is_float else 'i1'}"
+                start = "double, " if first else ""
+                self.declared.add(f"declare {_type(result.kind)} @{name}({start}{kind})")
+                return f"call {made} @{name}({first}{_typed(a)})"
             case _:
                 lanes = f"v{a.kind.count}" if isinstance(a.kind, Lanes) else ""
                 name = f"llvm.{_MATH[operation]}.{lanes}f64"
-                if lanes:  # those of plain numbers every module declares
-                    self.declared.add(f"declare {kind} @{name}({kind})")
-                return f"call {kind} @{name}({_typed(a)})"
+                if lanes or operation == "floor":  # others of plain numbers every module declares
+                    self.declared.add(f"declare {kind} @{name}({', '.join([kind] * len(values))})")
+                return f"call {kind} @{name}({', '.join(map(_typed, values))})"
 
     def _spread(self, result: Value, a: Value) -> str:
         assert isinstance(result.kind, Lanes)
@@ -183,6 +199,15 @@ class _Printer:
             f"  call void @llvm.memcpy.p0.p0.i64({_typed(target)}, {_typed(source)}, i64 {size}, i1 false)"
         )
 
+    def _clear(self, begin: Value, end: Value) -> None:
+        self._labels += 1
+        k = self._labels
+        self.declared.add("declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
+        for name, one in (("from", begin), ("to", end)):
+            self.lines.append(f"  %{name}{k} = ptrtoint ptr {_name(one)} to i64")
+        self.lines.append(f"  %size{k} = sub i64 %to{k}, %from{k}")
+        self.lines.append(f"  call void @llvm.memset.p0.i64(ptr {_name(begin)}, i8 0, i64 %size{k}, i1 false)")
+
 
 def _type(kind: Kind) -> str:
     if isinstance(kind, Lanes):
@@ -194,8 +219,9 @@ def _name(value: Value) -> str:
     name = value.name
     if isinstance(name, str):
         return f"%{name}"
-    if isinstance(value.kind, Lanes) and isinstance(name, float):
-        return f"<{', '.join([f'double {_exact(name)}'] * value.kind.count)}>"
+    if isinstance(value.kind, Lanes):
+        one = f"double {_exact(name)}" if isinstance(name, float) else f"i1 {name}"
+        return f"<{', '.join([one] * value.kind.count)}>"
     return _exact(name) if isinstance(name, float) else str(name)
 
 

@@ -131,14 +131,20 @@ class Value:
     def __ne__(self, other: Operand) -> Value:  # type: ignore[override]
         return self._two("unequal", other, kind=BOOLEAN)
 
-    def __and__(self, other: Value) -> Value:
+    def __and__(self, other: Value | int) -> Value:
         return self._two("and", other)
 
-    def __or__(self, other: Value) -> Value:
+    def __or__(self, other: Value | int) -> Value:
         return self._two("or", other)
 
     def __invert__(self) -> Value:
-        return self.routine.put("not", BOOLEAN, self)
+        return self.routine.put("not", self.kind, self)
+
+    def __rshift__(self, count: int) -> Value:
+        return self._two("shift right", count)
+
+    def __lshift__(self, count: int) -> Value:
+        return self._two("shift left", count)
 
     def __bool__(self) -> bool:
         raise TypeError("a value of a routine is not known while the routine is written: use `when` or `choose`")
@@ -169,6 +175,14 @@ class Value:
     def integer(self) -> Value:
         """Return a condition or a code as an integer."""
         return self.routine.put("to integer", INTEGER, self)
+
+    def bits(self) -> Value:
+        """Return the integer with the bits of this number."""
+        return self.routine.put("bits", INTEGER, self)
+
+    def number_of_bits(self) -> Value:
+        """Return the number with the bits of this integer."""
+        return self.routine.put("bits", NUMBER, self)
 
     def code(self) -> Value:
         """Return a condition as a code: 1 where it holds."""
@@ -372,6 +386,26 @@ class Routine:
         """Return the absolute value."""
         return self.put("size", a.kind, a)
 
+    def floor(self, a: Value) -> Value:
+        """Return the largest whole number that is not larger."""
+        return self.put("floor", a.kind, a)
+
+    def truncated(self, a: Value) -> Value:
+        """Return a number as an integer, without its fraction."""
+        return self.put("truncated", INTEGER, a)
+
+    def fused(self, a: Value, b: Value, c: Value) -> Value:
+        """Return ``a b + c``, rounded once where the processor can do that at the same cost."""
+        return self.put("fused", a.kind, a, b, c)
+
+    def any_lane(self, a: Value) -> Value:
+        """Tell whether a condition holds in one of the lanes."""
+        return self.put("any lane", BOOLEAN, a)
+
+    def largest_lane(self, a: Value) -> Value:
+        """Return the largest of the lanes, of which none is no number."""
+        return self.put("largest lane", NUMBER, a)
+
     def sum_of_lanes(self, a: Value) -> Value:
         """Return the sum of the lanes, from the first to the last."""
         return self.put("sum of lanes", NUMBER, a)
@@ -379,6 +413,10 @@ class Routine:
     def copy(self, target: Value, source: Value, count: Operand) -> None:
         """Copy so many elements of 8 bytes each."""
         self.do("copy", target, source, self.value(count, INTEGER))
+
+    def clear(self, begin: Value, end: Value) -> None:
+        """Set all elements between two addresses to zero."""
+        self.do("clear", begin, end)
 
     def is_null(self, address: Value) -> Value:
         """Tell whether an address leads nowhere."""

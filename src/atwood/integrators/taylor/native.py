@@ -19,16 +19,24 @@ from numpy.typing import ArrayLike
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.once import once
+from atwood.codegen.routines.source import RoutineSource
 from atwood.errors import UsageError
 from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.compiled_functions import StepGuard
 from atwood.integrators.event_location import State
 from atwood.integrators.explicit_problem import Counts, Outcome, absolute_tolerances, no_interpolation
-from atwood.integrators.machine_text import WIDTH
 from atwood.integrators.protocol import FloatArray, SolverOptions
-from atwood.integrators.taylor.code import COUNTS, FUNCTIONS, NUMBERS, POINTERS, step_code
+from atwood.integrators.taylor.memory import (
+    COUNTS,
+    LANES,
+    NUMBERS,
+    POINTERS,
+    ROWS,
+    STRIDE,
+    WIDTH,
+    positions,
+)
 from atwood.integrators.taylor.problem import DEFECT, FLOOR, TaylorProblem, choose_order, share_of_radius
-from atwood.integrators.taylor.stepping_code import LANES, ROWS, STRIDE, positions
 from atwood.late import names_of, replace
 
 if TYPE_CHECKING:
@@ -51,7 +59,7 @@ class CompiledRecurrences:
     Parameters
     ----------
     programs
-        The recurrences, made for `~atwood.integrators.taylor.stepping_code.LANES`.
+        The recurrences, made for `~atwood.integrators.taylor.memory.LANES`.
     """
 
     def __init__(self, programs: TaylorPrograms) -> None:
@@ -266,10 +274,23 @@ _COUNTED = len(names_of(Counts))
 _T, _FIRST, _STEPS = NUMBERS.index("t"), NUMBERS.index("first"), COUNTS.index("steps")
 
 
+_ROUTINES = RoutineSource(
+    "integrators.taylor.steps",
+    (
+        "integrators/output_times.py",
+        "integrators/taylor/convolutions.py",
+        "integrators/taylor/memory.py",
+        "integrators/taylor/problem.py",
+        "integrators/taylor/steps.py",
+    ),
+)
+
+
 @once
 def _code() -> Built:
     """Return the code of the steps."""
-    return build_code([], CodeOptions(level=2), more=step_code(), exports=FUNCTIONS)
+    exports = ("run", "interpolate", "sample", "begin")
+    return build_code([], CodeOptions(level=2), exports=exports, routines=_ROUTINES)
 
 
 @once

@@ -84,7 +84,7 @@ class TaylorProblem:
     Parameters
     ----------
     programs
-        The recurrences, of which `atwood.integrators.taylor.stepping_code.LANES` convolutions are worked out at a time.
+        The recurrences, of which `atwood.integrators.taylor.memory.LANES` convolutions are worked out at a time.
     parameters
         The values of the parameters of the program of order zero.
     stop_time

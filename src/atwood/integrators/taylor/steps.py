@@ -1,0 +1,275 @@
+"""Steps of the Taylor-series method, for any system.
+
+The routines take the steps of `atwood.integrators.taylor.reference`.  What they know of a system comes in through
+addresses of the two compiled programs of its recurrences, so that they are compiled once and kept.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes
+from atwood.codegen.routines.language import Routine, Value
+from atwood.integrators.output_times import SAMPLE_ARGUMENTS, write_sample
+from atwood.integrators.taylor.convolutions import write_convolutions
+from atwood.integrators.taylor.memory import LANES, STRIDE, WIDTH, Memory, open_routine
+from atwood.integrators.taylor.problem import HIGHEST, LOWEST, RETREAT, RETRIES, SMALLER, WATCHED
+
+__all__ = ["write_routines"]
+
+_REACHED, _USED_UP, _TOO_SMALL, _NO_VALUE, _NO_RATES = range(5)
+"""How a routine ends."""
+
+_PART = Lanes(WIDTH)
+
+
+def write_routines() -> list[Routine]:
+    """Write the routines; ``run``, ``interpolate``, ``sample`` and ``begin`` are called from outside."""
+    ends = [_begin(), _run(), _interpolate(), _sample()]
+    return [*ends, _evaluate(), _expand(), _choose(), _largest(), _move(), _misses(), *write_convolutions()]
+
+
+def _evaluate() -> Routine:
+    """Find rates and what recurrences need, by tables of addresses, and count: 1 where one is not finite."""
+    r, m, (source, target) = open_routine("evaluate", {"source": ADDRESS, "target": ADDRESS})
+    code = r.call(m.at.start, source, m.at.start_derived, m.at.scratch, target)
+    m.counts.evaluations = m.counts.evaluations + 1
+    m.counts.undefined = m.counts.undefined + code.integer()
+    r.give(code)
+    return r
+
+
+def _begin() -> Routine:
+    """Start anew from a state, with a unit of time in which the fastest unknown changes by its size."""
+    r, m, (t, state) = open_routine("begin", {"t": NUMBER, "state": ADDRESS}, exported=True)
+    m.numbers.t, m.numbers.t_old, m.numbers.t_new, m.numbers.last = t, t, t, 0.0
+    # Nothing that is not finite must be left among the coefficients.
+    r.clear(m.arrays, m.row("y"))
+    blocks = m.counts.pair_blocks * 2 + m.counts.square_blocks
+    r.clear(m.at.table, m.at.table.at(blocks * STRIDE))
+    r.clear(m.row("y_low"), m.row("new"))
+    for row in ("y", "new", "x"):
+        r.copy(m.row(row), state, m.size)
+    with r.when(r.call("evaluate", m.session, m.at.new_in, m.at.new_out) != 0):
+        r.give(_NO_RATES)
+    rates, floors, steepest = m.row("rates"), m.row("floors"), r.variable(0.0)
+    r.copy(rates, m.row("new_rates"), m.padded)
+    with r.count(m.size) as i:
+        pace = r.size(rates[i]) / (floors[i] + r.size(state[i]))
+        steepest.now = r.most(pace, steepest.now)
+    bound = r.least(m.numbers.horizon, m.numbers.longest)
+    m.numbers.unit = r.choose(steepest.now > 0.0, r.least(1.0 / steepest.now, bound), bound)
+    r.give(_REACHED)
+    return r
+
+
+def _expand() -> Routine:
+    """Find the coefficients at the state: 0, or 1 where one is not finite."""
+    r, m, _ = open_routine("expand")
+    last, tries = m.numbers.last, r.variable(0, INTEGER)
+    unit = r.variable(r.choose(last > 0.0, last, m.numbers.unit))
+    r.call(m.at.prologue, m.at.known, m.at.derived, m.at.scratch, result=None)
+    y, rates, values, slopes = m.row("y"), m.row("rates"), m.row(0), m.row(1)
+    with r.forever() as attempts:
+        now = unit.now
+        m.numbers.unit = now
+        with r.count(m.padded, step=WIDTH) as j:
+            values[j] = m.lanes(y, j)
+            slopes[j] = m.lanes(rates, j) * now
+        failed = r.variable(False, BOOLEAN)
+        with r.forever() as orders:
+            for k in range(1, HIGHEST):
+                with r.when(_order(r, m, k, now) != 0):
+                    failed.now = True
+                    r.leave(orders)
+                if k + 1 >= LOWEST:
+                    with r.when(m.counts.order == k + 1):
+                        r.leave(orders)
+            r.leave(orders)
+        with r.when(~failed.now):
+            r.give(0)
+        m.counts.undefined = m.counts.undefined + 1
+        tries.now = tries.now + 1
+        with r.when(tries.now >= RETRIES):
+            r.leave(attempts)
+        unit.now = now * SMALLER
+    r.give(1)
+    return r
+
+
+def _order(r: Routine, m: Memory, k: int, unit: Value) -> Value:
+    """Find the coefficients of one order, and those of the unknowns of the next; return 1 where one is not finite."""
+    pairs, squares, table = m.counts.pair_blocks, m.counts.square_blocks, m.at.table
+    r.call(f"pairs{k}", table, m.at.pair_sums, pairs, result=None)
+    with r.when(squares > 0):
+        r.call(f"squares{k}", table.at(pairs * (2 * STRIDE)), m.at.square_sums, squares, result=None)
+    m.numbers.order_number, m.numbers.order_inverse = float(k), 1.0 / k
+    m.numbers.order_step, m.numbers.order_tick = unit * (1.0 / (k + 1)), unit if k == 1 else 0.0
+    row = table.at(LANES * (k - 1))
+    for place, target in enumerate((row, row, row, m.row(k + 1))):
+        m.at.order_out.write(place, target, ADDRESS)
+    m.at.order_in.write(3, m.row(k), ADDRESS)
+    return r.call(m.at.recurrence, m.at.order_in, m.at.derived, m.at.scratch, m.at.order_out)
+
+
+def _largest() -> Routine:
+    """Return the largest coefficient of an order, in units of the sizes."""
+    r, m, (order,) = open_routine("largest", {"order": INTEGER}, result=NUMBER)
+    row, sizes, largest = m.row(order), m.row("sizes"), r.variable(0.0, _PART)
+    with r.count(m.padded, step=WIDTH) as j:
+        largest.now = r.most(r.size(m.lanes(row, j)) * m.lanes(sizes, j), largest.now)
+    r.give(r.largest_lane(largest.now))
+    return r
+
+
+def _choose() -> Routine:
+    """Return the step that the last coefficients allow, if none is given.
+
+    The rate at which coefficients grow is the logarithm to base 2 of one over its order, good enough for a step: linear
+    between powers of two, and finite at zero.
+    """
+    r, m, _ = open_routine("choose", result=NUMBER)
+    first = m.numbers.first
+    with r.when(first > 0.0):
+        m.numbers.first = 0.0
+        r.give(first)
+    y, floors, sizes = m.row("y"), m.row("floors"), m.row("sizes")
+    with r.count(m.padded, step=WIDTH) as j:
+        sizes[j] = 1.0 / (m.lanes(floors, j) + r.size(m.lanes(y, j)))
+
+    def largest(order: Value) -> Value:
+        return r.call("largest", m.session, order, result=NUMBER)
+
+    growth = r.value(-1e9, NUMBER)
+    for i in range(WATCHED):
+        order = m.counts.order - i
+        top = largest(order)
+        bits = top.bits()
+        mantissa = ((bits & (2**52 - 1)) | (1023 << 52)).number_of_bits()
+        logarithm = mantissa + ((bits >> 52) - 1024).number()
+        rate = r.choose(top < 2.0**-1022, -1023.0, logarithm) / order.number()
+        growth = r.most(rate, growth)
+    power = m.numbers.share - growth
+    floor = r.floor(power)
+    part = power - floor
+    factor = part * (part * 0.3398 + 0.6602) + 1.0
+    value = r.variable(factor * ((r.truncated(floor) + 1023) << 52).number_of_bits())
+    reach = m.numbers.reach
+    with r.when(reach < inf):  # no unknown changes too much for events to be seen
+        for number in (1, 2):
+            ratio = reach / largest(r.value(number, INTEGER))
+            value.now = r.least(ratio if number == 1 else r.sqrt(ratio), value.now)
+    r.give(m.numbers.unit * value.now)
+    return r
+
+
+def _horner(r: Routine, m: Memory, j: Value, share: Value) -> tuple[Value, Value]:
+    """Return the polynomial less its first term at a share of its unit, and its slope, by Horner's scheme."""
+    order = m.counts.order
+    value, turn, k = r.variable(m.lanes(m.row(order), j), _PART), r.variable(0.0, _PART), r.variable(order - 1, INTEGER)
+    with r.forever() as terms:
+        now = value.now
+        turn.now = r.fused(turn.now, share, now)
+        value.now = r.fused(now, share, m.lanes(m.row(k.now), j))
+        k.now = k.now - 1
+        with r.when(k.now <= 0):
+            r.leave(terms)
+    return value.now * share, r.fused(turn.now, share, value.now)
+
+
+def _move() -> Routine:
+    """Write the values at the end of a step, what they leave out, and the slope there."""
+    r, m, (share,) = open_routine("move", {"share": NUMBER}, result=None)
+    names = ("y", "y_low", "new", "new_low", "slope")
+    y, y_low, new, new_low, slopes = (m.row(name) for name in names)
+    spread = r.value(share, _PART)
+    with r.count(m.padded, step=WIDTH) as j:
+        moved, slope = _horner(r, m, j, spread)
+        slopes[j] = slope
+        high = m.lanes(y, j)
+        total = high + moved
+        part = total - high
+        lost = (high - (total - part)) + (moved - part)
+        low = m.lanes(y_low, j) + lost
+        rounded = total + low
+        new[j] = rounded
+        new_low[j] = low - (rounded - total)
+    return r
+
+
+def _misses() -> Routine:
+    """Tell whether rates at the end of a step are not the slope of the polynomial."""
+    r, m, (h,) = open_routine("misses", {"h": NUMBER}, result=BOOLEAN)
+    weight, allowed = h / m.counts.order.number(), m.numbers.allowed
+    pace, missed = 1.0 / m.numbers.unit, r.variable(False, Lanes(WIDTH, is_float=False))
+    y, new, slope, rates, floors = (m.row(name) for name in ("y", "new", "slope", "new_rates", "floors"))
+    with r.count(m.padded, step=WIDTH) as j:
+        apart = r.size(m.lanes(slope, j) * pace - m.lanes(rates, j)) * weight
+        size = m.lanes(floors, j) + r.most(r.size(m.lanes(y, j)), r.size(m.lanes(new, j)))
+        missed.now = missed.now | ~(apart <= size * allowed)
+    r.give(r.any_lane(missed.now))
+    return r
+
+
+def _run() -> Routine:
+    """Take steps until one ends at or after the time to stop at."""
+    r, m, _ = open_routine("run", exported=True)
+    h, t_new = r.variable(0.0), r.variable(0.0)
+    with r.forever():
+        t = m.numbers.t
+        with r.when(t >= m.numbers.stop):
+            r.give(_REACHED)
+        with r.when(m.counts.steps >= m.counts.limit):
+            r.give(_USED_UP)
+        with r.when(r.call("expand", m.session) != 0):
+            r.give(_TOO_SMALL)
+        h.now = r.least(r.call("choose", m.session, result=NUMBER), m.numbers.longest)
+        least, stop = r.size(t) * (10.0 * 2.0**-52), m.numbers.stop_time
+        with r.forever() as attempts:
+            ends = t + h.now >= stop
+            t_new.now = r.choose(ends, stop, t + h.now)
+            step = t_new.now - t
+            with r.when(~(((step > least) & (step >= 1e-300)) | (ends & (step > 0.0)))):
+                r.give(_TOO_SMALL)
+            m.numbers.t_new = t_new.now
+            r.call("move", m.session, step / m.numbers.unit, result=None)
+            fits = r.variable(r.call("evaluate", m.session, m.at.new_in, m.at.new_out) == 0, BOOLEAN)
+            with r.when(fits.now):
+                fits.now = ~r.call("misses", m.session, step, result=BOOLEAN)
+            with r.when(fits.now):
+                r.leave(attempts)
+            h.now = step * RETREAT
+            m.counts.failures = m.counts.failures + 1
+        m.numbers.t_old, m.numbers.t, m.numbers.last = t, t_new.now, t_new.now - t
+        m.counts.steps = m.counts.steps + 1
+        for source, target in (("new", "y"), ("new_low", "y_low"), ("new_rates", "rates")):
+            r.copy(m.row(target), m.row(source), m.padded)
+    return r
+
+
+def _interpolate() -> Routine:
+    """Write values and rates at a time within the last step."""
+    arguments = {"time": NUMBER, "y_out": ADDRESS, "yp_out": ADDRESS}
+    r, m, (time, y_out, yp_out) = open_routine("interpolate", arguments, exported=True)
+    with r.when(time == m.numbers.t):
+        r.copy(y_out, m.row("y"), m.size)
+        r.copy(yp_out, m.row("rates"), m.size)
+        r.give(_REACHED)
+    m.numbers.time = time
+    first, trial = m.row(0), m.row("trial")
+    share = r.value((time - m.numbers.t_old) / m.numbers.unit, _PART)
+    with r.count(m.padded, step=WIDTH) as j:
+        trial[j] = m.lanes(first, j) + _horner(r, m, j, share)[0]
+    code = r.call("evaluate", m.session, m.at.trial_in, m.at.trial_out)
+    r.copy(y_out, trial, m.size)
+    r.copy(yp_out, m.row("trial_rates"), m.size)
+    with r.when(code != 0):
+        r.give(_NO_VALUE)
+    r.give(_REACHED)
+    return r
+
+
+def _sample() -> Routine:
+    """Go through output times and fill a table; it ends as `run` does."""
+    r, m, _ = open_routine("sample", SAMPLE_ARGUMENTS, exported=True)
+    return write_sample(r, m.numbers, m.counts, m.size)
