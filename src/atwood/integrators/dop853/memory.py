@@ -25,7 +25,7 @@ ROWS = {
 }
 """Rows of the table of arrays. `last` is the value at which the slope before that of the end was taken."""
 
-NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked")
+NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked", "likeness", "tried")
 COUNTS = (
     "size",
     "padded",

@@ -12,7 +12,7 @@ from math import inf
 from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Lanes
 from atwood.codegen.routines.language import Routine, Value
 from atwood.integrators.dop853.memory import LANES, Memory, open_routine
-from atwood.integrators.dop853.reference import GROWTH, RETREAT, SAFETY, SHRINKAGE
+from atwood.integrators.dop853.reference import APART, GROWTH, RETREAT, SAFETY, SHRINKAGE
 from atwood.integrators.dop853.tableau import DENSE, ERROR_3, ERROR_5, NODES, STAGES
 from atwood.integrators.explicit_problem import CALM, EDGE, STIFF
 from atwood.integrators.output_times import SAMPLE_ARGUMENTS, write_sample
@@ -146,7 +146,7 @@ def _first_step(r: Routine, m: Memory, t: Value) -> None:
 def _begin() -> Routine:
     """Start anew from a state."""
     r, m, (t, start) = open_routine("begin", {"t": NUMBER, "start": ADDRESS}, exported=True)
-    m.numbers.t, m.numbers.t_old, m.numbers.looked = t, t, t
+    m.numbers.t, m.numbers.t_old, m.numbers.looked, m.numbers.likeness = t, t, t, 0.0
     m.counts.edgy, m.counts.calm, m.counts.looks = 0, 0, m.counts.steps
     r.copy(m.row("y"), start, m.size)
     r.copy(m.row("y_old"), start, m.size)
@@ -223,9 +223,17 @@ def _held() -> Routine:
 
 
 def _error() -> Routine:
-    """Return the error of a step in units of what is allowed (Hairer, Norsett and Wanner, section II.10)."""
+    """Return the error of a step in units of what is allowed (Hairer, Norsett and Wanner, section II.10).
+
+    Where the estimate of fifth order comes near to one of its zeros, the ratio of both estimates in the step before
+    tells how large it is; that of this step is kept as `tried`.
+    """
     r, m, (h,) = open_routine("error", {"h": NUMBER}, result=NUMBER)
-    fifth, third = _squares(r, m, ERROR_5), _squares(r, m, ERROR_3)
+    own, third = _squares(r, m, ERROR_5), _squares(r, m, ERROR_3)
+    h4 = h * h * (h * h)
+    before = third * r.least(h4 * m.numbers.likeness, APART)
+    fifth, spread = r.choose(own < before, before, own), h4 * third
+    m.numbers.tried = r.choose(spread > 0.0, own / spread, 0.0)
     both = fifth + third * 0.01
     error = h * fifth / r.sqrt(both * m.size.number())
     r.give(r.choose(both == 0.0, 0.0, error))
@@ -280,6 +288,7 @@ def _attempt() -> Routine:
         within = r.least(r.choose(factor < 1.0 / GROWTH, 1.0 / GROWTH, factor), SHRINKAGE)
         grown = step / within
         m.numbers.next = r.choose((grown > step) & shortened.now, step, grown)
+        m.numbers.likeness = m.numbers.tried
         m.numbers.h, m.numbers.t_old, m.numbers.t = step, t, t_new
         m.counts.steps = m.counts.steps + 1
         r.give(0)
