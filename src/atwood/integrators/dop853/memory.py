@@ -59,6 +59,8 @@ POINTERS = (
     "watch",
     "watch_data",
     "due",
+    "guard",
+    "guard_data",
 )
 
 

@@ -222,6 +222,17 @@ def _held() -> Routine:
     return r
 
 
+def _guarded() -> Routine:
+    """Ask what judges steps about one that is good enough otherwise; 0 where it is good."""
+    r, m, (t, t_new) = open_routine("guarded", {"t": NUMBER, "t_new": NUMBER})
+    guard = m.at.guard
+    with r.when(r.is_null(guard)):
+        r.give(0)
+    ends = (t, m.row("y"), m.row(0), t_new, m.row("trial"), m.row(_END))
+    r.give(r.call(guard, *ends, m.at.guard_data))
+    return r
+
+
 def _error() -> Routine:
     """Return the error of a step in units of what is allowed (Hairer, Norsett and Wanner, section II.10).
 
@@ -284,6 +295,8 @@ def _attempt() -> Routine:
         with r.when(r.call("held", m.session, t_new) != 0):
             retreat()
         with r.when(r.call("evaluate", m.session, t_new, m.row("trial"), m.row(_END)) != 0):
+            retreat()
+        with r.when(r.call("guarded", m.session, t, t_new) != 0):
             retreat()
         within = r.least(r.choose(factor < 1.0 / GROWTH, 1.0 / GROWTH, factor), SHRINKAGE)
         grown = step / within
@@ -402,5 +415,5 @@ def write_routines() -> list[Routine]:
     (`atwood.integrators.dop853.memory`).
     """
     ends = [_begin(), _run(), _interpolate(), _sample()]
-    inner = [_evaluate(), _attempt(), _error(), _stability(), _held(), _look(), _watched()]
+    inner = [_evaluate(), _attempt(), _error(), _stability(), _held(), _guarded(), _look(), _watched()]
     return [*ends, *inner, *map(_stage, range(1, 16)), _densify(), _polynomial(), _slope()]

@@ -24,7 +24,10 @@ LANES = 8
 STRIDE = LANES * (HIGHEST + 1)
 """How far one block is from the next: an odd number of rows, so that the rows of one order do not share cache sets."""
 
-_NAMES = ("y", "y_low", "new", "new_low", "rates", "new_rates", "slope", "floors", "sizes", "trial", "trial_rates")
+_NAMES = (
+    *("y", "y_low", "new", "new_low", "rates", "new_rates", "slope", "floors", "sizes"),
+    *("trial", "trial_rates", "kept", "kept_rates"),
+)
 ROWS = {"x": 0, **{name: HIGHEST + 1 + i for i, name in enumerate(_NAMES)}, "all": HIGHEST + 1 + len(_NAMES)}
 """The rows of the table of arrays: the coefficients of the unknowns from order zero on, and what steps need."""
 
@@ -42,6 +45,7 @@ POINTERS = (
     *("start_derived", "derived", "scratch", "known"),
     *("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out"),  # tables of pointers
     *("arrays", "table", "pair_sums", "square_sums", "numbers", "counts"),
+    *("guard", "guard_data"),
 )
 
 

@@ -13,7 +13,7 @@ from atwood.codegen.routines.language import Routine, Value
 from atwood.integrators.output_times import SAMPLE_ARGUMENTS, write_sample
 from atwood.integrators.taylor.convolutions import write_convolutions
 from atwood.integrators.taylor.memory import LANES, STRIDE, WIDTH, Memory, open_routine
-from atwood.integrators.taylor.problem import HIGHEST, LOWEST, RETREAT, RETRIES, SMALLER, WATCHED
+from atwood.integrators.taylor.problem import HIGHEST, LOWEST, PARTS, RETREAT, RETRIES, SMALLER, WATCHED
 
 __all__ = ["write_routines"]
 
@@ -26,7 +26,7 @@ _PART = Lanes(WIDTH)
 def write_routines() -> list[Routine]:
     """Write the routines; ``run``, ``interpolate``, ``sample`` and ``begin`` are called from outside."""
     ends = [_begin(), _run(), _interpolate(), _sample()]
-    return [*ends, _evaluate(), _expand(), _choose(), _largest(), _move(), _misses(), *write_convolutions()]
+    return [*ends, _evaluate(), _expand(), _choose(), _largest(), _move(), _misses(), _guarded(), *write_convolutions()]
 
 
 def _evaluate() -> Routine:
@@ -211,6 +211,34 @@ def _misses() -> Routine:
     return r
 
 
+def _guarded() -> Routine:
+    """Ask what judges steps about each part of one; 0 where all are good."""
+    r, m, (t, h) = open_routine("guarded", {"t": NUMBER, "h": NUMBER})
+    guard, unit = m.at.guard, m.numbers.unit
+    with r.when(r.is_null(guard)):
+        r.give(0)
+    first, pace = m.row(0), 1.0 / unit
+    trial, slopes, kept, kept_slopes = (m.row(name) for name in ("trial", "trial_rates", "kept", "kept_rates"))
+    r.copy(kept, m.row("y"), m.size)
+    r.copy(kept_slopes, m.row("rates"), m.size)
+    begin = r.variable(t)
+    with r.count(PARTS + 1, start=1) as i:
+        since = i.number() * (1.0 / PARTS) * h
+        end, share = t + since, r.value(since / unit, _PART)
+        with r.count(m.padded, step=WIDTH) as j:
+            moved, slope = _horner(r, m, j, share)
+            trial[j] = m.lanes(first, j) + moved
+            slopes[j] = slope * pace
+        code = r.call(guard, begin.now, kept, kept_slopes, end, trial, slopes, m.at.guard_data)
+        with r.when(code != 0):
+            r.give(1)
+        r.copy(kept, trial, m.size)
+        r.copy(kept_slopes, slopes, m.size)
+        begin.now = end
+    r.give(0)
+    return r
+
+
 def _run() -> Routine:
     """Take steps until one ends at or after the time to stop at."""
     r, m, _ = open_routine("run", exported=True)
@@ -236,6 +264,8 @@ def _run() -> Routine:
             fits = r.variable(r.call("evaluate", m.session, m.at.new_in, m.at.new_out) == 0, BOOLEAN)
             with r.when(fits.now):
                 fits.now = ~r.call("misses", m.session, step, result=BOOLEAN)
+            with r.when(fits.now):
+                fits.now = r.call("guarded", m.session, t, step) == 0
             with r.when(fits.now):
                 r.leave(attempts)
             h.now = step * RETREAT
