@@ -1,4 +1,4 @@
-"""Which runs have steps that laws could slip through, and what judges these (`atwood.simulation.problem.curved_laws`)."""
+"""Runs whose steps laws could slip through, and what judges these (`atwood.simulation.problem.curved_laws`)."""
 
 from __future__ import annotations
 
