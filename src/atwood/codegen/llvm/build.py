@@ -45,6 +45,7 @@ GENERATORS = (
     "llvm/unit.py",
     "routines/kinds.py",
     "routines/language.py",
+    "routines/tree.py",
 )
 """The files, by their place in the room of the code generators, on which the machine code of a program depends.
 

@@ -10,7 +10,8 @@ import struct
 from collections.abc import Sequence
 
 from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes
-from atwood.codegen.routines.language import Block, Branch, Call, Instruction, Jump, Loop, Routine, Value
+from atwood.codegen.routines.language import Routine, Value
+from atwood.codegen.routines.tree import Block, Branch, Call, Instruction, Jump, Loop
 
 __all__ = ["print_routines"]
 

@@ -12,55 +12,9 @@ from contextlib import contextmanager
 from typing import Any
 
 from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes
-from atwood.late import dataclass
+from atwood.codegen.routines.tree import Block, Branch, Call, Instruction, Jump, Loop
 
-__all__ = ["Block", "Branch", "Call", "Instruction", "Jump", "Loop", "Record", "Routine", "Value", "Variable"]
-
-
-@dataclass(frozen=True, eq=False)
-class Instruction:
-    """An operation on values; `result` is None where it has none."""
-
-    operation: str
-    result: Value | None
-    arguments: tuple[Any, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Call:
-    """A call of a routine by its name, or of a function by its address."""
-
-    result: Value | None
-    function: str | Value
-    arguments: tuple[Value, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Branch:
-    """What is done where a condition holds, and what otherwise."""
-
-    condition: Value
-    then: Block
-    otherwise: Block
-
-
-@dataclass(frozen=True, eq=False)
-class Loop:
-    """What is done again and again until a jump leaves it."""
-
-    number: int
-    body: Block
-
-
-@dataclass(frozen=True, eq=False)
-class Jump:
-    """To the end of a loop, or to its next turn."""
-
-    loop: Loop
-    leaves: bool
-
-
-Block = list["Instruction | Call | Branch | Loop | Jump"]
+__all__ = ["Operand", "Record", "Routine", "Value", "Variable"]
 
 
 class Value:

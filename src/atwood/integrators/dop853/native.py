@@ -328,6 +328,7 @@ _PROJECT, _WATCH, _GUARD = map(POINTERS.index, ("project", "watch", "guard"))
 _ROUTINES = RoutineSource(
     "integrators.dop853.steps",
     (
+        "integrators/dop853/dense_output.py",
         "integrators/dop853/memory.py",
         "integrators/dop853/reference.py",
         "integrators/dop853/steps.py",

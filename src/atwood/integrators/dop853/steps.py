@@ -6,21 +6,19 @@ addresses, so that they are compiled once and kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from math import inf
 
-from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Lanes
+from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes
 from atwood.codegen.routines.language import Routine, Value
+from atwood.integrators.dop853.dense_output import END, slopes, weighted, write_dense_output
 from atwood.integrators.dop853.memory import LANES, Memory, open_routine
 from atwood.integrators.dop853.reference import APART, GROWTH, RETREAT, SAFETY, SHRINKAGE
-from atwood.integrators.dop853.tableau import DENSE, ERROR_3, ERROR_5, NODES, STAGES
+from atwood.integrators.dop853.tableau import ERROR_3, ERROR_5, STAGES
 from atwood.integrators.explicit_problem import CALM, EDGE, STIFF
 from atwood.integrators.output_times import SAMPLE_ARGUMENTS, write_sample
 
 __all__ = ["write_routines"]
-
-_END = 12
-"""The slope at the end of a step, with which the next one begins."""
 
 _STRETCH = 1.5
 """The end of a step takes the place of a look that was wanted before, if that makes the way to it longer by no more."""
@@ -34,21 +32,12 @@ _REACHED, _USED_UP, _TOO_SMALL, _NO_VALUE, _NO_RATES, _NOTICED = range(6)
 and that is heeded, or in which something was seen by what watches the motion."""
 
 
-def _weighted(m: Memory, weights: Mapping[int, float], j: Value) -> Value:
-    """Return a weighted sum of slopes."""
-    terms = [m.lanes(m.row(row), j) * weight for row, weight in weights.items()]
-    total = terms[0]
-    for term in terms[1:]:
-        total = total + term
-    return total
-
-
 def _stage(stage: int) -> Routine:
     """Write the values at which a slope is taken, or the new values."""
     r, m, (h,) = open_routine(f"stage{stage}", {"h": NUMBER})
-    base, trial, last = m.row("y_old" if stage > _END else "y"), m.row("trial"), m.row("last")
+    base, trial, last = m.row("y_old" if stage > END else "y"), m.row("trial"), m.row("last")
     with r.count(m.padded, step=LANES) as j:
-        value = m.lanes(base, j) + _weighted(m, STAGES[stage - 1], j) * h
+        value = m.lanes(base, j) + weighted(m, STAGES[stage - 1], j) * h
         trial[j] = value
         if stage == 11:
             last[j] = value
@@ -70,7 +59,7 @@ def _squares(r: Routine, m: Memory, weights: Mapping[int, float]) -> Value:
 
     def square(j: Value) -> Value:
         size = r.most(r.size(m.lanes(y, j)), r.size(m.lanes(trial, j)))
-        error = _weighted(m, weights, j) / (size * relative + m.lanes(absolute, j))
+        error = weighted(m, weights, j) / (size * relative + m.lanes(absolute, j))
         return error * error
 
     return _sum(r, m, square)
@@ -110,15 +99,6 @@ def _evaluate() -> Routine:
     return r
 
 
-def _slopes(r: Routine, m: Memory, stages: Iterable[int], t: Value, h: Value, failed: Callable[[], None]) -> None:
-    """Take the slopes of stages one after the other."""
-    for stage in stages:
-        r.call(f"stage{stage}", m.session, h)
-        code = r.call("evaluate", m.session, t + h * NODES[stage], m.row("trial"), m.row(stage))
-        with r.when(code != 0):
-            failed()
-
-
 def _first_step(r: Routine, m: Memory, t: Value) -> None:
     """Choose the first step by the size of the first two derivatives (Hairer, Norsett and Wanner, section II.4)."""
     longest = m.numbers.longest
@@ -127,15 +107,15 @@ def _first_step(r: Routine, m: Memory, t: Value) -> None:
     with r.when(given > 0.0):
         m.numbers.next = r.least(given, longest)
         r.give(_REACHED)
-    y, trial, end, probe = m.row("y"), m.row("trial"), m.row(_END), m.row(1)
-    d0, d1 = _size(r, m, "y"), _size(r, m, _END)
+    y, trial, end, probe = m.row("y"), m.row("trial"), m.row(END), m.row(1)
+    d0, d1 = _size(r, m, "y"), _size(r, m, END)
     usual = (d0 >= 1e-5) & (d1 >= 1e-5) & (d0 / d1 < inf)
     h0 = r.least(r.choose(usual, d0 * 0.01 / d1, 1e-6), bound)
     m.numbers.next = h0
     with r.count(m.padded, step=LANES) as j:
         trial[j] = m.lanes(y, j) + m.lanes(end, j) * h0
     code = r.call("evaluate", m.session, t + h0, trial, probe)
-    d2 = _size(r, m, 1, _END) / h0
+    d2 = _size(r, m, 1, END) / h0
     with r.when((code == 0) & (d2 < inf)):
         steepest = r.most(d2, d1)
         root = r.sqrt(r.sqrt(r.sqrt(0.01 / steepest)))
@@ -150,7 +130,7 @@ def _begin() -> Routine:
     m.counts.edgy, m.counts.calm, m.counts.looks = 0, 0, m.counts.steps
     r.copy(m.row("y"), start, m.size)
     r.copy(m.row("y_old"), start, m.size)
-    with r.when(r.call("evaluate", m.session, t, m.row("y"), m.row(_END)) != 0):
+    with r.when(r.call("evaluate", m.session, t, m.row("y"), m.row(END)) != 0):
         r.give(_NO_RATES)
     _first_step(r, m, t)
     r.give(_REACHED)
@@ -162,7 +142,7 @@ def _look() -> Routine:
     r, m, (t,) = open_routine("look", {"t": NUMBER})
     count, values, signs = m.counts.event_count, m.at.values, m.at.signs
     with r.when(count > 0):
-        code = r.call(m.at.events, t, m.row("y"), m.row(_END), values, m.at.events_data)
+        code = r.call(m.at.events, t, m.row("y"), m.row(END), values, m.at.events_data)
         with r.when(code != 0):
             r.give(1)
         with r.count(count) as i, r.when(~(values[i] * signs[i] > 0.0)):
@@ -184,7 +164,7 @@ def _watched() -> Routine:
         r.give(0)
     with r.when(~(t < t_new)):
         r.give(0)
-    y, end, trial, last = m.row("y"), m.row(_END), m.row("trial"), m.row("last")
+    y, end, trial, last = m.row("y"), m.row(END), m.row("trial"), m.row("last")
     with r.forever():
         due = m.at.due[0]
         is_within = due <= t_new
@@ -228,7 +208,7 @@ def _guarded() -> Routine:
     guard = m.at.guard
     with r.when(r.is_null(guard)):
         r.give(0)
-    ends = (t, m.row("y"), m.row(0), t_new, m.row("trial"), m.row(_END))
+    ends = (t, m.row("y"), m.row(0), t_new, m.row("trial"), m.row(END))
     r.give(r.call(guard, *ends, m.at.guard_data))
     return r
 
@@ -254,7 +234,7 @@ def _error() -> Routine:
 def _stability() -> Routine:
     """Count steps at the edge of stability; 1 where the problem has just turned out stiff."""
     r, m, (h,) = open_routine("stability", {"h": NUMBER})
-    turned, apart = _distance(r, m, _END, 11), _distance(r, m, "trial", "last")
+    turned, apart = _distance(r, m, END, 11), _distance(r, m, "trial", "last")
     is_edgy = (h * r.sqrt(turned / apart) > EDGE) & (apart > 0.0)
     edgy = r.choose(is_edgy, m.counts.edgy + 1, m.counts.edgy)
     calm = r.choose(is_edgy, 0, m.counts.calm + 1, INTEGER)
@@ -281,8 +261,8 @@ def _attempt() -> Routine:
             m.counts.failures = m.counts.failures + 1
             r.repeat(attempts)
 
-        _slopes(r, m, range(1, _END), t, step, retreat)
-        r.call(f"stage{_END}", m.session, step)
+        slopes(r, m, range(1, END), t, step, retreat)
+        r.call(f"stage{END}", m.session, step)
         error = r.call("error", m.session, step, result=NUMBER)
         factor = r.sqrt(r.sqrt(r.sqrt(error))) / SAFETY
         with r.when(~(error <= 1.0)):
@@ -294,7 +274,7 @@ def _attempt() -> Routine:
         t_new = t + step
         with r.when(r.call("held", m.session, t_new) != 0):
             retreat()
-        with r.when(r.call("evaluate", m.session, t_new, m.row("trial"), m.row(_END)) != 0):
+        with r.when(r.call("evaluate", m.session, t_new, m.row("trial"), m.row(END)) != 0):
             retreat()
         with r.when(r.call("guarded", m.session, t, t_new) != 0):
             retreat()
@@ -319,7 +299,7 @@ def _run() -> Routine:
             r.give(_USED_UP)
         with r.when(r.call("watched", m.session, t) != 0):
             r.give(_NOTICED)
-        begin, end = m.row(0), m.row(_END)
+        begin, end = m.row(0), m.row(END)
         r.copy(begin, end, m.padded)
         m.counts.is_dense = 0
         with r.when(r.call("attempt", m.session) != 0):
@@ -336,72 +316,6 @@ def _run() -> Routine:
     return r
 
 
-def _densify() -> Routine:
-    """Make the dense output of the last step, unless it is there; 1 where there is none."""
-    r, m, () = open_routine("densify")
-    with r.when(m.counts.is_dense != 0):
-        r.give(0)
-    h, dense = m.numbers.h, m.row("dense")
-    _slopes(r, m, (13, 14, 15), m.numbers.t_old, h, lambda: r.give(1))
-    y, y_old, begin, end = m.row("y"), m.row("y_old"), m.row(0), m.row(_END)
-    with r.count(m.padded, step=LANES) as j:
-        step = m.lanes(y, j) - m.lanes(y_old, j)
-        rise, fall = m.lanes(begin, j) * h, m.lanes(end, j) * h
-        rows = [step, rise - step, (step + step) - (rise + fall)]
-        rows += [_weighted(m, weights, j) * h for weights in DENSE]
-        for number, row in enumerate(rows):
-            dense[j + m.padded * number] = row
-    m.counts.is_dense = 1
-    r.give(0)
-    return r
-
-
-def _polynomial() -> Routine:
-    """Write the dense output at a share of the last step to `trial`."""
-    r, m, (x,) = open_routine("polynomial", {"x": NUMBER})
-    rows = [m.row("dense").at(m.padded * k) for k in range(7)]
-    below, trial, rest = [m.row("y_old"), *rows[:-1]], m.row("trial"), 1.0 - x
-    with r.count(m.padded, step=LANES) as j:
-        value = m.lanes(rows[-1], j)
-        for power, row in enumerate(reversed(below)):
-            value = value * (rest if power % 2 else x) + m.lanes(row, j)
-        trial[j] = value
-    r.give(0)
-    return r
-
-
-def _slope() -> Routine:
-    """Write the slope of the cubic through both ends of the last step, at a share of it, to `last`."""
-    r, m, (x,) = open_routine("slope", {"x": NUMBER})
-    rest = 1.0 - x
-    both, begin, end = x * rest * 6.0 / m.numbers.h, rest * (1.0 - x * 3.0), x * (x * 3.0 - 2.0)
-    y, y_old, first, second, last = m.row("y"), m.row("y_old"), m.row(0), m.row(_END), m.row("last")
-    with r.count(m.padded, step=LANES) as j:
-        step = m.lanes(y, j) - m.lanes(y_old, j)
-        last[j] = step * both + m.lanes(first, j) * begin + m.lanes(second, j) * end
-    r.give(0)
-    return r
-
-
-def _interpolate() -> Routine:
-    """Write values and rates at a time within the last step."""
-    arguments = {"time": NUMBER, "y_out": ADDRESS, "yp_out": ADDRESS}
-    r, m, (time, y_out, yp_out) = open_routine("interpolate", arguments, exported=True)
-    with r.when(time == m.numbers.t):
-        r.copy(y_out, m.row("y"), m.size)
-        r.copy(yp_out, m.row(_END), m.size)
-        r.give(0)
-    with r.when(r.call("densify", m.session) != 0):
-        r.give(_NO_VALUE)
-    r.call("polynomial", m.session, (time - m.numbers.t_old) / m.numbers.h)
-    trial = m.row("trial")
-    r.copy(y_out, trial, m.size)
-    code = r.call(m.at.function, time, trial, yp_out, m.at.data)
-    m.counts.evaluations = m.counts.evaluations + 1
-    r.give(r.choose(code == 0, 0, _NO_VALUE, CODE))
-    return r
-
-
 def _sample() -> Routine:
     """Go through output times and fill a table; it ends as `run` does."""
     r, m, _ = open_routine("sample", SAMPLE_ARGUMENTS, exported=True)
@@ -414,6 +328,6 @@ def write_routines() -> list[Routine]:
     They take a pointer to the pointers of a session; numbers and counts are behind two of these
     (`atwood.integrators.dop853.memory`).
     """
-    ends = [_begin(), _run(), _interpolate(), _sample()]
+    ends = [_begin(), _run(), _sample()]
     inner = [_evaluate(), _attempt(), _error(), _stability(), _held(), _guarded(), _look(), _watched()]
-    return [*ends, *inner, *map(_stage, range(1, 16)), _densify(), _polynomial(), _slope()]
+    return [*ends, *inner, *map(_stage, range(1, 16)), *write_dense_output()]

@@ -1,0 +1,107 @@
+"""Slopes within a step of the method of order 8(5,3), and its dense output.
+
+Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+from atwood.codegen.routines.kinds import ADDRESS, CODE, NUMBER
+from atwood.codegen.routines.language import Routine, Value
+from atwood.integrators.dop853.memory import LANES, Memory, open_routine
+from atwood.integrators.dop853.tableau import DENSE, NODES
+
+__all__ = ["END", "slopes", "weighted", "write_dense_output"]
+
+END = 12
+"""The slope at the end of a step, with which the next one begins."""
+
+
+def write_dense_output() -> list[Routine]:
+    """Write the routines that read a solution within the last step."""
+    return [_interpolate(), _densify(), _polynomial(), _slope()]
+
+
+def weighted(m: Memory, weights: Mapping[int, float], j: Value) -> Value:
+    """Return a weighted sum of slopes."""
+    terms = [m.lanes(m.row(row), j) * weight for row, weight in weights.items()]
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def slopes(r: Routine, m: Memory, stages: Iterable[int], t: Value, h: Value, failed: Callable[[], None]) -> None:
+    """Take the slopes of stages one after the other."""
+    for stage in stages:
+        r.call(f"stage{stage}", m.session, h)
+        code = r.call("evaluate", m.session, t + h * NODES[stage], m.row("trial"), m.row(stage))
+        with r.when(code != 0):
+            failed()
+
+
+def _densify() -> Routine:
+    """Make the dense output of the last step, unless it is there; 1 where there is none."""
+    r, m, () = open_routine("densify")
+    with r.when(m.counts.is_dense != 0):
+        r.give(0)
+    h, dense = m.numbers.h, m.row("dense")
+    slopes(r, m, (13, 14, 15), m.numbers.t_old, h, lambda: r.give(1))
+    y, y_old, begin, end = m.row("y"), m.row("y_old"), m.row(0), m.row(END)
+    with r.count(m.padded, step=LANES) as j:
+        step = m.lanes(y, j) - m.lanes(y_old, j)
+        rise, fall = m.lanes(begin, j) * h, m.lanes(end, j) * h
+        rows = [step, rise - step, (step + step) - (rise + fall)]
+        rows += [weighted(m, weights, j) * h for weights in DENSE]
+        for number, row in enumerate(rows):
+            dense[j + m.padded * number] = row
+    m.counts.is_dense = 1
+    r.give(0)
+    return r
+
+
+def _polynomial() -> Routine:
+    """Write the dense output at a share of the last step to `trial`."""
+    r, m, (x,) = open_routine("polynomial", {"x": NUMBER})
+    rows = [m.row("dense").at(m.padded * k) for k in range(7)]
+    below, trial, rest = [m.row("y_old"), *rows[:-1]], m.row("trial"), 1.0 - x
+    with r.count(m.padded, step=LANES) as j:
+        value = m.lanes(rows[-1], j)
+        for power, row in enumerate(reversed(below)):
+            value = value * (rest if power % 2 else x) + m.lanes(row, j)
+        trial[j] = value
+    r.give(0)
+    return r
+
+
+def _slope() -> Routine:
+    """Write the slope of the cubic through both ends of the last step, at a share of it, to `last`."""
+    r, m, (x,) = open_routine("slope", {"x": NUMBER})
+    rest = 1.0 - x
+    both, begin, end = x * rest * 6.0 / m.numbers.h, rest * (1.0 - x * 3.0), x * (x * 3.0 - 2.0)
+    y, y_old, first, second, last = m.row("y"), m.row("y_old"), m.row(0), m.row(END), m.row("last")
+    with r.count(m.padded, step=LANES) as j:
+        step = m.lanes(y, j) - m.lanes(y_old, j)
+        last[j] = step * both + m.lanes(first, j) * begin + m.lanes(second, j) * end
+    r.give(0)
+    return r
+
+
+def _interpolate() -> Routine:
+    """Write values and rates at a time within the last step."""
+    arguments = {"time": NUMBER, "y_out": ADDRESS, "yp_out": ADDRESS}
+    r, m, (time, y_out, yp_out) = open_routine("interpolate", arguments, exported=True)
+    with r.when(time == m.numbers.t):
+        r.copy(y_out, m.row("y"), m.size)
+        r.copy(yp_out, m.row(END), m.size)
+        r.give(0)
+    with r.when(r.call("densify", m.session) != 0):
+        r.give(3)
+    r.call("polynomial", m.session, (time - m.numbers.t_old) / m.numbers.h)
+    trial = m.row("trial")
+    r.copy(y_out, trial, m.size)
+    code = r.call(m.at.function, time, trial, yp_out, m.at.data)
+    m.counts.evaluations = m.counts.evaluations + 1
+    r.give(r.choose(code == 0, 0, 3, CODE))
+    return r
