@@ -26,6 +26,7 @@ from atwood_library import (
     Slider,
     Spherical,
     Spring,
+    Table,
     Weld,
 )
 
@@ -377,6 +378,52 @@ def signals_that_do_not_fit(draft: Draft, names: list[str]) -> None:
     )()
 
 
+def text_that_is_no_value(draft: Draft, names: list[str]) -> None:
+    """A drive follows text that is neither a formula of time nor a length, or could be both."""
+    name = draft.name("drive")
+    names += ["motion", name]
+    text = draft.chance.choice(
+        (
+            "2 t",
+            "5*s",
+            "1,5*t",
+            "1,5 m",
+            "2*kg",
+            "3 m + 2*t",
+            "2 sin(t)",
+            "sin(",
+            "x*t",
+            "3 kg",
+            "2t",
+            "t = 3",
+            "",
+            "5 h",
+        )
+    )
+    draft.scene.add(name, Drive(motion=text))
+
+
+def a_table_that_is_none(draft: Draft, names: list[str]) -> None:
+    """Rows of a table do not rise, are too few, no numbers, or end before the run."""
+    name = draft.name("table")
+    names += [name, "table"]
+    rows = draft.chance.choice(
+        (
+            [(0.0, 1.0)],
+            [(0.0, 1.0), (0.0, 2.0)],
+            [(1.0, 0.0), (0.0, 1.0)],
+            [(0.0, float("nan")), (1.0, 2.0)],
+            [(0.0, "a"), (1.0, 2.0)],
+            [(0.01, 0.0), (1.0, 2.0)],
+            [(0.0, 0.0), (0.02, 2.0)],
+            "nowhere.csv",
+            [],
+            3.0,
+        )
+    )
+    draft.scene.add(name, Table(table=rows, interpolation=draft.chance.choice(("linear", "akima", "cubic"))))
+
+
 def no_scene_at_all(draft: Draft, names: list[str]) -> None:
     """There are no parts."""
     draft.scene = Scene()
@@ -410,6 +457,8 @@ BREAKS = (
     a_shortcut_past_a_joint,
     a_weld_too_much,
     signals_that_do_not_fit,
+    text_that_is_no_value,
+    a_table_that_is_none,
     no_scene_at_all,
 )
 """All ways to break a scene."""

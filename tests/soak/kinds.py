@@ -18,6 +18,7 @@ KINDS = {
     "interrupts": "interrupts",
     "methods": "methods",
     "scenes": "scenes",
+    "tables": "tables",
     "metamorphic": "metamorphic",
     "memory": "memory",
 }

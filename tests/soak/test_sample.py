@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from . import metamorphic, methods
+from . import metamorphic, methods, tables
 from .draw import draw
 from .oracle import STEP, Oracle
 from .scenes import Way, check_mechanism
@@ -51,6 +51,12 @@ def test_relations_hold(seed: int) -> None:
 def test_methods_agree(seed: int) -> None:
     trial = methods.check(seed)
     assert any(word.startswith("compared") for word in trial.tried)
+    assert not trial.findings, trial.findings[0].detail
+
+
+@pytest.mark.parametrize("seed", [101, 103, 110, 117, 131, 175])
+def test_tables_agree_with_scipy(seed: int) -> None:
+    trial = tables.check(seed)
     assert not trial.findings, trial.findings[0].detail
 
 

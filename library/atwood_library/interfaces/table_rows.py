@@ -14,6 +14,9 @@ from atwood import ParameterError
 __all__ = ["piece_at", "pieces_of", "read_table"]
 
 
+_FILE = "Give a CSV file with a time and a value in each line, under a line of names if there is one."
+
+
 def read_table(value: Any, where: str) -> Any:
     """Return the rows of a table from anything that holds one.
 
@@ -41,9 +44,11 @@ def _read_csv(file: Path, where: str) -> list[list[float]]:
     try:
         lines = file.read_text(encoding="utf-8-sig").splitlines()
     except OSError as error:
-        raise ParameterError(f"the file {str(file)!r} cannot be read ({error.strerror})", where=where) from None
+        raise ParameterError(
+            f"the file {str(file)!r} cannot be read ({error.strerror})", where=where, advice="Look at its path."
+        ) from None
     except UnicodeDecodeError:
-        raise ParameterError(f"the file {str(file)!r} is no text", where=where) from None
+        raise ParameterError(f"the file {str(file)!r} is no text", where=where, advice=_FILE) from None
     kept = [(number, line) for number, line in enumerate(lines, start=1) if line.strip() and line.lstrip()[0] != "#"]
     mark = next((one for one in ";\t," if any(one in line for _, line in kept)), " ")
     rows: list[list[float]] = []
@@ -54,7 +59,9 @@ def _read_csv(file: Path, where: str) -> list[list[float]]:
             row = [float(text if mark == "," else text.replace(",", ".")) for text in cells[:2]]
         except ValueError:
             if rows or any(cell[:1].isdigit() for cell in cells[:2]):
-                raise ParameterError(f"line {number} of {str(file)!r} is no row of numbers", where=where) from None
+                raise ParameterError(
+                    f"line {number} of {str(file)!r} is no row of numbers", where=where, advice=_FILE
+                ) from None
             width = 2 * len(cells)  # of a row in which each number has a comma
             continue
         if len(cells) == width if not rows else len(cells) != width:
@@ -66,7 +73,7 @@ def _read_csv(file: Path, where: str) -> list[list[float]]:
         rows.append(row)
         width = len(cells)
     if not rows:
-        raise ParameterError(f"{str(file)!r} has no rows of numbers", where=where)
+        raise ParameterError(f"{str(file)!r} has no rows of numbers", where=where, advice=_FILE)
     return rows
 
 

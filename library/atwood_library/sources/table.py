@@ -46,7 +46,11 @@ class Table(Component):
         """Refuse rows that make no function."""
         rows, where = self.table, f"{self.path}.table"
         if not isinstance(rows[0], tuple) or len(rows[0]) < 2 or len(rows) < 2:
-            raise ParameterError("it needs two rows or more, of a time and a value", where=where)
+            raise ParameterError(
+                "it needs two rows or more, of a time and a value",
+                where=where,
+                advice="Write them as [(0, 0), (1, 0.5)], or give the path of a CSV file.",
+            )
         times = [row[0] for row in rows]
         if any(not a < b for a, b in pairwise(times)):
             raise ParameterError(
@@ -58,7 +62,9 @@ class Table(Component):
         first, last = self.table[0][0], self.table[-1][0]
         if start < first:
             raise ParameterError(
-                f"it begins at t = {first:g} s, and the run at t = {start:g} s", where=f"{self.path}.table"
+                f"it begins at t = {first:g} s, and the run at t = {start:g} s",
+                where=f"{self.path}.table",
+                advice="Give a row at or before the start of the run.",
             )
         if self.at_end == "refuse" and end > last:
             raise ParameterError(

@@ -221,8 +221,10 @@ class Trajectories(Mapping[str, FloatArray]):
     def _ipython_key_completions_(self) -> list[str]:
         return list(self.paths)
 
-    def plot(self, paths: Iterable[str] | None = None, file: str | os.PathLike[str] | None = None) -> Any:
-        """Plot quantities over time, and return the figure; see `atwood.plot`.
+    def plot(
+        self, paths: Iterable[str] | None = None, file: str | os.PathLike[str] | None = None, x: str | None = None
+    ) -> Any:
+        """Plot quantities over time, or over another one, and return the figure; see `atwood.plot`.
 
         Parameters
         ----------
@@ -230,9 +232,11 @@ class Trajectories(Mapping[str, FloatArray]):
             Which quantities; the coordinates and the energy when not given.
         file
             Where to save the picture; its suffix says how.
+        x
+            The quantity that they are plotted over; time when not given.
         """
         # Views stand above results and are never imported from here, only looked up when a picture is wanted.
-        return import_module("atwood.plotting.plots.quantities").plot(self, paths, file)
+        return import_module("atwood.plotting.plots.quantities").plot(self, paths, file, x)
 
 
 class Group(Mapping[str, FloatArray]):

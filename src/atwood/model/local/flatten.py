@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+import warnings
 from collections.abc import Iterator, Mapping
 from types import FrameType
 from typing import Any
@@ -202,6 +203,7 @@ def _number(value: Any, model: Model, key: str, prefix: str) -> float:
                 f"it is bound to {value!r}, which is in {value.unit.text} and not in {wanted.text}", where=path
             )
         value = value.value_in(model)
+    was_text = isinstance(value, str)
     if isinstance(value, str):
         _, unit_text = split_quantity(value) or (0.0, "")
         given = parse_unit(unit_text)
@@ -217,6 +219,13 @@ def _number(value: Any, model: Model, key: str, prefix: str) -> float:
         raise StartError(f"{number} is not a finite number", where=path, advice="Give a finite number.")
     if wanted is not None and wanted.text == "rad" and abs(number) > LARGEST_ANGLE:
         raise too_large_an_angle(number, path, StartError)
+    is_typed = isinstance(value, (int, float)) and number == round(number, 2)
+    if wanted is not None and wanted.text == "rad" and abs(number) > math.tau and is_typed and not was_text:
+        warnings.warn(
+            f"{path}: the start {number:g} is taken as radians, {number / math.tau:.3g} turns; "
+            f"if degrees are meant, write '{number:g} deg'",
+            stacklevel=2,
+        )
     return number
 
 

@@ -7,8 +7,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, instance, optional, takes
+from atwood.arrays import FloatArray
 from atwood.errors import ResultError
-from atwood.model.declare.quantities import PATHS
+from atwood.model.declare.quantities import PATH, PATHS
 from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish, with_unit
 from atwood.result.files import SavedResult
 from atwood.result.result import Result
@@ -41,11 +42,15 @@ _QUANTITIES = {
     result=instance("a result, as simulate or load_result returns it", Result, SavedResult),
     paths=PATHS,
     file=optional(FILE),
+    x=optional(PATH),
 )
 def plot(
-    result: Result | SavedResult, paths: Iterable[str] | None = None, file: str | os.PathLike[str] | None = None
+    result: Result | SavedResult,
+    paths: Iterable[str] | None = None,
+    file: str | os.PathLike[str] | None = None,
+    x: str | None = None,
 ) -> Figure:
-    """Plot quantities over time, one panel for each unit.
+    """Plot quantities over time, or over another quantity, one panel for each unit.
 
     Parameters
     ----------
@@ -56,6 +61,8 @@ def plot(
         The coordinates, the tensions and the energy balance when not given.
     file
         Where to save the picture (``.png``, ``.svg`` or ``.pdf``).
+    x
+        The quantity that they are plotted over, such as ``"rod1.angle"``; time when not given.
 
     Returns
     -------
@@ -73,7 +80,8 @@ def plot(
     groups: dict[str, list[str]] = {}
     for path in chosen:
         groups.setdefault(result.unit(path), []).append(path)
-    shows_energy = paths is None and isinstance(result, Result)
+    shows_energy = paths is None and isinstance(result, Result) and x is None
+    across, label = (result.time, "time, s") if x is None else (result.array(x), with_unit(x, result.unit(x)))
     room = _PANELS - 1 if shows_energy else _PANELS
     if len(groups) > room and paths is not None:
         raise ResultError(
@@ -85,10 +93,12 @@ def plot(
     figure = new_figure(8.0, 1.0 + 2.1 * max(count, 1))
     panels = figure.subplots(max(count, 1), 1, sharex=True, squeeze=False)[:, 0]
     for axes, unit in zip(panels, units, strict=False):
-        _draw(axes, result, groups[unit], unit)
+        _draw(axes, result, groups[unit], unit, across)
+        if x is None:
+            _mark(axes, result)
     if shows_energy and isinstance(result, Result):
         _draw_energy(panels[count - 1], result)
-    panels[-1].set_xlabel("time, s", color=INK, fontsize=10)
+    panels[-1].set_xlabel(label, color=INK, fontsize=10)
     panels[0].set_title(_title(result), loc="left", fontsize=11, fontweight="bold", color=INK)
     figure.align_ylabels(list(panels))
     return finished(figure, file)
@@ -122,7 +132,7 @@ def _expand(result: Result | SavedResult, paths: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _draw(axes: Axes, result: Result | SavedResult, paths: list[str], unit: str) -> None:
+def _draw(axes: Axes, result: Result | SavedResult, paths: list[str], unit: str, across: FloatArray) -> None:
     """Draw the quantities of one unit, with their names at the side."""
     kinds = {path.rpartition(".")[2] for path in paths}
     label = kinds.pop().replace("_", " ") if len(kinds) == 1 else _QUANTITIES.get(unit, "")
@@ -130,7 +140,7 @@ def _draw(axes: Axes, result: Result | SavedResult, paths: list[str], unit: str)
     polish(axes, y_label=with_unit(label, unit))
     picked = paths if len(paths) <= _CURVES else [paths[i] for i in _spread(len(paths), _CURVES)]
     for colour, path in zip(COLOURS, picked, strict=False):
-        axes.plot(result.time, result.array(path), color=colour, linewidth=1.6, label=_without_ending(path, paths))
+        axes.plot(across, result.array(path), color=colour, linewidth=1.6, label=_without_ending(path, paths))
     title = f"{len(picked)} of {len(paths)}" if len(picked) < len(paths) else None
     axes.legend(
         loc="upper left",
@@ -142,7 +152,6 @@ def _draw(axes: Axes, result: Result | SavedResult, paths: list[str], unit: str)
         title=title,
         title_fontsize=8,
     )
-    _mark(axes, result)
 
 
 def _without_ending(path: str, paths: list[str]) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import StartError
+from atwood.expr import Expression, depends_on, is_zero
 from atwood.forms.assembly import Assembly
 from atwood.linalg.matrices import Matrix, is_full, scaled, to_array
 from atwood.simulation.dynamics.balance import balance_of
@@ -105,6 +106,15 @@ def _massless_directions(assembly: Assembly, moving: FloatArray, state: State) -
     turns = all(units[name] == "rad/s" for name in names)
     where = _part_of(assembly, names[0])
     acting = _acting_on(assembly, where)
+    speeds = zip(assembly.own_equations.speeds, every, strict=True)
+    bare = _without_mass(assembly, [speed for speed, name in speeds if name in names])
+    if bare and not acting:
+        return StartError(
+            f"its mass is zero, and something without inertia is free to move along {', '.join(names)}: "
+            "a force would accelerate it without bound",
+            where=bare,
+            advice="Give it a mass.",
+        )
     return StartError(
         f"something without inertia is free to move along {', '.join(names)}: "
         "a force would accelerate it without bound" + (f", as {' and '.join(acting)} would" if acting else ""),
@@ -138,6 +148,21 @@ def _part_of(assembly: Assembly, name: str) -> str:
     path = name.rpartition(".")[0]
     head, _, last = path.rpartition(".")
     return head if last in ("position", "velocity", "spin") and head else path
+
+
+def _without_mass(assembly: Assembly, speeds: list[Expression]) -> str:
+    """Return the part without mass that some speeds move, best one that holds nothing; empty if there is none."""
+    equations, found = assembly.own_equations, ""
+    for path, local in assembly.mechanism.locals_.items():
+        masses = [m for one in local.point_inertias for row in one.masses for m in row]
+        masses += [m for one in local.body_inertias for m in (one.mass, one.moment)]
+        nodes = [assembly.mechanism.graph.node_of[path, name] for name in local.connectors]
+        moved = [v for node in nodes for v in equations.kinematics.velocities.get(node, ())]
+        if masses and all(map(is_zero, masses)) and any(depends_on(v, speeds) for v in moved):
+            if not local.constraints:
+                return path
+            found = found or path
+    return found
 
 
 def _acting_on(assembly: Assembly, where: str) -> list[str]:

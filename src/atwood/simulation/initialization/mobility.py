@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, get_args
 
 import numpy as np
@@ -131,12 +132,28 @@ def refuse_immobile(assembly: Assembly, freedom: int, start: Start) -> None:
     found = find_immobile(assembly, freedom, start) if freedom <= 0 and not assembly.modes else None
     if found is None:
         return
+    for path, part in _without_moment(assembly):
+        raise TopologyError(
+            f"it could only turn at {path}, and has no moment of inertia about that place to turn with",
+            where=part,
+            advice="Give it a moment of inertia, or a centre of mass away from the joint.",
+        )
     raise TopologyError(
         found.describe(),
         where=found.freed[0][0] if found.freed else assembly.flat.name,
         advice="Look at the axes and places of the joints; if it is meant as a structure, say structure=True "
         "(on the command line: --structure).",
     )
+
+
+def _without_moment(assembly: Assembly) -> Iterator[tuple[str, str]]:
+    """Yield joints at which a body with mass could turn whose moment of inertia is zero, with a part of the body."""
+    bodies, masses = assembly.mechanism.bodies, assembly.maximal.masses.bodies
+    for joint in assembly.mechanism.graph.joints:
+        for node in (joint.a, joint.b):
+            body = bodies.body_of[node]
+            if joint.turns and body in masses and body not in bodies.oriented:
+                yield joint.part, masses[body].parts[0]
 
 
 _OTHER_KINDS = tuple(kind for kind in get_args(Kind) if kind != "joint")

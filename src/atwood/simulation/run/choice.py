@@ -294,6 +294,8 @@ def describe_choices(choices: Sequence[Choice]) -> str:
     choices
         One after the other.
     """
+    if not choices:
+        return "none: the run ended before one was chosen"
     said = [f"{choices[0].name}: {choices[0].reason}"]
     said += [f"from t = {one.time:.6g} s {one.name}: {one.reason}" for one in choices[1:_SAID]]
     if len(choices) > _SAID:

@@ -87,8 +87,8 @@ class Run:
 
     @property
     def solver(self) -> str:
-        """What solved it, at last: a key of `SOLVERS`."""
-        return self.choices[-1].solver
+        """What solved it, at last: a key of `SOLVERS`; empty where it ended before one was chosen."""
+        return self.choices[-1].solver if self.choices else ""
 
     @property
     def why(self) -> str:

@@ -56,6 +56,8 @@ def why_not_batched(request: SweepRequest) -> str:
         return "on a line, each start says on which side of each other the parts are"
     if options.accuracy is not None:
         return "each run has tolerances for its accuracy"
+    if options.conditions:
+        return "each run stops at a condition"
     if options.max_seconds is not None:
         return "each run has a limit of time"
     if request.has_turns:

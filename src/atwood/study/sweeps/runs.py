@@ -242,7 +242,7 @@ def _simulated(request: SweepRequest, assembly: Assembly) -> tuple[Result, str]:
     samples = 400 if request.has_turns or assembly.level == "index1-projected" else 1
     outputs = 2 if request.only_end else request.times
     options = replace(request.options, outputs=outputs, samples=samples)
-    if options.accuracy is not None:
+    if options.accuracy is not None or options.conditions:
         return solve_as_asked(assembly, options)
     asked = {"max_steps": options.max_steps, "max_seconds": options.max_seconds, "solver": options.solver}
     given: dict[str, Any] = {"rtol": options.relative_tolerance, "outputs": outputs, "samples": samples, **asked}

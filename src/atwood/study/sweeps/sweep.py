@@ -14,13 +14,14 @@ from atwood.arguments import BY_PATH, instance, one_of, optional, takes, whole
 from atwood.errors import AtwoodError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.model.declare.quantities import PATHS
 from atwood.pipeline import SCENE, assembly_of
 from atwood.progress import told
 from atwood.simulation.problem.arguments import (
     ACCURACY,
+    CONDITIONS,
     FORM,
     LEVEL,
     LIMITS,
@@ -33,6 +34,7 @@ from atwood.simulation.problem.arguments import (
     check_span,
     refuse_two_accuracies,
 )
+from atwood.simulation.problem.conditions import condition_functions, conditions_of
 from atwood.simulation.problem.options import RunOptions, sample_times
 from atwood.simulation.run.choice import check_solver
 from atwood.simulation.run.tolerances import allowed
@@ -66,6 +68,7 @@ _TRIALS = 20
     progress=PROGRESS,
     name=NAME,
     accuracy=ACCURACY,
+    until=CONDITIONS,
     **LIMITS,
 )
 def sweep(
@@ -88,6 +91,7 @@ def sweep(
     progress: Callable[[int, int], object] | bool | None = None,
     name: str | None = None,
     accuracy: float | None = None,
+    until: Any = None,
 ) -> Sweep:
     """Run a scene with many values of its parameters and of its start.
 
@@ -127,6 +131,8 @@ def sweep(
     accuracy
         The largest error of the motion of each run, as for `simulate`, in place of `rtol`; `Sweep.messages` says which
         runs did not reach it. Such runs are made one by one, each about four times.
+    until
+        Where each run stops: a condition in words, as for `simulate`, or several. Such runs are made one by one.
 
     Returns
     -------
@@ -148,6 +154,8 @@ def sweep(
     cases = make_cases(source, vary, start, combine)
     first = _first(assembly, cases)
     end = assembly.flat.t_end if t_end is None else float(t_end)
+    stops = conditions_of(until, None)
+    condition_functions(first, stops)  # what cannot be read is told at once
     options = RunOptions(end, rtol, max_steps=max_steps, max_seconds=max_seconds, solver=solver, accuracy=accuracy)
     request = SweepRequest(
         first,
@@ -155,7 +163,7 @@ def sweep(
         expand_paths(first, quantities),
         _times(first, end, outputs),
         outputs is None,
-        allowed(options),
+        allowed(replace(options, conditions=stops)),
     )
     records = Records.empty(request)
     count = _threads(threads)
