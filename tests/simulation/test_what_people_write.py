@@ -61,7 +61,8 @@ def test_a_run_that_ends_before_its_start_has_no_solver(form: str) -> None:
 def test_a_start_in_degrees_without_their_unit_is_doubted() -> None:
     scene = pendulum()
     scene.start["rod.angle"] = 90
-    with pytest.warns(UserWarning, match=r"rod\.angle: the start 90 is taken as radians, 14\.3 turns.*'90 deg'"):
+    said = r"rod\.angle: the start 90 is taken as radians, 14\.3 turns.*'90 deg' or '90 rad'"
+    with pytest.warns(UserWarning, match=said):
         assemble(scene)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -223,7 +223,7 @@ def _number(value: Any, model: Model, key: str, prefix: str) -> float:
     if wanted is not None and wanted.text == "rad" and abs(number) > math.tau and is_typed and not was_text:
         warnings.warn(
             f"{path}: the start {number:g} is taken as radians, {number / math.tau:.3g} turns; "
-            f"if degrees are meant, write '{number:g} deg'",
+            f"write '{number:g} deg' or '{number:g} rad'",
             stacklevel=2,
         )
     return number
