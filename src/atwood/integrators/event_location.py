@@ -9,7 +9,7 @@ The rules, which decide the cases on the edge:
 - arriving at zero exactly is an event; leaving zero is not, nor is touching it;
 - at zero, and up to the rounding of its value, an event has no sign: after a restart there, and after it has happened,
   the sign is the first that is larger than rounding, at times that move away from there by more and more;
-- a change within rounding of a restart belongs to the restart;
+- a change within rounding of a restart belongs to the restart, unless the sign before is handed on to it;
 - events within rounding of each other happen together;
 - a function that passes zero and comes back within a step has passed it: see `atwood.integrators.dips`;
 - what needs no exact time happens at the end of the step in which its sign changed, unless something else does before.
@@ -25,7 +25,7 @@ import numpy as np
 from atwood.codegen.tangents import SECANT
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.dips import Point, find_dip, may_dip
-from atwood.integrators.protocol import FloatArray, ImplicitProblem, Values
+from atwood.integrators.protocol import JUST_HAPPENED, FloatArray, ImplicitProblem, Values
 from atwood.late import dataclass
 
 __all__ = ["EventLocator", "Root", "State"]
@@ -70,6 +70,8 @@ class EventLocator:
         self._rough = [i in problem.event_rough for i in range(problem.event_count)]
         self._moment = 100 * ROUNDING * horizon
         self._signs = [0] * problem.event_count
+        self._given = problem.event_signs  # before the first start
+        self._carried = [False] * problem.event_count  # whether its sign at the start is that before
         self._fired = [False] * problem.event_count
         self._fired_at = -inf
         self._start = -inf
@@ -93,15 +95,32 @@ class EventLocator:
     def restart(self, state: State) -> None:
         """Take the signs from a new start of the solution."""
         t = state[0]
+        is_first, given, self._given = bool(self._given), self._given or self.handed_on(t), ()
         values, noise = self._values(state), self._noise(state, 0.0)
-        again = self._fired if t == self._fired_at else [False] * len(values)
-        self._unsure = [one or abs(v) <= least for one, v, least in zip(again, values, noise, strict=True)]
-        self._origin = [v if one else 0.0 for one, v in zip(again, values, strict=True)]
-        self._signs = [0 if one else _sign(v) for one, v in zip(self._unsure, values, strict=True)]
+        at_zero = [abs(value) <= least for value, least in zip(values, noise, strict=True)]
+        for i, (value, zero, one) in enumerate(zip(values, at_zero, given, strict=True)):
+            self._carried[i] = abs(one) == 1 and (is_first or zero or one * value > 0.0)
+            self._unsure[i] = one == JUST_HAPPENED or (zero and one == 0)
+            self._origin[i] = value if one == JUST_HAPPENED else 0.0
+            self._signs[i] = 0 if self._unsure[i] else one if self._carried[i] else _sign(value)
         self._blind = [-inf] * len(values)
         self._start = t
         self._settling = True
         self._last = None
+
+    def handed_on(self, t: float, ahead: Root | None = None) -> tuple[int, ...]:
+        """Return what a start at a time is to know of each event: its sign, or that it has just happened.
+
+        Parameters
+        ----------
+        t
+            The time.
+        ahead
+            What has been found beyond it, but has not happened yet.
+        """
+        fired = self._fired if t == self._fired_at else [False] * len(self._signs)
+        found = [JUST_HAPPENED if one else sign for one, sign in zip(fired, self._signs, strict=True)]
+        return tuple(found if ahead is None else (-one or sign for one, sign in zip(ahead.events, found, strict=True)))
 
     def search(self, begin: float, end: float, at: Interpolant) -> Root | None:
         """Return the first root between two times of the last step, or `None`.
@@ -214,8 +233,12 @@ class EventLocator:
             self._unsure = [one or other for one, other in zip(together, self._unsure, strict=True)]
             self._origin = [0.0 if one else value for one, value in zip(together, self._origin, strict=True)]
             self._settle(time, at)
-            passed = [one and sign != old for one, sign, old in zip(together, self._signs, known, strict=True)]
-            if any(passed) and time - self._start > moment:
+            is_start = time - self._start <= moment
+            passed = [
+                one and sign != old and (carried or not is_start)
+                for one, sign, old, carried in zip(together, self._signs, known, self._carried, strict=True)
+            ]
+            if any(passed):
                 self._fired, self._fired_at = passed, time
                 return Root(state, tuple(-sign if one else 0 for one, sign in zip(passed, known, strict=True)))
             if after >= end:

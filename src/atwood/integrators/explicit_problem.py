@@ -128,6 +128,9 @@ class ExplicitProblem:
         For each event +1 (rising values only), -1 (falling values only) or 0 (both).  Empty: all 0.
     event_rough
         Numbers of the events whose exact time does not matter: they happen at the end of a step.
+    event_signs
+        The sign that each event had before the start, 0 where it is not known, or
+        `~atwood.integrators.protocol.JUST_HAPPENED`.  Empty: all 0.
     compiled
         ``compiled()``: a compiled form of `rates`.  Each session asks once, and must not share it with another one.
     compiled_events
@@ -145,6 +148,7 @@ class ExplicitProblem:
     event_count: int = 0
     event_directions: tuple[int, ...] = ()
     event_rough: tuple[int, ...] = ()
+    event_signs: tuple[int, ...] = ()
     compiled: Callable[[], CompiledRates] | None = None
     compiled_events: Callable[[], CompiledEvents | None] | None = None
     project: Callable[[float, FloatArray], Values] | None = None

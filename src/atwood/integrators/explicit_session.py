@@ -228,6 +228,11 @@ class ExplicitSession:
         )
 
     @property
+    def handed_on(self) -> tuple[int, ...]:
+        """What a start from here is to know of the events; see `EventLocator.handed_on`."""
+        return () if self._locator is None else self._locator.handed_on(self._here[0], self._root)
+
+    @property
     def here(self) -> StepResult:
         """The state that was handed out last."""
         return StepResult(*_copied(self._here), Status.REACHED, self._no_events)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from atwood.linalg.fixed_pivots import FixedPivots
 
 __all__ = [
+    "JUST_HAPPENED",
     "Budget",
     "ChoosePivots",
     "FloatArray",
@@ -59,6 +60,10 @@ SPARSE_DENSITY = 0.15
 """The largest share of entries that are not zero for which it pays."""
 
 
+JUST_HAPPENED = 2
+"""What is given in place of the sign of an event that a run starts after."""
+
+
 @dataclass(frozen=True, eq=False)
 class ImplicitProblem:
     """The equations ``F(t, y, y') = 0`` of one mode.
@@ -87,6 +92,8 @@ class ImplicitProblem:
         For each event +1 (rising values only), -1 (falling values only) or 0 (both).  Empty: all 0.
     event_rough
         Numbers of the events whose exact time does not matter: they happen at the end of a step.
+    event_signs
+        The sign that each event had before the start, 0 where it is not known, or `JUST_HAPPENED`.  Empty: all 0.
     native
         ``native(linear_solver)``: compiled forms of the residual and the Jacobian for a matrix that is dense, sparse,
         or one column with all entries.  Each session asks once, and must not share its answer with
@@ -107,6 +114,7 @@ class ImplicitProblem:
     event_count: int = 0
     event_directions: tuple[int, ...] = ()
     event_rough: tuple[int, ...] = ()
+    event_signs: tuple[int, ...] = ()
     native: Callable[[LinearSolver], NativeCallbacks] | None = None
     pivots: ChoosePivots | None = None
     begin: Callable[[float, FloatArray, FloatArray], None] | None = None

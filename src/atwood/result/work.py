@@ -114,7 +114,7 @@ def integral_in_steps(times: FloatArray, values: FloatArray) -> tuple[FloatArray
     # Gauss' rule errs by the term of twice the order, which follows if the coefficients fall evenly.
     fall = np.divide(last, sizes, out=np.zeros_like(last), where=sizes > 0.0) ** (2.0 * count / (count - 1.0))
     done = np.cumsum(half * (values @ weights), axis=-1)
-    return np.concatenate([np.zeros_like(done[..., :1]), done], axis=-1), (sizes * fall) @ half
+    return np.concatenate([np.zeros((*done.shape[:-1], 1)), done], axis=-1), (sizes * fall) @ half
 
 
 def find_ledger(

@@ -150,6 +150,11 @@ class NativeSession:
         )
 
     @property
+    def handed_on(self) -> tuple[int, ...]:
+        """What a start from here is to know of the events; see `EventLocator.handed_on`."""
+        return () if self._locator is None else self._locator.handed_on(self._here[0], self._root)
+
+    @property
     def counts(self) -> Counts:
         """What IDA has counted since its last start, with the order and the size of the last step."""
         self._check_open()

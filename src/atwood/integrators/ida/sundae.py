@@ -144,6 +144,11 @@ class SundaeSession:
             seconds=self._seconds,
         )
 
+    @property
+    def handed_on(self) -> tuple[int, ...]:
+        """What a start from here is to know of the events; see `EventLocator.handed_on`."""
+        return () if self._locator is None else self._locator.handed_on(self._here[0], self._root)
+
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray) -> None:
         """Go on from another consistent state, after an event, a change of mode, or a projection."""
         self._set_start(t, y, yp)

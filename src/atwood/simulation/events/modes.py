@@ -17,7 +17,7 @@ from atwood.forms.kept import Key
 from atwood.forms.quantities import known_program
 from atwood.integrators.protocol import StepResult
 from atwood.late import dataclass
-from atwood.mechanics.outputs.event_functions import EventFunction, list_event_functions
+from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
     switch_functions,
@@ -138,6 +138,11 @@ class EventProbe:
         has just gone slack, happens only when it has passed zero by as much; else errors of a step would set it off.
     conditions
         What the run looks for besides.
+
+    Attributes
+    ----------
+    handed
+        What the session before, in the same mode, hands on; see `EventLocator.handed_on`.
     """
 
     def __init__(
@@ -150,6 +155,7 @@ class EventProbe:
         conditions: tuple[Condition, ...] = (),
     ) -> None:
         self.plan, self._conditions = plan, conditions
+        self.handed: tuple[int, ...] = ()
         self.assembly = assembly = plan.assembly
         self.event_functions = (*condition_functions(assembly, conditions), *find_event_functions(assembly))
         self.needs = assembly.shared.get(_NEEDS, lambda: _find_needs(assembly, self.event_functions), conditions)
@@ -165,7 +171,13 @@ class EventProbe:
         self.shift = np.zeros(len(small))
         values = np.asarray(self.values(t, q, u)) if self.event_functions else np.zeros(0)
         happened, self.shift = margins_at_start(self.event_functions, values, small)
+        self._sides = np.where(np.abs(values) > small, np.sign(values), 0.0)
         self.broken = next((one for one, has in zip(self.event_functions, happened, strict=True) if has), None)
+
+    def follow(self, handed: tuple[int, ...]) -> None:
+        """Take what the session before hands on; an event whose value has jumped has the sign that it has now."""
+        found = zip(handed, self._sides.tolist(), strict=bool(handed))
+        self.handed = tuple(0 if abs(sign) == 1 and sign * side < 0.0 else sign for sign, side in found)
 
     @property
     def directions(self) -> tuple[int, ...]:
@@ -264,9 +276,10 @@ class EventProbe:
             found.append((high, function))
         return self._record(*min(found, key=lambda one: one[0])) if found else None
 
-    def name(self, step: StepResult) -> EventRecord | None:
-        """Return what happened when the driver reports an event, and does not go on as before; None if it does."""
-        return next((self._record(step.t, one) for one in self._fired(step) if one.target), None)
+    def changing(self, step: StepResult) -> list[EventRecord]:
+        """Return what changes something when the driver reports events: the first, and further updates of states."""
+        found = [self._record(step.t, one) for one in self._fired(step) if one.target]
+        return [one for i, one in enumerate(found) if i == 0 or one.target == UPDATE]
 
     def noted(self, step: StepResult) -> list[EventRecord]:
         """Return what changes nothing among what the driver reports."""

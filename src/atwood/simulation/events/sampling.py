@@ -329,7 +329,7 @@ def _bound(assembly: Assembly, path: str, t: float) -> Any:
 
 
 def _times(one: _Update, assembly: Assembly, start: float, end: float) -> list[float]:
-    """Return when an update is due; not at the very end of a run, at which values are those before it."""
+    """Return when an update is due; pieces of functions of time do not begin at the very end of a run."""
     if one.law.options.when:
         given = np.array([start, *getattr(_bound(assembly, one.path, start), one.law.options.when)()], dtype=float)
         return [float(t) for t in np.unique(given) if start <= t < end - _ROUNDING * np.spacing(abs(end))]
@@ -342,8 +342,7 @@ def _times(one: _Update, assembly: Assembly, start: float, end: float) -> list[f
         )
     count = max(0, int(np.ceil(span / one.every)) + 1)
     times = start + (one.offset + one.every * np.arange(count))
-    last = end - _ROUNDING * np.spacing(abs(end))
-    return [float(t) for t in times[times < last]]
+    return [min(float(t), end) for t in times if t <= end + _ROUNDING * np.spacing(abs(end))]
 
 
 def _snapped(times: FloatArray, moments: FloatArray) -> FloatArray:

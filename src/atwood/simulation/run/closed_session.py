@@ -87,6 +87,11 @@ class ClosedLoopSession:
         return self._before + self._session.statistics
 
     @property
+    def handed_on(self) -> tuple[int, ...]:
+        """What a start from here is to know of the events of parts."""
+        return self._session.handed_on[: self._count]
+
+    @property
     def states(self) -> int:
         """How many unknowns are integrated at present."""
         loops = self._solved.form.loops
@@ -192,8 +197,10 @@ class ClosedLoopSession:
         # Choices change at the end of a step, and not within it, where a state is known less well.
         first = len(probe.directions)
         ends = (*range(first, first + margins), *range(first + 2 * margins, len(directions)))
+        own = self.handed_on if self._before.steps else probe.handed
+        signs = (*own, *(0 for _ in directions[first:])) if own else ()
         guard = request.guard(self._solver, (solved.form, solved.values))
-        problem = replace(problem, event_rough=(*probe.rough, *ends), guard=guard)
+        problem = replace(problem, event_rough=(*probe.rough, *ends), event_signs=signs, guard=guard)
         self._events = None
         if directions and problem.compiled is not None:
             problem = self._with_compiled(problem, solved, shifts)

@@ -71,6 +71,10 @@ class Outcome:
         What went wrong, where that names a part.
     noted
         Events on the way that change nothing.
+    together
+        Further events at the end that change states.
+    handed
+        What the next stretch in this mode is to know of the events.
     """
 
     t: float
@@ -81,6 +85,8 @@ class Outcome:
     event: EventRecord | None = None
     error: SolveError | None = None
     noted: tuple[EventRecord, ...] = ()
+    together: tuple[EventRecord, ...] = ()
+    handed: tuple[int, ...] = ()
 
 
 def shortest_mode(plan: Plan, options: RunOptions, began: float) -> float:

@@ -147,12 +147,11 @@ class _Walk:
         self._schedules: dict[Shared, Schedule] = {}
         self._plans: dict[tuple[tuple[float, ...], tuple[float, ...] | None], Plan] = {}
         self._kept = KeptSession()
-        self._piece_start = start.time
         self.segments: list[SegmentRecord] = []
         self.events: list[EventRecord] = []
         self.choices: list[Choice] = []
         self.statistics = Statistics(error_test_failures=0, convergence_failures=0)
-        self.t = start.time
+        self.t = self._piece_start = start.time
         self.assembly, self.q, self.u = settle(assembly, start, reassemble)
         self.held = self.assembly.held_at_start
         self.sampler = find_sampler(self.assembly, start.time, options.t_end, samples.own)
@@ -160,6 +159,7 @@ class _Walk:
         self.assembly = self.first = self._in_piece(self.assembly)
         self.coordinate_switches: list[CoordinateSwitch] = []
         self.impact, self.show = False, bool(samples.shown[0])
+        self._handed: tuple[int, ...] = ()
         self.plan: Plan | None = None
         self.ended: EventRecord | None = None
         self.probe: EventProbe | None = None
@@ -189,26 +189,26 @@ class _Walk:
         while True:
             before = self.t
             recorder, outcome = self._segment()
-            self.t = outcome.t
+            self.t, self._handed = outcome.t, outcome.handed
             self.events += outcome.noted
             is_short = outcome.t - before < shortest_mode(recorder.plan, self.options, self.start.time)
             chatter = chatter + 1 if is_short else 0
             if outcome.event is None:
-                if outcome.status == "finished" and outcome.t < self.options.t_end:
+                if outcome.status == "finished" and (outcome.t < self.options.t_end or self._due()):
                     _, self.q, self.u, _ = recorder.last()
                     self.impact, chatter = False, 0
                     continue
                 return self._made(outcome.status, outcome.message, outcome)
             is_switch = outcome.event.target == COORDINATE_SWITCH
             if not is_switch:
-                self.events.append(outcome.event)
+                self.events += (outcome.event, *outcome.together)
             if outcome.event.target == "stop":
                 return self._made("stopped", outcome.event.describe(), outcome)
             if chatter > _CHATTER:
                 endless = f"{outcome.event.part} changes its mode endlessly at t = {self.t:.9g}"
                 return self._made("failed", endless, outcome)
-            self._switch_coordinates(outcome.event, recorder) if is_switch else self._enter(outcome.event, recorder)
-            if self.t >= self.options.t_end:
+            self._switch_coordinates(outcome.event, recorder) if is_switch else self._enter(outcome, recorder)
+            if self.t >= self.options.t_end and outcome.event.target != UPDATE:
                 return self._made("finished", "", outcome)
 
     def _segment(self) -> tuple[Recorder, Outcome]:
@@ -218,8 +218,7 @@ class _Walk:
         after_time_event = schedule.piece(self.t) != schedule.piece(self._piece_start)
         if after_time_event:
             self._pass_time_event()
-        due = self.sampler.due_at(self.t) if self.t > self._sampled else ()
-        if due:
+        if due := self._due():
             after_time_event = True
             self._sampled = self.t
             self._update(due)
@@ -232,7 +231,7 @@ class _Walk:
         assert self.probe is not None
         limit = min(schedule.next(t, options.t_end), self.sampler.next(t, options.t_end))
         ahead = self.samples.until(t, limit)
-        if limit < options.t_end:  # the state just after it is shown
+        if limit < options.t_end or (t < limit and self.sampler.due_at(limit)):  # the state just after it is shown
             ahead = ahead.without_last_shown()
         segment = Segment(self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics, self._kept)
         recorder = Recorder(self.plan)
@@ -249,6 +248,10 @@ class _Walk:
         self.choice = outcome.choices[-1]
         return recorder, outcome
 
+    def _due(self) -> tuple[int, ...]:
+        """Return which updates are still to be made now."""
+        return self.sampler.due_at(self.t) if self.t > self._sampled else ()
+
     def prepare(self) -> None:
         """Make all that is needed in the present mode, and between two time events, if it is not there."""
         with stage("preparation"):
@@ -262,12 +265,13 @@ class _Walk:
             has_states = bool(plan.assembly.own_equations.states or self.sampler.updates)
             if not self.segments and not options.structure and not has_states:
                 refuse_immobile(self.assembly, len(plan.assembly.own_equations.speeds) - plan.finding.rank, self.start)
-            self._plans, self.probe = {}, None
+            self._plans, self.probe, self._handed = {}, None, ()
             self.choice = choose(plan, options, t, q, u)
         self._plans.setdefault(self._piece, plan)
         if self.probe is None:
             self.probe = EventProbe(plan, t, q, u, options.relative_tolerance, options.conditions)
         self.plan = plan
+        self.probe.follow(self._handed)
 
     def _plan(self) -> Plan:
         """Return the plan of a mode from the present state; if a law has no value there, it is named."""
@@ -306,10 +310,7 @@ class _Walk:
         return self.assembly.relation_values, self.assembly.held
 
     def _reassemble(
-        self,
-        modes: Mapping[str, str],
-        line_signs: Mapping[tuple[str, str, str], float],
-        orientation: Orientation,
+        self, modes: Mapping[str, str], line_signs: Mapping[tuple[str, str, str], float], orientation: Orientation
     ) -> Assembly:
         return self._in_piece(self._other(modes, line_signs, orientation))
 
@@ -365,22 +366,22 @@ class _Walk:
         self.plan, self.impact, self.show = None, False, False
         self.coordinate_switches.append(CoordinateSwitch(self.t, event.part))
 
-    def _enter(self, event: EventRecord, recorder: Recorder) -> None:
-        """Enter the mode that an event leads to."""
+    def _enter(self, outcome: Outcome, recorder: Recorder) -> None:
+        """Enter the mode that an event leads to; states change by all events that happen together."""
         _, q, u, _ = recorder.last()
+        event = outcome.event
+        assert event is not None
         self.impact, self.show = event.impact, True
         if event.target == UPDATE:
             self.q, self.u = q, u
         else:
             from atwood.simulation.events.mode_change import enter_mode
 
-            self.assembly, self.q, self.u = enter_mode(
-                (self.t, q, u), self.assembly, event, self._reassemble, self.start.length
-            )
+            state = self.t, q, u
+            self.assembly, self.q, self.u = enter_mode(state, self.assembly, event, self._reassemble, self.start.length)
             self.plan = None
-        due = self.sampler.due_after(event.part, event.law)
-        if due:
-            self._update(due)
+        if due := {i for one in (event, *outcome.together) for i in self.sampler.due_after(one.part, one.law)}:
+            self._update(sorted(due))
 
     def _made(self, status: str, message: str, outcome: Outcome) -> Run:
         """Return the run, or raise with it what made it fail."""

@@ -64,6 +64,8 @@ def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u
     already = segment.probe.broken_at_start(t)
     if already is not None:
         return Outcome(t, "event", "", Statistics(), (segment.choice,), already)
+    if t >= segment.end:  # what has changed at the end of the run is shown
+        return Outcome(t, "finished", "", Statistics(), (segment.choice,))
     if n == 0:
         from atwood.simulation.run.nothing_free import follow
 
@@ -159,7 +161,12 @@ class _Runner:
             self._cost(),
             tuple(self.choices),
             noted=tuple(self.noted),
+            handed=self._handed_on(),
         )
+
+    def _handed_on(self) -> tuple[int, ...]:
+        """Return what a start from here is to know of the events."""
+        return cast("tuple[int, ...]", getattr(self.session, "handed_on", ()))
 
     def _cost(self) -> Statistics:
         cost = self.before if self.session is None else self.before + self.session.statistics
@@ -177,8 +184,7 @@ class _Runner:
             probe, split = self.segment.probe, self.segment.plan.program.split
             step_result = without_margin(lambda t, y: probe.values(t, *split(y)), probe.shift, step_result, self.began)
             self.recorder.rewind(step_result.t)
-            event = self.segment.probe.name(step_result)
-            assert event is not None, "what changes nothing has been noted"
+            event, *together = self.segment.probe.changing(step_result)
             if event.target != COORDINATE_SWITCH:
                 self.recorder.take(step_result.t, step_result.y, True)
             elif step_result.t > self.recorder.end:
@@ -188,7 +194,7 @@ class _Runner:
                     step_result.y,
                     bool(np.any(segment.samples.shown[segment.samples.times == step_result.t])),
                 )
-            return replace(self._ended(step_result.t, "event", ""), event=event)
+            return replace(self._ended(step_result.t, "event", ""), event=event, together=tuple(together))
         if step_result.t > self.recorder.end:
             self.recorder.take(step_result.t, step_result.y, True)
         if step_result.status is Status.TIME_LIMIT:
@@ -205,7 +211,7 @@ class _Runner:
             return False
         noted = self.segment.probe.noted(step_result)
         self.noted += noted
-        if self.segment.probe.name(step_result) is not None:
+        if self.segment.probe.changing(step_result):
             return False
         if noted:
             self.recorder.take(step_result.t, step_result.y, True)
@@ -296,6 +302,7 @@ class _Runner:
 
     def _change_solver(self, step_result: StepResult) -> tuple[float, FloatArray, FloatArray]:
         """Return the state from which another solver goes on."""
+        self.segment.probe.handed = self._handed_on()
         self.before, self.session = self._cost(), None
         self.choices[-1] = replace(self.choices[-1], time=step_result.t)
         plan = self.segment.plan
@@ -492,6 +499,7 @@ class _Runner:
         q, u = (part.copy() for part in plan.program.split(step_result.y))
         if plan.is_projected:
             q, u = project_safely(plan, step_result.t, q, u)
+        self.segment.probe.handed = self._handed_on()
         self.before, self.session = self._cost(), None
         plan.keep(finding, step_result.t, q)
         return self._open(step_result.t, *self._packed(step_result.t, q, u))

@@ -123,7 +123,8 @@ def open_implicit_session(
 
 def _implicit_problem(request: SolverRequest) -> ImplicitProblem:
     probe = request.probe
-    return replace(request.plan.problem(probe.function(), probe.directions), event_rough=probe.rough)
+    problem = request.plan.problem(probe.function(), probe.directions)
+    return replace(problem, event_rough=probe.rough, event_signs=probe.handed)
 
 
 def _guarded(problem: ImplicitProblem, request: SolverRequest, solver: str) -> ImplicitProblem:
@@ -344,7 +345,7 @@ def _explicit_problem(request: SolverRequest, solver: str) -> ExplicitProblem:
 def _watched(request: SolverRequest, problem: ExplicitProblem, solver: str) -> ExplicitProblem:
     """Return a problem with what judges its steps, whose events are machine code too, if they can be."""
     probe = request.probe
-    problem = replace(problem, event_rough=probe.rough, guard=request.guard(solver))
+    problem = replace(problem, event_rough=probe.rough, event_signs=probe.handed, guard=request.guard(solver))
     found = None if problem.events is None else probe.compiled(for_ida=False)
     if found is None:
         return problem
