@@ -103,6 +103,9 @@ def _joint_at(full: str, beside: Mapping[str, list[str]], offered: Mapping[str, 
         )
     if not joints:
         raise ConnectError(
-            "it is connected to no joint", where=full, advice="Connect it to one that a joint offers, like hinge.shaft."
+            "it is connected to no joint",
+            where=full,
+            advice="Connect it to one that a joint offers, like hinge.shaft; between a gear and a spring that may be a "
+            "joint without inertia.",
         )
     return offered[joints[0]]
