@@ -373,8 +373,17 @@ class Buffer(Component):
         return 0.5 * self.stiffness * beyond * beyond
 
 
-def test_laws_that_switch_with_the_motion_are_refused() -> None:
-    scene = cart(("buffer", Buffer()))
+class Contact(Buffer):
+    """Pushes back as balls do, of which there is no value before they touch."""
+
+    @potential
+    def stored(self) -> Scalar:
+        """Return what is stored beyond the gap."""
+        return 0.4 * self.stiffness * ex.maximum(self.point.position[0] - 0.3, 0.0) ** 2.5
+
+
+def test_laws_that_switch_with_the_motion_are_refused_where_they_have_no_value_behind() -> None:
+    scene = cart(("buffer", Contact()))
     scene.connect(scene["cart"].point, scene["buffer"].point)
     scene.start["cart.velocity.x"] = 1.0
     with pytest.raises(UnsupportedError, match="switches with the motion") as refused:

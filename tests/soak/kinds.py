@@ -20,6 +20,7 @@ KINDS = {
     "scenes": "scenes",
     "tables": "tables",
     "metamorphic": "metamorphic",
+    "switches": "switches",
     "memory": "memory",
 }
 """Name of a kind and its module, whose `check(seed)` makes a trial."""

@@ -42,6 +42,7 @@ from atwood.topology.orientation_coordinates import Orientation
 
 if TYPE_CHECKING:
     from atwood.codegen.llvm.columns import ColumnKernel, ColumnProgram
+    from atwood.forms.sides.taken_out import Sides
 
 __all__ = ["Assembly", "FormName"]
 
@@ -72,10 +73,8 @@ class Assembly:
         The scene as leaves and connections.
     mechanism
         Its nodes, bodies and laws.
-    form
-        ``"reduced"`` or ``"dae"``.
-    level
-        Level of the dae form; empty for the reduced form.
+    form, level
+        ``"reduced"`` or ``"dae"``, and the level of the latter; empty for the reduced form.
     modes
         Mode of each part that has modes.
     source
@@ -86,12 +85,12 @@ class Assembly:
         What all assemblies of this structure share: equations, programs and their code.
     orientation
         In which coordinates the reduced form has orientations in space.
-    given_relations
-        See `relation_values`; None for those that hold just after the scene's start.
-    held
-        Values of the discrete states of its parts; None for those that the parts declare.
+    given_relations, held
+        Values of `relations`, and of the discrete states of its parts; None for those that hold just after the start.
     given_values
         Values of the parameters from sample to sample, shape (parameters, samples); None for those of the mechanism.
+    sides, side_values
+        In a run, the relations of what moves that are parameters, and their values in a piece of the motion.
     kept
         What was made with these values: where it starts, for one.
     """
@@ -108,6 +107,8 @@ class Assembly:
     given_relations: tuple[float, ...] | None = None
     held: tuple[float, ...] | None = None
     given_values: FloatArray | None = None
+    sides: Sides | None = None
+    side_values: tuple[float, ...] = ()
     kept: Kept = field(default_factory=Kept, init=False, repr=False)
     _kernels: dict[tuple[Program, bool], BoundKernel] = field(default_factory=dict, init=False, repr=False)
     _columns: dict[Program, ColumnKernel] = field(default_factory=dict, init=False, repr=False)
@@ -231,15 +232,15 @@ class Assembly:
     @cached_property
     def parameters(self) -> tuple[Expression, ...]:
         """The symbols of the parameters: discrete states after the scene's own, relations of functions of time last."""
-        held = (one.symbol for one in self.discrete_states)
-        return (*self.mechanism.table.values, *held, *(one.symbol for one in self.relations))
+        own = *(one.symbol for one in self.discrete_states), *(() if self.sides is None else self.sides.symbols)
+        return (*self.mechanism.table.values, *own, *(one.symbol for one in self.relations))
 
     @cached_property
     def parameter_values(self) -> FloatArray:
         """The values of the parameters."""
         if self.given_values is not None:
             return self.given_values
-        held = self.held_at_start if self.held is None else self.held
+        held = *(self.held_at_start if self.held is None else self.held), *self.side_values
         return np.array([*self.mechanism.table.values.values(), *held, *self.relation_values], dtype=float)
 
     @takes(values=optional(BY_PATH), start=optional(BY_PATH), guess=optional(BY_PATH))

@@ -195,7 +195,7 @@ def _make(assembly: Assembly) -> CanonicalPrograms:
     equations = assembly.reduced
     found = lagrangian_along_speeds(assembly, equations)
     _refuse(assembly, found)
-    (lagrangian,) = as_by_hand(equations, assembly.parameters, [found.lagrangian])
+    (lagrangian,) = as_by_hand(equations, assembly.parameters, _in_pieces(assembly, found.lagrangian))
     terms = _Terms(
         found.time,
         found.coordinates,
@@ -209,6 +209,10 @@ def _make(assembly: Assembly) -> CanonicalPrograms:
     return _hamilton(terms, assembly.flat.name, assembly.parameters)
 
 
+def _in_pieces(assembly: Assembly, lagrangian: Expression) -> list[Expression]:
+    return [lagrangian] if assembly.sides is None else assembly.sides.taken_out([lagrangian])
+
+
 def _make_closed(assembly: Assembly, form: ClosedForm) -> CanonicalPrograms:
     found, free = lagrangian_along_speeds(assembly, assembly.reduced), form.loops.independent
     _refuse(assembly, found, loops_are_solved=True)
@@ -217,7 +221,7 @@ def _make_closed(assembly: Assembly, form: ClosedForm) -> CanonicalPrograms:
         raise UnsupportedError(what, where=assembly.flat.name, advice="Use the solver 'explicit' or 'ida'.")
     q, u = found.coordinates, found.velocities
     dependent = [one for values in (q, u) for i, one in enumerate(values) if i not in free]
-    (lagrangian,) = in_terms_of_independent(form, [found.lagrangian])
+    (lagrangian,) = in_terms_of_independent(form, _in_pieces(assembly, found.lagrangian))
     if depends_on(lagrangian, dependent):
         what = "an energy reads an angle of its loops otherwise than by sine and cosine"
         raise UnsupportedError(what, where=assembly.flat.name, advice="Use the solver 'explicit' or 'ida'.")

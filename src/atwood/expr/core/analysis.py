@@ -119,7 +119,9 @@ def count_operations(outputs: Sequence[Expression | float], parameters: Collecti
 
 
 def substitute(
-    outputs: Sequence[Expression | float], mapping: Mapping[Expression, Expression | float]
+    outputs: Sequence[Expression | float],
+    mapping: Mapping[Expression, Expression | float],
+    again: Iterable[Expression] = (),
 ) -> list[Expression]:
     """Replace expressions by others and simplify what follows from it.
 
@@ -129,6 +131,8 @@ def substitute(
         The expressions to rewrite.
     mapping
         What to replace, usually symbols, and by what.  All replacements happen at once.
+    again
+        What is to be made again, although nothing in it is replaced.
     """
     if not outputs:
         return []
@@ -137,7 +141,7 @@ def substitute(
     if len(mapping) > len(nodes):  # one part of a large scene
         mapping = {node: mapping[node] for node in nodes if node in mapping}
     replaced = {old.index: graph.convert(new) for old, new in mapping.items()}
-    touched = dependents(nodes, mapping)
+    touched = dependents(nodes, [*mapping, *again])
     unknowns: dict[int, list[Expression]] = {}
     for node in nodes:
         index = node.index

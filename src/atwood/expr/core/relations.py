@@ -9,21 +9,21 @@ That is what Modelica calls a time event (Modelica Language Specification, secti
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
 
 from atwood.expr.core import algebra
-from atwood.expr.core.analysis import evaluate, live
+from atwood.expr.core.analysis import evaluate, live, substitute
 from atwood.expr.core.derivatives import jvp
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.intervals import bounds
 
-__all__ = ["Relation", "TimeRelations", "relation_value", "values_just_after"]
+__all__ = ["MotionRelations", "Relation", "TimeRelations", "relation_value", "values_just_after"]
 
-_KNOWN, _TIMED, _MOVING = 0, 1, 2
+_KNOWN, _TIMED, _MOVING, _OTHER = 0, 1, 2, 3
 
 _ORDERS = 6
 """So many derivatives say on which side of zero a function is just after it was there."""
@@ -65,11 +65,15 @@ class TimeRelations:
         The relations, each after those that it reads.
     """
 
+    what = "relation"
+    """Names its symbols."""
+
     def __init__(self, time: Expression) -> None:
         self.time = time
         self.found: list[Relation] = []
         self._symbols: dict[tuple[str, Expression], Expression] = {}
         self._kinds: dict[int, int] = {time.index: _TIMED}
+        self._else = _MOVING
         self._is_reading = False
 
     @contextmanager
@@ -116,7 +120,7 @@ class TimeRelations:
             graph, zero = difference.graph, difference
             if kind == "floor":
                 zero = algebra.unary("sin", algebra.multiply(graph.constant(math.pi), difference))
-            symbol = graph.symbol(f"relation {len(self.found)}")
+            symbol = graph.symbol(f"{self.what} {len(self.found)}")
             # Making nodes may end with `TimeIsUp`: so it is known only once it is found, too.
             self._symbols[key] = symbol
             self._kinds[symbol.index] = _TIMED
@@ -130,12 +134,98 @@ class TimeRelations:
             node = stack[-1]
             waiting = [one for one in node.arguments if one.index not in kinds]
             if node.index not in kinds and not waiting:
-                own = _MOVING if node.is_symbol and not node.is_parametric else _KNOWN
+                own = self._else if node.is_symbol and not node.is_parametric else _KNOWN
                 kinds[node.index] = max((kinds[one.index] for one in node.arguments), default=own)
             if not waiting:
                 stack.pop()
             stack += waiting
         return kinds[expression.index]
+
+
+class MotionRelations(TimeRelations):
+    """The relations of what moves that equations have, taken out while the equations are written anew.
+
+    Each keeps its value in a piece of the motion, until its difference passes zero. What depends on accelerations or
+    multipliers is left as it stands.
+
+    Parameters
+    ----------
+    relations
+        Those of functions of time alone.
+    moving
+        The symbols of coordinates and speeds in whose terms differences are wanted.
+    left
+        Numbers of the relations that stay in the laws.
+    layered
+        Whether a sign that stays changes within a layer: its symbol is then one over the layer's width.
+    """
+
+    what = "side"
+
+    def __init__(
+        self,
+        relations: TimeRelations,
+        moving: Iterable[Expression],
+        left: Collection[int] = (),
+        layered: bool = False,
+    ) -> None:
+        super().__init__(relations.time)
+        self._before, self._else = relations, _OTHER
+        self._kinds |= {one.index: _TIMED for one in relations.symbols}
+        self._kinds |= {one.index: _MOVING for one in moving}
+        self._left, self._layered = left, layered
+        self._places: Mapping[Expression, Expression] = {}
+        self._is_closed = False
+
+    def are_timed(self, *expressions: Expression | None) -> bool:
+        """Return whether expressions depend on coordinates or speeds."""
+        return max(self._kind(one) for one in expressions if one is not None) == _MOVING
+
+    def take(self, kind: str, difference: Expression) -> Expression:
+        """Return what stands for a relation; on which side equal numbers are is decided by what comes after."""
+        if kind == "nonzero":  # of numbers that are no conditions, and are hardly ever zero
+            return difference
+        kind, graph = "less" if kind == "less_equal" else kind, difference.graph
+        (placed,) = substitute([difference], self._places) if self._places else (difference,)
+        as_it_stands = graph.node(kind, (difference, graph.zero) if kind == "less" else (difference,))
+        if self._is_closed and (kind, placed) not in self._symbols:
+            return as_it_stands
+        symbol = super().take(kind, placed)
+        if symbol.is_constant or int(symbol.name.split()[1]) not in self._left:
+            return symbol
+        if kind == "sign" and self._layered:
+            inner = graph.node("minimum", (algebra.multiply(difference, symbol), graph.one))
+            return graph.node("maximum", (inner, algebra.negate(graph.one)))
+        return as_it_stands
+
+    def taken_out(
+        self, values: Sequence[Expression], places: Mapping[Expression, Expression], is_closed: bool = False
+    ) -> list[Expression]:
+        """Return expressions with what stands for their relations.
+
+        Parameters
+        ----------
+        values
+            The expressions.
+        places
+            The coordinates and speeds that they are in, in terms of those of which differences are to be; empty where
+            they are the same.
+        is_closed
+            Whether relations that have not been found yet stay as they are.
+        """
+        self._kinds |= {one.index: _MOVING for one in places}
+        graph, again = self.time.graph, [one for one in live(values) if one.operation in _COMPARING]
+        again = [one for one in again if self.are_timed(*one.arguments)]
+        if not again:
+            return list(values)
+        self._places, self._is_closed, graph.relations = places, is_closed, self
+        try:
+            return substitute(values, {}, again)
+        finally:
+            graph.relations = self._before
+
+
+_COMPARING = frozenset({"less", "less_equal", "sign", "absolute", "minimum", "maximum", "floor"})
 
 
 def relation_value(kind: str, difference: float) -> float:

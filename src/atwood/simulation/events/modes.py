@@ -23,6 +23,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     switch_functions,
 )
 from atwood.simulation.dynamics.reactions import ReactionSolver
+from atwood.simulation.events.sides import SIDE, side_functions
 from atwood.simulation.problem.conditions import Condition, condition_functions
 from atwood.simulation.problem.problem import Plan
 
@@ -74,6 +75,7 @@ def find_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
         _EVENT_FUNCTIONS,
         lambda: (
             *list_event_functions(assembly.mechanism, assembly.own_equations, assembly.reactions, assembly.modes),
+            *side_functions(assembly),
             *switch_functions(assembly.own_equations),  # last: of what happens at the same time, the others come first
         ),
     )
@@ -97,6 +99,9 @@ def _find_needs(assembly: Assembly, event_functions: Sequence[EventFunction]) ->
 
 MARGIN = 10.0
 """What starts at zero must pass it by so many tolerances, lest errors of a step set it off."""
+
+_TINY = 1e-300
+"""Makes zero positive."""
 
 _PASSED = 0.9
 """What has passed zero by this share of its margin at the start of a mode happens there.
@@ -172,12 +177,22 @@ class EventProbe:
         values = np.asarray(self.values(t, q, u)) if self.event_functions else np.zeros(0)
         happened, self.shift = margins_at_start(self.event_functions, values, small)
         self._sides = np.where(np.abs(values) > small, np.sign(values), 0.0)
+        sided = np.array([one.target == SIDE for one in self.event_functions], dtype=np.bool_)
+        # What has just passed zero, or will soon, is off by rounding.
+        self.shift = np.where(sided & (values <= 0.0), 2.0 * np.abs(values) + _TINY, self.shift)
         self.broken = next((one for one, has in zip(self.event_functions, happened, strict=True) if has), None)
 
     def follow(self, handed: tuple[int, ...]) -> None:
-        """Take what the session before hands on; an event whose value has jumped has the sign that it has now."""
-        found = zip(handed, self._sides.tolist(), strict=bool(handed))
-        self.handed = tuple(0 if abs(sign) == 1 and sign * side < 0.0 else sign for sign, side in found)
+        """Take what the session before hands on; an event whose value has jumped has the sign that it has now.
+
+        Relations of what moves are read anew: where one has changed, its difference begins at zero.
+        """
+        if len(handed) != len(self.event_functions):  # other relations are watched from here on
+            handed = (0,) * len(self.event_functions) if handed else ()
+        found = zip(handed, self._sides.tolist(), self.event_functions, strict=bool(handed))
+        self.handed = tuple(
+            0 if one.target == SIDE or (abs(sign) == 1 and sign * side < 0.0) else sign for sign, side, one in found
+        )
 
     @property
     def directions(self) -> tuple[int, ...]:
@@ -284,6 +299,10 @@ class EventProbe:
     def noted(self, step: StepResult) -> list[EventRecord]:
         """Return what changes nothing among what the driver reports."""
         return [self._record(step.t, one) for one in self._fired(step) if not one.target]
+
+    def changed_sides(self, step: StepResult) -> tuple[int, ...]:
+        """Return the numbers of the relations of what moves that change where the driver stopped."""
+        return tuple(int(one.law) for one in self._fired(step) if one.target == SIDE)
 
     def _fired(self, step: StepResult) -> list[EventFunction]:
         """Return what the driver reports, without zeros that do not count."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.errors import KernelEvaluationError, StartError
+from atwood.errors import AtwoodError, KernelEvaluationError, StartError, UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.late import replace
@@ -17,7 +17,7 @@ from atwood.simulation.dynamics.determined_reactions import check_read_reactions
 from atwood.simulation.dynamics.floating import seen_from_afar
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
 from atwood.simulation.dynamics.scales import coordinate_scales, find_scales, motion_scales
-from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START
+from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.initialization.massless import check_massless_directions
 from atwood.simulation.problem.not_compilable import announce, find_not_compilable
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     pass
 from atwood.simulation.problem.problem import Plan, dependent_speeds_of, kept_rows
 
-__all__ = ["make_plan", "pack_state"]
+__all__ = ["make_plan", "pack_state", "plan_of_run"]
 
 
 _PLAN: Key[Plan] = Key("plan")
@@ -55,6 +55,21 @@ def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length
     if made.not_compilable:
         announce(assembly, made.not_compilable)
     return replace(made)  # its dependent coordinates change on the way
+
+
+def plan_of_run(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
+    """Return the plan of a mode, as `make_plan` does; if a law has no value there, it is named."""
+    try:
+        return make_plan(assembly, t, q, u, length, span)
+    except UnsupportedError:
+        raise
+    except AtwoodError as error:
+        found = undefined_value_at(assembly, t, q, u)
+        if found is None:
+            raise
+        raise StartError(
+            f"{found.describe()}, so that the run cannot start", where=found.part, advice=ADVICE_AT_START
+        ) from error
 
 
 def _make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:

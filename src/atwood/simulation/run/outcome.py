@@ -75,6 +75,8 @@ class Outcome:
         Further events at the end that change states.
     handed
         What the next stretch in this mode is to know of the events.
+    sides
+        Numbers of the relations of what moves that change at its end.
     """
 
     t: float
@@ -87,6 +89,7 @@ class Outcome:
     noted: tuple[EventRecord, ...] = ()
     together: tuple[EventRecord, ...] = ()
     handed: tuple[int, ...] = ()
+    sides: tuple[int, ...] = ()
 
 
 def shortest_mode(plan: Plan, options: RunOptions, began: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.clock import GRACE, Clock, TimeIsUp
-from atwood.errors import AtwoodError, StartError, UnsupportedError
+from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.integrators.protocol import Statistics
@@ -22,15 +22,15 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     switch_coordinates,
     to_regular,
 )
-from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.events.modes import EventProbe, EventRecord
 from atwood.simulation.events.sampling import Updated, find_sampler
+from atwood.simulation.events.sides import SIDE
 from atwood.simulation.events.time_events import Schedule, find_schedule
 from atwood.simulation.initialization.mobility import check_prescribed, refuse_immobile
 from atwood.simulation.initialization.start import Start, settle
 from atwood.simulation.problem.arguments import check_span
 from atwood.simulation.problem.options import RunOptions, Samples, sample_times
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import plan_of_run
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.choice import Choice, check_solver, choose
 from atwood.simulation.run.made import Run, as_asked, run_out_of_time
@@ -38,6 +38,7 @@ from atwood.simulation.run.outcome import Outcome, Segment, shortest_mode
 from atwood.simulation.run.record import Recorder, SegmentRecord
 from atwood.simulation.run.segment import run_segment
 from atwood.simulation.run.session import KeptSession
+from atwood.simulation.run.sides_of_run import SidesOfRun
 from atwood.simulation.run.stuck import failed
 from atwood.simulation.run.tolerances import allowed
 from atwood.stages import stage
@@ -146,7 +147,8 @@ class _Walk:
         self.samples, self.again = samples, again
         self._schedules: dict[Shared, Schedule] = {}
         self._plans: dict[tuple[tuple[float, ...], tuple[float, ...] | None], Plan] = {}
-        self._kept = KeptSession()
+        self._kept, self._sides = KeptSession(), SidesOfRun(options)
+        self._piece_start = start.time
         self.segments: list[SegmentRecord] = []
         self.events: list[EventRecord] = []
         self.choices: list[Choice] = []
@@ -199,16 +201,18 @@ class _Walk:
                     self.impact, chatter = False, 0
                     continue
                 return self._made(outcome.status, outcome.message, outcome)
-            is_switch = outcome.event.target == COORDINATE_SWITCH
-            if not is_switch:
+            target = outcome.event.target
+            self._sides.change(outcome.sides if target == SIDE else (), is_short)
+            if target not in (SIDE, COORDINATE_SWITCH):
                 self.events += (outcome.event, *outcome.together)
-            if outcome.event.target == "stop":
+            if target == "stop":
                 return self._made("stopped", outcome.event.describe(), outcome)
-            if chatter > _CHATTER:
+            if chatter > _CHATTER and target != SIDE:
                 endless = f"{outcome.event.part} changes its mode endlessly at t = {self.t:.9g}"
                 return self._made("failed", endless, outcome)
+            is_switch = target == COORDINATE_SWITCH
             self._switch_coordinates(outcome.event, recorder) if is_switch else self._enter(outcome, recorder)
-            if self.t >= self.options.t_end and outcome.event.target != UPDATE:
+            if self.t >= self.options.t_end and target != UPDATE:
                 return self._made("finished", "", outcome)
 
     def _segment(self) -> tuple[Recorder, Outcome]:
@@ -240,7 +244,8 @@ class _Walk:
             raise outcome.error
         if recorder.is_empty:  # nor was there time to
             return recorder, outcome
-        self.segments.append(recorder.segment(self.impact, after_time_event))
+        record = recorder.segment(self.impact, after_time_event)
+        self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
         self.statistics = self.statistics + outcome.statistics
         for choice in outcome.choices:
             if not self.choices or not choice.is_like(self.choices[-1]):
@@ -267,28 +272,23 @@ class _Walk:
                 refuse_immobile(self.assembly, len(plan.assembly.own_equations.speeds) - plan.finding.rank, self.start)
             self._plans, self.probe, self._handed = {}, None, ()
             self.choice = choose(plan, options, t, q, u)
+        sided = self._sides.on(self.assembly, plan, t, q, u)
+        if sided is None:  # a relation stays where it changes
+            self.plan = None
+            return self._prepare()
+        self.probe = self.probe if sided is plan else None
+        plan = sided
         self._plans.setdefault(self._piece, plan)
         if self.probe is None:
             self.probe = EventProbe(plan, t, q, u, options.relative_tolerance, options.conditions)
         self.plan = plan
         self.probe.follow(self._handed)
+        return None
 
     def _plan(self) -> Plan:
-        """Return the plan of a mode from the present state; if a law has no value there, it is named."""
+        assembly = self._sides.in_pieces(self.assembly, self.t, self.q, self.u)
         span = self.options.t_end - self.start.time
-        try:
-            return make_plan(self.assembly, self.t, self.q, self.u, self.start.length, span)
-        except UnsupportedError:
-            raise
-        except AtwoodError as error:
-            found = undefined_value_at(self.assembly, self.t, self.q, self.u)
-            if found is None:
-                raise
-            raise StartError(
-                f"{found.describe()}, so that the run cannot start",
-                where=found.part,
-                advice=ADVICE_AT_START,
-            ) from error
+        return plan_of_run(assembly, self.t, self.q, self.u, self.start.length, span)
 
     def _schedule(self, assembly: Assembly) -> Schedule:
         """Return the time events of a scene in one mode."""
@@ -323,8 +323,8 @@ class _Walk:
         if self.plan is not None:
             self.probe = None
             known = self._plans.get(self._piece)
-            self.plan = self.plan.in_piece(self.assembly) if known is None else known
-            self.assembly = self.plan.assembly
+            self.plan = self.plan.in_piece(self._sides.like(self.assembly, self.plan)) if known is None else known
+            self.assembly = self.assembly if self.plan.assembly.sides else self.plan.assembly
             self.plan.review_partitioning(self.t, self.q)
 
     def _update(self, due: Sequence[int]) -> None:
@@ -341,7 +341,7 @@ class _Walk:
         self._jump(before)
         if self.plan is not None:
             self.probe, self._plans = None, {}
-            self.plan = self.plan.in_piece(self.assembly)
+            self.plan = self.plan.in_piece(self._sides.like(self.assembly, self.plan))
 
     def _jump(self, before: Assembly, show_both: bool = False) -> None:
         """Go on where prescribed motions switch: velocities may jump, and one-sided constraints let go."""
@@ -371,9 +371,9 @@ class _Walk:
         _, q, u, _ = recorder.last()
         event = outcome.event
         assert event is not None
-        self.impact, self.show = event.impact, True
-        if event.target == UPDATE:
-            self.q, self.u = q, u
+        self.impact, self.show = event.impact, event.target != SIDE
+        if event.target in (UPDATE, SIDE):
+            self.q, self.u, self.probe = q, u, self.probe if event.target == UPDATE else None
         else:
             from atwood.simulation.events.mode_change import enter_mode
 

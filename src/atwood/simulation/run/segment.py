@@ -22,6 +22,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
 from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.dynamics.undefined_values import find_undefined_value, states_ahead
 from atwood.simulation.events.modes import EventRecord
+from atwood.simulation.events.sides import SIDE
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely
@@ -39,6 +40,9 @@ __all__ = ["run_segment"]
 
 _BLOCKS = 50
 """Progress is told about so many times."""
+
+_MOMENT = 16.0
+"""Times that are so many units of rounding apart are one."""
 
 _PARTS = 5
 """So often it is seen to that coordinates of orientations keep their size where formulas give all others."""
@@ -185,7 +189,10 @@ class _Runner:
             step_result = without_margin(lambda t, y: probe.values(t, *split(y)), probe.shift, step_result, self.began)
             self.recorder.rewind(step_result.t)
             event, *together = self.segment.probe.changing(step_result)
-            if event.target != COORDINATE_SWITCH:
+            end = self.segment.end
+            if event.target == SIDE and end - step_result.t <= _MOMENT * np.spacing(abs(end)):  # no step is left
+                step_result = replace(step_result, t=end)
+            if event.target not in (COORDINATE_SWITCH, SIDE):
                 self.recorder.take(step_result.t, step_result.y, True)
             elif step_result.t > self.recorder.end:
                 segment = self.segment
@@ -194,7 +201,9 @@ class _Runner:
                     step_result.y,
                     bool(np.any(segment.samples.shown[segment.samples.times == step_result.t])),
                 )
-            return replace(self._ended(step_result.t, "event", ""), event=event, together=tuple(together))
+            sides = self.segment.probe.changed_sides(step_result)
+            ended = self._ended(step_result.t, "event", "")
+            return replace(ended, event=event, together=tuple(together), sides=sides)
         if step_result.t > self.recorder.end:
             self.recorder.take(step_result.t, step_result.y, True)
         if step_result.status is Status.TIME_LIMIT:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
+from atwood.forms.sides.taken_out import has_sides
 from atwood.integrators.ensemble.batch import BatchPlaces
 from atwood.late import dataclass
 from atwood.simulation.events.modes import find_event_functions
@@ -52,6 +53,8 @@ def why_not_batched(request: SweepRequest) -> str:
         return "parts of it have states of their own"
     if assembly.relations or equations.prescribed:
         return "something in it follows the clock"
+    if has_sides(assembly):
+        return "its laws compare what moves"
     if assembly.mechanism.space.is_line:
         return "on a line, each start says on which side of each other the parts are"
     if options.accuracy is not None:

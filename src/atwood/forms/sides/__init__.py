@@ -1,0 +1,1 @@
+"""Relations of what moves as parameters of the programs that are run."""
