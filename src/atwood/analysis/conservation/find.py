@@ -325,6 +325,7 @@ class _Search:
             return not size
         columns = np.stack(self._columns, axis=1)
         scales = np.linalg.norm(columns, axis=0)
+        scales[scales == 0.0] = 1.0
         weights = np.linalg.lstsq(columns / scales, centred, rcond=1e-10)[0]
         if (
             float(np.linalg.norm(columns / scales @ weights - centred)) > 1e-8 * size

@@ -7,18 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from atwood.analysis.conservation.states import State
+from atwood.analysis.conservation.states import KEPT, State
 from atwood.arrays import FloatArray
 
 __all__ = ["KEPT", "about_center", "conserved_directions", "is_constant", "is_kept", "readable_basis"]
 
-KEPT = 1e-9
-"""Relative to its terms: how well the rate of a quantity must vanish at each state."""
-
 _RANK = 1e-8
 """Relative to the largest singular value: what counts as zero among rates of a family."""
 
-_ROUND = 1e-9
+_ROUND = 1e-8
 """Components of directions this near to zero or one are these."""
 
 

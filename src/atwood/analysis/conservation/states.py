@@ -1,6 +1,7 @@
 """Quantities and their rates along the motion, at random states of a scene.
 
-States are consistent: constraints hold on positions and velocities, and the balance of forces gives the accelerations.
+States are all over the domain, and two of three are where laws that act narrowly or briefly do (`features`). They are
+consistent: constraints hold on positions and velocities, and the balance of forces gives the accelerations.
 What switches decide, and relations of time, is chosen at random, too (`atwood.analysis.freeing`), so that a push that
 comes later and a stop that nothing touches yet are not overlooked.
 """
@@ -11,9 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from atwood.analysis.conservation.features import Features
 from atwood.analysis.freeing import loosen
 from atwood.arrays import FloatArray
 from atwood.codegen import compile_program
+from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import AtwoodError, SolveError
 from atwood.expr import Expression, OutputGroup, Program, vjp
 from atwood.expr.core.relations import Relation, TimeRelations
@@ -27,7 +30,7 @@ from atwood.simulation.dynamics.rank import independent_rows
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import find_start
 
-__all__ = ["RandomStates", "State"]
+__all__ = ["KEPT", "RandomStates", "State"]
 
 _SEED = 19180726
 """Of the random states: the same for every call, so that what is said of a scene does not change."""
@@ -38,8 +41,26 @@ _REACHES = (1.0, 0.3, 0.1)
 _DECADES = 5.0
 """Every second state is nearer and slower by up to so many powers of ten."""
 
+_FARTHEST = 1.0
+"""Every third state is farther away and later by up to so many powers of ten."""
+
+_POLE, _OFF_POLE = 1e3, 0.7
+"""At a pole angles are so many times as fast as the body; states are so many radians away from a start there."""
+
+_EACH = 3
+"""For each argument of a law that may be narrow so many states more."""
+
+_PACED = 5
+"""At so many places it is looked how fast things happen."""
+
 _TRIALS = 9
 """For each state that is wanted, so many are tried."""
+
+KEPT = 1e-9
+"""Relative to its terms: how well the rate of a quantity must vanish at each state."""
+
+_ROUGH = 0.1
+"""A state says nothing where rounding changes what is left of a rate by this share of it."""
 
 _MET = 1e-9
 """Relative to the sizes of the scene: how well constraints hold at a state."""
@@ -113,6 +134,7 @@ class RandomStates:
         moving = {*e.coordinates, *e.speeds}
         self._free = loosen(program, _Relations(assembly.relations), moving)
         self.reason = "constraints are not met near its start"
+        self._features = Features(assembly, e, [*e.rows, *quantities])
         self._kernel = compile_program(self._free.program)
         self._probe = compile_program(self._free.probe)
 
@@ -127,7 +149,7 @@ class RandomStates:
         Parameters
         ----------
         count
-            How many.
+            How many; as many again for the features of laws.
         length
             Size of the scene, m.
 
@@ -136,24 +158,31 @@ class RandomStates:
         StartError
             If the scene has no consistent start.
         """
+        count += _EACH * (self._features.count + sum(len(one) for _, one in self._free.probe.outputs))
         start = find_start(self.assembly)
         random = np.random.default_rng(_SEED)
         sizes = motion_scales(self._equations, length)
         q0 = from_regular(self.assembly, start.coordinates)
-        pace = self._pace(start.time, q0, start.speeds, sizes)
-        span = max(self.assembly.flat.t_end - start.time, 1.0 / pace)
+        for one in self._equations.orientation_coordinates if self._is_pole(start.time, q0) else ():
+            q0[list(one.coordinates)] += _OFF_POLE
+        least = self.assembly.flat.t_end - start.time
+        pace = self._pace(start.time, q0, start.speeds, sizes, 1.0 / least if least > 0.0 else 1.0)
+        span = max(least, 1.0 / pace)
         found: list[State] = []
         for trial in range(_TRIALS * count):
             reach = _REACHES[trial * len(_REACHES) // (_TRIALS * count)]
-            t = start.time + span * float(random.uniform())
-            # What a scene is far away from makes its size: some states are near by and slow beside that.
+            # What a scene is far away from makes its size: some states are near by and slow beside that, some far away.
             near, slow = (10.0 ** -random.uniform(0.0, _DECADES, 2)) if trial % 2 else (1.0, 1.0)
-            step = near * reach * sizes * random.uniform(-1.0, 1.0, len(sizes))
+            far, late = (10.0 ** random.uniform(0.0, _FARTHEST, 2)) if trial % 3 == 2 else (1.0, 1.0)
+            t = start.time + late * span * float(random.uniform())
+            step = near * far * reach * sizes * random.uniform(-1.0, 1.0, len(sizes))
             u = slow * pace * sizes * random.uniform(-1.0, 1.0, len(sizes))
             try:
                 q = self._balance.kinematic_map.moved(t, q0, step)
+                if len(found) % 3:
+                    t, q = self._features.towards(t, q, sizes, span, random)
                 q, u = self._balance.project(t, q, u, sizes)
-                if self._is_met(t, q, u, sizes, slow * pace):
+                if t >= start.time and not self._is_pole(t, q) and self._is_met(t, q, u, sizes, slow * pace):
                     found.append(self._at(t, q, u, sizes, random, len(found)))
             except (AtwoodError, ArithmeticError, np.linalg.LinAlgError) as error:
                 self.reason = str(error)
@@ -162,15 +191,32 @@ class RandomStates:
                 break
         return found if len(found) == count else []
 
-    def _pace(self, t: float, q: FloatArray, u: FloatArray, sizes: FloatArray) -> float:
-        """Return how fast things happen, 1/s."""
+    def _is_pole(self, t: float, q: FloatArray) -> bool:
+        """Return whether angles are so near to where they have no rates that these are rounding."""
         try:
-            kept = self._kept(t, q, u, sizes)
-            a, _ = self._balance.accelerate(t, q, u, kept)
-        except (AtwoodError, ArithmeticError, np.linalg.LinAlgError):
-            a = np.zeros_like(u)
-        fast = [float(np.max(np.abs(u) / sizes, initial=0.0)), float(np.max(np.sqrt(np.abs(a) / sizes), initial=0.0))]
-        return max(fast) or 1.0
+            rates = self._balance.kinematic_map.rates(t, q, np.ones(len(self._equations.speeds)))
+        except (AtwoodError, ArithmeticError):
+            return True
+        turned = [rates[i] for one in self._equations.orientation_coordinates for i in one.coordinates]
+        return bool(np.max(np.abs(turned), initial=0.0) > _POLE)
+
+    def _pace(self, t: float, q: FloatArray, u: FloatArray, sizes: FloatArray, least: float) -> float:
+        """Return how fast things happen, 1/s: at the start, and at the median of states beside it."""
+        random = np.random.default_rng(_SEED)
+        fast = []
+        for number in range(_PACED):
+            aside = sizes * random.uniform(-1.0, 1.0, len(sizes)) * bool(number)
+            try:
+                with np.errstate(all="ignore"):
+                    there, still = self._balance.project(
+                        t, self._balance.kinematic_map.moved(t, q, aside), np.zeros_like(u), sizes
+                    )
+                    a, _ = self._balance.accelerate(t, there, still, self._kept(t, there, still, sizes))
+            except (AtwoodError, ArithmeticError, np.linalg.LinAlgError):
+                continue
+            if np.all(np.isfinite(a)):
+                fast.append(float(np.max(np.sqrt(np.abs(a) / sizes), initial=0.0)))
+        return max(float(np.max(np.abs(u) / sizes, initial=0.0)), float(np.median(fast)) if fast else 0.0, least)
 
     def _kept(self, t: float, q: FloatArray, u: FloatArray, sizes: FloatArray) -> np.ndarray | None:
         """Return which constraints are independent; None for all of none."""
@@ -192,10 +238,21 @@ class RandomStates:
     def _at(
         self, t: float, q: FloatArray, u: FloatArray, sizes: FloatArray, random: np.random.Generator, number: int
     ) -> State:
-        known, n, own = self.assembly.parameter_values, len(u), self._balance.program
+        known = self.assembly.parameter_values
         if not self._free.is_plain:
             probed = self._probe.bind(known)([t], q, u)
             known = np.concatenate([known, self._free.choose(probed, random, number)])
+        here = self._with(known, t, q, u, sizes)
+        # The rate of what is conserved is zero beside, too: what it changes by is rounding, as near poles of angles.
+        aside = [ROUGHNESS * random.uniform(-1.0, 1.0, len(u)) for _ in range(2)]
+        there = self._with(known, t, self._balance.kinematic_map.moved(t, q, sizes * aside[0]), u + u * aside[1], sizes)
+        left = np.abs(here.rates) > KEPT * here.terms
+        if np.any(np.abs(there.rates - here.rates)[left] > _ROUGH * np.abs(here.rates)[left]):
+            raise SolveError("rates are rounding here", where=self.assembly.flat.name)
+        return here
+
+    def _with(self, known: FloatArray, t: float, q: FloatArray, u: FloatArray, sizes: FloatArray) -> State:
+        n, own = len(u), self._balance.program
         values = [np.asarray(one, dtype=float) for one in self._kernel.bind(known)([t], q, u)]
         if not all(np.all(np.isfinite(one)) for one in values):
             raise SolveError("a law has no value here", where=self.assembly.flat.name)

@@ -14,7 +14,7 @@ from atwood.analysis.reduction.quadrature import Path, find_path
 from atwood.analysis.reduction.radial import Radial
 from atwood.arguments import ARRAY, TEXT, check, instance, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.errors import AtwoodError, UnsupportedError, UsageError, suggestion
 from atwood.expr import OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
@@ -304,4 +304,9 @@ def _start_of(assembly: Assembly, found: Lagrangian) -> tuple[FloatArray, FloatA
     rates = Quantities(assembly, found).on_speeds(list(found.velocities))
     outputs = (OutputGroup("rates", tuple(rates)),)
     program = Program(f"{assembly.flat.name} rates", state_groups(e), assembly.parameters, outputs)
-    return q, np.asarray(assembly.kernel(program)([start.time], q, start.speeds)[0], dtype=float)
+    try:
+        return q, np.asarray(assembly.kernel(program)([start.time], q, start.speeds)[0], dtype=float)
+    except AtwoodError as error:
+        raise UnsupportedError(
+            "it starts where its coordinates are singular", where=assembly.flat.name, advice="Simulate it."
+        ) from error

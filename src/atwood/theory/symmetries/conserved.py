@@ -140,6 +140,8 @@ class ConservedQuantity:
 class Conserved(Sequence[ConservedQuantity]):
     """What is conserved along the motions of a scene: a sequence of quantities, also by name.
 
+    What is proven and what was checked at states is in it; `proven`, `checked` and `not_looked_for` say which.
+
     Parameters
     ----------
     quantities
@@ -148,10 +150,29 @@ class Conserved(Sequence[ConservedQuantity]):
         What is not, and what it depends on.
     scene
         What the scene is called.
+    not_looked_for
+        What may be conserved besides.
     """
 
-    def __init__(self, quantities: Sequence[ConservedQuantity], notes: Sequence[str], scene: str) -> None:
+    def __init__(
+        self,
+        quantities: Sequence[ConservedQuantity],
+        notes: Sequence[str],
+        scene: str,
+        not_looked_for: Sequence[str] = (),
+    ) -> None:
         self.quantities, self.notes, self.scene = tuple(quantities), tuple(notes), scene
+        self.not_looked_for = tuple(not_looked_for)
+
+    @property
+    def proven(self) -> tuple[ConservedQuantity, ...]:
+        """The quantities that are proven to be conserved."""
+        return tuple(one for one in self.quantities if one.proven)
+
+    @property
+    def checked(self) -> tuple[ConservedQuantity, ...]:
+        """The quantities that stay at all states that were looked at, which is no proof."""
+        return tuple(one for one in self.quantities if not one.proven)
 
     def __len__(self) -> int:
         return len(self.quantities)
@@ -204,22 +225,37 @@ class Conserved(Sequence[ConservedQuantity]):
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {"scene": self.scene, "conserved": [one.to_dict() for one in self], "notes": list(self.notes)}
+        return {
+            "scene": self.scene,
+            "conserved": [one.to_dict() for one in self],
+            "proven": [one.name for one in self.proven],
+            "checked": [one.name for one in self.checked],
+            "not_looked_for": list(self.not_looked_for),
+            "notes": list(self.notes),
+        }
 
     def __str__(self) -> str:
-        lines = [f"{self.scene}: {len(self)} conserved"]
-        for one in self:
+        lines = [self._heading]
+        for one in (*self.proven, *self.checked):
             lines.append(f"  {one}")
             lines += [f"      {one.text()}"] * one.formulas.is_readable
+        lines += [f"  not looked for: {one}" for one in self.not_looked_for]
         return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
 
+    @property
+    def _heading(self) -> str:
+        return f"{self.scene}: {len(self.proven)} proven to be conserved, {len(self.checked)} checked"
+
     def __repr__(self) -> str:
-        return f"Conserved({self.scene!r}: {listed(self.names) if self else 'nothing'})"
+        parts = [("proven", self.proven), ("checked", self.checked)]
+        told = "; ".join(f"{name} {listed([one.name for one in some])}" for name, some in parts if some)
+        return f"Conserved({self.scene!r}: {told or 'nothing'})"
 
     def _repr_html_(self) -> str:
         rows = [(one.name, one.kind, one.text(), one.meaning, one.evidence) for one in self]
         heads = ("name", "kind", "expression", "meaning", "how it is known")
-        return html_table(f"Conserved: {self.scene}", heads, rows, "; ".join(self.notes))
+        below = [*(f"not looked for: {one}" for one in self.not_looked_for), *self.notes]
+        return html_table(self._heading, heads, rows, "; ".join(below))
 
 
 def _listed(value: Any) -> Any:
@@ -227,6 +263,10 @@ def _listed(value: Any) -> Any:
 
 
 _SYMMETRIES = each(instance("a Symmetry", Symmetry), "symmetries, as a list")
+_BEYOND = (
+    "integrals of symmetries that depend on velocities, as that of Laplace, Runge and Lenz: state them, `Symmetry`"
+)
+_ROLLING = "integrals of rolling that belong to no symmetry"
 SYMMETRIES = Kind("a Symmetry, or a list of them", _listed)
 
 
@@ -273,4 +313,5 @@ def conserved(
     stated = [check_symmetry(one, quantities, prover, formulas) for one in every]
     findings = find_conserved(assembly, quantities, prover)
     made = [ConservedQuantity(one, formulas) for one in (*findings.items, *stated)]
-    return Conserved(made, findings.notes, assembly.flat.name)
+    beyond = [_BEYOND, *([_ROLLING] if any(not one.holonomic for one in assembly.reduced.constraints) else [])]
+    return Conserved(made, findings.notes, assembly.flat.name, beyond)
