@@ -41,6 +41,8 @@ def _read_csv(file: Path, where: str) -> list[list[float]]:
     """Return the first two columns of a file; beside semicolons, tabs or spaces a comma is before decimals."""
     import csv
 
+    if file.exists() and not file.is_file():  # a pipe would be waited for
+        raise ParameterError(f"{str(file)!r} is no file", where=where)
     try:
         lines = file.read_text(encoding="utf-8-sig").splitlines()
     except OSError as error:
@@ -54,7 +56,10 @@ def _read_csv(file: Path, where: str) -> list[list[float]]:
     rows: list[list[float]] = []
     width = 0
     for number, line in kept:
-        (cells,) = csv.reader([line.strip(" ")], delimiter=mark, skipinitialspace=True)
+        try:
+            (cells,) = csv.reader([line.strip(" ")], delimiter=mark, skipinitialspace=True)
+        except csv.Error as error:
+            raise ParameterError(f"line {number} of {str(file)!r} cannot be read ({error})", where=where) from None
         try:
             row = [float(text if mark == "," else text.replace(",", ".")) for text in cells[:2]]
         except ValueError:

@@ -36,6 +36,7 @@ from atwood.result.formats.companion import read_with_companion, write_with_comp
 from atwood.result.formats.dataset import Dataset, json_text
 from atwood.result.formats.matlab import read_matlab, write_matlab
 from atwood.result.formats.netcdf import read_netcdf, write_netcdf
+from atwood.result.formats.packed import check_unpacked
 from atwood.result.result import Result
 from atwood.result.trajectories import Trajectories
 from atwood.showing import count_of, listed
@@ -215,7 +216,18 @@ def load_result(file: str | os.PathLike[str]) -> SavedResult:
     """
     source = Path(file)
     _, read = _format_of(source)
-    return read_checked(source, read, "result", "Save the run again.")
+    return read_checked(source, lambda file: _sound(read(file)), "result", "Save the run again.")
+
+
+def _sound(saved: SavedResult) -> SavedResult:
+    """Return what was read, if it is numbers at times, each with a unit."""
+    known = (saved.units, saved.meanings, saved.metadata)
+    arrays = [np.asarray(one) for one in (saved.time, *saved.quantities.values())]
+    if not all(isinstance(one, Mapping) for one in known) or not saved.units.keys() >= saved.quantities.keys():
+        raise ValueError("its units and meanings are not by path")
+    if any(one.shape != (len(saved.time),) or one.dtype.kind not in "fiu" for one in arrays):
+        raise ValueError("its quantities are no numbers at its times")
+    return saved
 
 
 def check_target(file: str | os.PathLike[str]) -> None:
@@ -308,6 +320,7 @@ def _savez(stream: BinaryIO, arrays: Mapping[str, Any]) -> None:
 
 
 def _read_npz(file: Path) -> SavedResult:
+    check_unpacked(file)
     with file.open("rb") as stream, np.load(stream, allow_pickle=False) as data:  # a damaged file is closed, too
         about = json.loads(str(data[_ABOUT]))
         quantities = {name: data[name] for name in data.files if name not in ("time", _ABOUT)}

@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -331,8 +332,8 @@ def _read_value(value: Any, where: str) -> Any:
 def _read_bound(written: Any, where: str) -> Any:
     if isinstance(written, str):
         return FieldReference(written)
-    if isinstance(written, (int, float)) and not isinstance(written, bool):
-        return written
+    if isinstance(written, (int, float)) and not isinstance(written, bool) and abs(written) <= sys.float_info.max:
+        return float(written)  # in which powers cannot grow without end
     operation = written[0] if isinstance(written, list) and written else None
     if not isinstance(operation, str) or operation not in OPERATIONS:
         raise UsageError(f"the bound value {str(written)[:60]!r} cannot be read", where=where)

@@ -21,7 +21,7 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
     "sub": operator.sub,
     "mul": operator.mul,
     "div": operator.truediv,
-    "pow": operator.pow,
+    "pow": lambda a, b: (float(a) if isinstance(a, int) else a) ** b,  # whole numbers would grow without end
     "neg": operator.neg,
 }
 """What a deferred value can be made with."""

@@ -116,6 +116,9 @@ def flatten(scene: Model, name: str | None = None) -> FlatScene:
     """
     if not isinstance(scene, Model):
         raise UsageError(f"{scene!r} is no scene", advice="Pass a Scene or a Model.")
+    for setting in scene._settings if scene._parent is None else ():
+        if isinstance(bound := scene._value(setting), ParameterExpression):
+            raise ParameterError(f"it is bound to {bound!r}, and there is no model around it", where=setting)
     leaves: dict[str, Part] = {}
     joined: list[tuple[str, str]] = []
     start: dict[str, float] = {}
@@ -202,7 +205,7 @@ def _number(value: Any, model: Model, key: str, prefix: str) -> float:
             raise StartError(
                 f"it is bound to {value!r}, which is in {value.unit.text} and not in {wanted.text}", where=path
             )
-        value = value.value_in(model)
+        value = value.worked_out(model, path)
     was_text = isinstance(value, str)
     if isinstance(value, str):
         _, unit_text = split_quantity(value) or (0.0, "")

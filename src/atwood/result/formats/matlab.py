@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.result.formats.dataset import Dataset, Variable, json_text, unique_name
+from atwood.result.formats.packed import check_unpacked
 
 __all__ = ["read_matlab", "write_matlab"]
 
@@ -85,6 +86,7 @@ def read_matlab(file: Path) -> tuple[Dataset, str]:
     """
     from scipy.io import loadmat
 
+    check_unpacked(file)
     found = loadmat(str(file), chars_as_strings=True)
     about = json.loads(str(found[_ABOUT].item()))
     variables = []

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from atwood.result.formats.dataset import Dataset, Variable, json_text, unique_name
+from atwood.result.formats.packed import check_unpacked
 
 __all__ = ["read_npz", "write_npz"]
 
@@ -47,6 +48,7 @@ def read_npz(file: Path) -> tuple[Dataset, str]:
     file
         The file.
     """
+    check_unpacked(file)
     with file.open("rb") as stream, np.load(stream, allow_pickle=False) as found:  # a damaged file is closed, too
         about = json.loads(str(found[_ABOUT]))
         heads = about["variables"]

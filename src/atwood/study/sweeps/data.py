@@ -151,6 +151,14 @@ def from_parts(
     units
         Of quantities by path, of what was varied by label.
     """
+    runs = int(np.prod(about["shape"]))
+    expected = [(time, time.shape[:1]), (end_time, (runs,)), (steps, (runs,))]
+    expected += [(values, (runs,)) for values in varied.values()]
+    expected += [(values, (runs, *time.shape)) for values in quantities.values()]
+    if not time.size or any(np.shape(values) != shape for values, shape in expected):
+        raise ValueError("its arrays do not fit together")
+    if len(status) != runs or not all(isinstance(one, str) for one in (*status, *meanings, *meanings.values())):
+        raise ValueError("it does not say how its runs ended, or what its quantities mean")
     statistics = dict(about["statistics"])
     statistics["reassembled"] = {int(run): text for run, text in statistics["reassembled"].items()}
     known = {one.name for one in fields(SweepStatistics)}
