@@ -1,12 +1,17 @@
 """Files that are written: whole or not at all, whoever else writes; and read without waiting for anybody."""
 
+import json
 import marshal
 import os
 import stat
+import struct
 import threading
+import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import atwood
@@ -14,7 +19,9 @@ from atwood import UsageError
 from atwood.codegen import cache as disk
 from atwood.files import check_directory, check_readable, write_atomically
 from atwood.forms import derived
+from atwood.result.formats import packed
 from atwood.solids import read_stl
+from atwood_library import Table
 from atwood_library.scenes import DoublePendulum, SimplePendulum
 
 posix = pytest.mark.skipif(os.name != "posix", reason="pipes, links and permissions are those of POSIX")
@@ -155,3 +162,103 @@ def test_forged_derivations_are_made_anew(tmp_path: Path, monkeypatch: pytest.Mo
     for entry in entries:
         assert store.write(entry.stem, content)
     assert atwood.simulate(DoublePendulum(), t_end=0.1, outputs=2)["rod2.angle"] == pytest.approx(expected)
+
+
+# -- what is read ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "bound",
+    [
+        "__class__",
+        "length",
+        ["div", 1, 0],
+        ["mul", 1e308, 1e308],
+        ["pow", 10, ["pow", 10, ["pow", 10, 10]]],
+        ["pow", -8, 0.5],
+        ["add", 10**400, 1],
+    ],
+    ids=str,
+)
+def test_bound_values_that_have_none_are_refused(bound: Any) -> None:
+    """In a scene itself, in a part of it, and as a start value."""
+    name = "atwood_library.scenes.double_pendulum:DoublePendulum"
+    written = {"bound": bound}
+    for scene in (
+        {"class": name, "values": {"gravity": written}},
+        {"class": name, "changes": {"settings": {"rod1": {"length": written}}}},
+        {"class": name, "changes": {"starts": {"": {"start": {"rod1.angle": written}}}}},
+    ):
+        with pytest.raises(atwood.AtwoodError):
+            atwood.assemble(atwood.from_data({"format": "atwood scene", "version": 1, "scene": scene}))
+
+
+def test_what_a_class_cannot_be_made_of_is_an_error_of_ours() -> None:
+    """Its regulator is worked out when it is made, by a function of scipy that gives up."""
+    scene = {"class": "atwood_library.scenes.cart_pole:CartPole", "values": {"cart_mass": 1e30}}
+    with pytest.raises(UsageError, match="cannot be what its classes are made of"):
+        atwood.from_data({"format": "atwood scene", "version": 1, "scene": scene})
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat"])
+def test_what_unpacks_to_more_than_any_run_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
+) -> None:
+    """Zeros, packed to a thousandth."""
+    monkeypatch.setattr(packed, "_MOST", 2**24)
+    file, packer, zeros = tmp_path / f"bomb{suffix}", zlib.compressobj(9), bytes(2**22)
+    if suffix == ".npz":
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as entries, entries.open("time.npy", "w") as entry:
+            for _ in range(5):
+                entry.write(zeros)
+    else:
+        content = b"".join(packer.compress(zeros) for _ in range(5)) + packer.flush()
+        file.write_bytes(bytes(128) + struct.pack("<II", 15, len(content)) + content)
+    for read in (atwood.load_result, atwood.load_sweep):
+        with pytest.raises(UsageError, match="unpacks to more than"):
+            read(file)
+
+
+@pytest.mark.parametrize(
+    ("time", "about"),
+    [
+        (np.zeros((3, 2)), {}),
+        (np.array(["a"] * 3), {}),
+        (np.ones(3) * 1j, {}),
+        (np.zeros(2), {}),
+        (np.zeros(3), {"metadata": 1}),
+        (np.zeros(3), {"units": ["m"]}),
+        (np.zeros(3), {"units": {}}),
+        (np.zeros(3), {"meanings": "m"}),
+    ],
+)
+def test_arrays_that_are_no_quantities_are_refused(tmp_path: Path, time: Any, about: dict[str, Any]) -> None:
+    whole = {"metadata": {}, "units": {"a": "m"}, "meanings": {}, **about}
+    np.savez(tmp_path / "run.npz", time=time, a=np.zeros(3), atwood=np.array(json.dumps(whole)))
+    with pytest.raises(UsageError, match="this is no result"):
+        atwood.load_result(tmp_path / "run.npz")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"time": 1.0}, {"time": []}, {"time": [[0.0]]}, {"status": [1, 2]}, {"status": []}, {"end_time": [1.0]}],
+    ids=str,
+)
+def test_sweeps_that_do_not_fit_together_are_refused(tmp_path: Path, change: dict[str, Any]) -> None:
+    file = tmp_path / "sweep.json"
+    atwood.sweep(SimplePendulum(), {"rod.length": [1.0, 2.0]}, t_end=0.2, outputs=3).save(file)
+    data = {key: one for key, one in json.loads(file.read_text()).items() if key not in ("checksum", "meanings")}
+    file.write_text(json.dumps(data))
+    assert len(atwood.load_sweep(file)) == 2
+    file.write_text(json.dumps({**data, **change}))
+    with pytest.raises(UsageError, match="this is no sweep"):
+        atwood.load_sweep(file)
+
+
+@posix
+def test_tables_wait_for_no_pipe(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "table.csv")
+    (tmp_path / "long.csv").write_text('"' + "x" * 200_000)
+    for name, words in (("table.csv", "is no file"), ("long.csv", "cannot be read")):
+        with pytest.raises(atwood.ParameterError, match=words):
+            Table(table=str(tmp_path / name))

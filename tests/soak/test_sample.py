@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from . import metamorphic, methods, tables
+from . import hostile, metamorphic, methods, poles, tables
 from .draw import draw
 from .oracle import STEP, Oracle
 from .scenes import Way, check_mechanism
@@ -58,6 +58,13 @@ def test_methods_agree(seed: int) -> None:
 def test_tables_agree_with_scipy(seed: int) -> None:
     trial = tables.check(seed)
     assert not trial.findings, trial.findings[0].detail
+
+
+@pytest.mark.parametrize("kind", [hostile, poles], ids=["hostile", "poles"])
+def test_files_and_poles(kind) -> None:
+    for seed in range(6):
+        trial = kind.check(seed)
+        assert not trial.findings, (seed, trial.findings[0])
 
 
 def test_the_oracle_is_consistent_by_itself() -> None:

@@ -104,6 +104,12 @@ def from_data(data: Mapping[str, Any], trust: Iterable[str] = ()) -> Model:
         scene = _read(data.get("scene"), "scene")
     except RecursionError:
         raise UsageError("the data are nested too deeply for a scene", where="scene", advice="Save it again.") from None
+    except AtwoodError:
+        raise
+    except Exception as error:  # classes work out what they are made of, and may do so with anything
+        raise UsageError(
+            f"its values cannot be what its classes are made of ({type(error).__name__}: {error})", where="scene"
+        ) from error
     if not isinstance(scene, Model):
         raise UsageError(f"a {type(scene).__name__} is no scene", where="scene", advice="Only models are scenes.")
     return scene

@@ -155,7 +155,7 @@ def from_parts(
     expected = [(time, time.shape[:1]), (end_time, (runs,)), (steps, (runs,))]
     expected += [(values, (runs,)) for values in varied.values()]
     expected += [(values, (runs, *time.shape)) for values in quantities.values()]
-    if not time.size or any(np.shape(values) != shape for values, shape in expected):
+    if not time.size or any(a.shape != shape or a.dtype.kind not in "biufU" for a, shape in expected):
         raise ValueError("its arrays do not fit together")
     if len(status) != runs or not all(isinstance(one, str) for one in (*status, *meanings, *meanings.values())):
         raise ValueError("it does not say how its runs ended, or what its quantities mean")
