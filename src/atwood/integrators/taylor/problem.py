@@ -69,7 +69,7 @@ RETRIES, SMALLER = 4, 1e-6
 """How often coefficients that are not finite are tried again, with a unit of time that is so many times smaller."""
 
 
-PARTS = 4
+PARTS = 2
 """What judges a step is asked about so many parts of it: longer ones bend more than the cubics between their ends."""
 
 

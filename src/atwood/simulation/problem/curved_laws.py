@@ -17,7 +17,7 @@ import numpy as np
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp, live, substitute
 from atwood.expr.core.enclosures import Pair, enclose, magnitude
-from atwood.expr.core.functions import Scalar, absolute, log, maximum, minimum, select, sign, sqrt
+from atwood.expr.core.functions import Scalar, absolute, exp, log, maximum, minimum, select, sign, sqrt
 from atwood.expr.core.intervals import bounds
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
@@ -27,9 +27,11 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map
 from atwood.model.local.laws import LocalPart
 
-__all__ = ["Curved", "find_curved", "is_needed", "watched_program"]
+__all__ = ["Curved", "find_curved", "find_external", "is_needed", "watched_program"]
 
 _CURVED: Key[tuple[Curved, ...]] = Key("functions that may change fast")
+
+_EXTERNAL: Key[tuple[Expression, ...]] = Key("functions in Python in laws")
 
 _FAINT = 60.0
 """An exponential of less than minus this is as good as zero, whatever it is multiplied by."""
@@ -60,6 +62,23 @@ def find_curved(assembly: Assembly) -> tuple[Curved, ...]:
     return assembly.shared.get(_CURVED, lambda: tuple(_find(assembly, assembly.own_equations)), assembly.form)
 
 
+def find_external(assembly: Assembly) -> tuple[Expression, ...]:
+    """Return the calls of functions in Python that move a scene, in the coordinates and speeds of its form."""
+
+    def find() -> tuple[Expression, ...]:
+        equations = assembly.own_equations
+        nodes = live([*equations.rows, *equations.rates, *(one.second for one in equations.constraints)])
+        known = _known(assembly, equations)
+        called = [one for one in nodes if one.operation == "external" and not one.is_parametric]
+        return tuple(one for one in called if all(node in known for node in live([one]) if node.is_symbol))
+
+    return assembly.shared.get(_EXTERNAL, find, assembly.form)
+
+
+def _known(assembly: Assembly, equations: Equations) -> set[Expression]:
+    return {equations.time, *equations.coordinates, *equations.speeds, *assembly.parameters}
+
+
 def _find(assembly: Assembly, equations: Equations) -> Iterable[Curved]:
     rows = [*equations.rows, *equations.rates, *(one.second for one in equations.constraints)]
     found = dict.fromkeys(_curved_in(rows, _ALWAYS - {"log", "pow"}))
@@ -76,11 +95,12 @@ def _find(assembly: Assembly, equations: Equations) -> Iterable[Curved]:
             powers = substitute([one.exponent or equations.graph.one for one in mine], mapping)
             more = zip(mine, placed, powers, strict=True)
             found |= dict.fromkeys(Curved(a.operation, b, None if a.exponent is None else c) for a, b, c in more)
-    known = {equations.time, *equations.coordinates, *equations.speeds, *assembly.parameters}
+    known = _known(assembly, equations)
     for one in found:
         nodes = live([one.argument] if one.exponent is None else [one.argument, one.exponent])
         moves = any(node.is_symbol and not node.is_parametric and node not in assembly.parameters for node in nodes)
-        if moves and all(node in known for node in nodes if node.is_symbol):
+        calls = any(node.operation == "external" for node in nodes)
+        if moves and not calls and all(node in known for node in nodes if node.is_symbol):
             yield one
 
 
@@ -121,26 +141,37 @@ def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Ite
 # -- how far an argument goes, in units of the function's scale ----------------------------------------------------
 
 
-def _span(one: Curved, argument: Pair, exponent: Pair | None) -> Scalar:
-    """Return how far a function changes between bounds of its argument, in units of its own scale."""
+def _share(one: Curved, argument: Pair, exponent: Pair | None, reach: Scalar) -> Scalar:
+    """Return how far a function changes between bounds of its argument, as a share of how far it may.
+
+    Parameters
+    ----------
+    one
+        The function.
+    argument, exponent
+        Bounds.
+    reach
+        How far it may change, in units of its own scale.
+    """
     low, high = argument
     if one.operation == "exp":
-        return maximum(high, -_FAINT) - maximum(low, -_FAINT)
+        return (maximum(high, -_FAINT) - maximum(low, -_FAINT)) / reach
     if one.operation == "tanh":
-        return maximum(minimum(high, _FLAT), -_FLAT) - maximum(minimum(low, _FLAT), -_FLAT)
+        return (maximum(minimum(high, _FLAT), -_FLAT) - maximum(minimum(low, _FLAT), -_FLAT)) / reach
     if one.operation in ("sinh", "cosh"):
-        return high - low
+        return (high - low) / reach
     if one.operation == "atan":
-        return 3.0 * (_steep(high) - _steep(low))
+        return 3.0 * (_steep(high) - _steep(low)) / reach
     if one.operation == "tan":
-        return 3.0 * (high - low)
-    least, most = (log(maximum(x, 1e-150)) for x in magnitude(argument))
+        return 3.0 * (high - low) / reach
+    least, most = magnitude(argument)
     if exponent is None:  # a quotient or a logarithm
-        return 2.0 * (most - least)
+        return most / (maximum(least, 1e-150) * exp(0.5 * reach))
     power = maximum(absolute(exponent[0]), absolute(exponent[1]))
-    ends = [select(exponent[1] < 0.0, x * power, maximum(x * power, -_FAINT)) for x in (least, most)]
+    ends = [power * log(maximum(x, 1e-150)) for x in (least, most)]
+    faint = [select(exponent[1] < 0.0, x, maximum(x, -_FAINT)) for x in ends]
     is_low = (exponent[0] > 0.0) * (exponent[1] <= _HIGH)
-    return select(is_low, 0.0, ends[1] - ends[0])
+    return select(is_low, 0.0, (faint[1] - faint[0]) / reach)
 
 
 def _steep(x: Scalar) -> Scalar:
@@ -173,9 +204,9 @@ def is_needed(assembly: Assembly, curved: Sequence[Curved], span: tuple[float, f
         with np.errstate(all="ignore"):
             if not np.all(np.isfinite(ends[0])) and one.operation not in ("exp", "tanh"):
                 return True
-            found = float(_span(one, ends[0], ends[1] if one.exponent is not None else None))
-        if not found <= reach:
-            return True
+            power = ends[1] if one.exponent is not None else None
+            if not float(_share(one, ends[0], power, reach)) <= 1.0:
+                return True
     return False
 
 
@@ -223,7 +254,7 @@ def watched_program(
     score: Scalar = 0.0
     for one in curved:
         power = None if one.exponent is None else found[one.exponent.index]
-        score = maximum(score, _span(one, found[one.argument.index], power) / reach)
+        score = maximum(score, _share(one, found[one.argument.index], power, reach))
     for angle in hull.angles.values():
         score = maximum(score, (angle[1] - angle[0]) * (1.0 / _TURN))
     groups = [group for end in ends for group in end.groups]

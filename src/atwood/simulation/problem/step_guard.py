@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
 from atwood.arrays import FloatArray
-from atwood.expr import Program
+from atwood.codegen import BoundKernel
+from atwood.codegen.python.backend import compile_program
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.loops.closed_form import ClosedForm
 from atwood.forms.program import state_groups
 from atwood.integrators.compiled_functions import StepGuard
-from atwood.simulation.problem.curved_laws import find_curved, is_needed, watched_program
+from atwood.integrators.sampled_steps import GRID, SAMPLES, SampledSteps
+from atwood.simulation.problem.curved_laws import find_curved, find_external, is_needed, watched_program
 
 __all__ = ["REACHES", "step_guard"]
 
-REACHES = {"explicit": 8.0, "taylor": 1.0, "ida": 2.0, "ida-sundae": 2.0, "gauss": 8.0, "composition": 8.0}
+REACHES = {"explicit": 8.0, "taylor": 2.0, "ida": 2.0, "ida-sundae": 2.0, "gauss": 8.0, "composition": 8.0}
 """How far a curved function may change in a step, in units of its own scale: as far as the slopes that a method takes
-show. Of a Taylor series that is so in each quarter of a step, of IDA at the end of a step alone."""
+show. Of a Taylor series that is so in each half of a step, of IDA at the end of a step alone."""
 
 _SHORTEST = 1e-13
 """Relative to the run: steps that are no longer are taken as they are, and what lasts no longer is a moment."""
@@ -45,6 +53,55 @@ def step_guard(
         Its closed loops, solved by formulas, with the values of their parameters; None where all coordinates are
         integrated.
     """
+    found = _by_bounds(assembly, span, reach, closed)
+    calls = find_external(assembly)
+    return _by_samples(assembly, span, calls, closed, found) if calls else found
+
+
+def _by_samples(
+    assembly: Assembly,
+    span: tuple[float, float],
+    calls: Sequence[Expression],
+    closed: tuple[ClosedForm, FloatArray] | None,
+    other: StepGuard | None,
+) -> StepGuard:
+    """Return what looks at functions in Python now and then, and say so."""
+    inputs, parameters, values = state_groups(assembly.own_equations), assembly.parameters, assembly.parameter_values
+    if closed is not None:
+        program, values = closed[0].accelerations.program, closed[1]
+        inputs, parameters, calls = program.inputs, program.parameters, substitute(calls, closed[0].known)
+    q, u = (group.symbols for group in inputs[1:])
+    moving = [one for one in calls if depends_on(one, [*q, *u])]
+    timed = [one for one in calls if one not in moving]
+
+    def bound(groups: tuple[InputGroup, ...], called: Sequence[Expression]) -> BoundKernel:
+        outputs = (OutputGroup("values", tuple(called)),)
+        name = f"{assembly.flat.name} (functions in Python)"
+        return compile_program(Program(name, groups, tuple(parameters), outputs)).bind(values)
+
+    of_time, of_motion = bound(inputs[:1], timed), bound(inputs, moving)
+    names = ", ".join(sorted({one.payload.name for one in calls}))
+    length = abs(span[1] - span[0])
+    warnings.warn(
+        f"{assembly.flat.name}: nothing is known of {names} but samples, {SAMPLES} a step and {GRID} a run where it "
+        f"is a function of time alone; what lasts less than {length / GRID:.3g} s, or is narrower than that part of a "
+        "step, could be missed",
+        stacklevel=2,
+    )
+    return SampledSteps(
+        lambda t: np.asarray(of_time([t])[0], dtype=float),
+        lambda t, y: np.asarray(of_motion([t], y[: len(q)], y[len(q) : len(q) + len(u)])[0], dtype=float),
+        span,
+        other,
+    ).guard()
+
+
+def _by_bounds(
+    assembly: Assembly,
+    span: tuple[float, float],
+    reach: float,
+    closed: tuple[ClosedForm, FloatArray] | None,
+) -> StepGuard | None:
     curved = find_curved(assembly)
     if not curved or not assembly.kept.get(_NEEDED, lambda: is_needed(assembly, curved, span, reach), span, reach):
         return None
