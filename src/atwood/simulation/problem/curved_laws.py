@@ -81,7 +81,7 @@ def _known(assembly: Assembly, equations: Equations) -> set[Expression]:
 
 def _find(assembly: Assembly, equations: Equations) -> Iterable[Curved]:
     rows = [*equations.rows, *equations.rates, *(one.second for one in equations.constraints)]
-    found = dict.fromkeys(_curved_in(rows, _ALWAYS - {"log", "pow"}))
+    found = dict.fromkeys(_curved_in(rows, _ALWAYS - {"log", "pow", "tan"}))
     kinematics = equations.kinematics
     signals = resolve_signals(assembly.mechanism, equations.site, kinematics, equations.read)
     for local in equations.locals_.values():
@@ -336,6 +336,8 @@ class _Hull:
         kinds = [self._smooth[one.index] for one in node.arguments]
         if all(kind == "fixed" for kind in kinds):
             return "fixed"
+        if node.operation == "atan2":  # which has no other bounds than half a turn to either side
+            return "smooth"
         if "" in kinds:
             return ""
         if node.operation in ("add", "sub", "neg"):
