@@ -111,6 +111,9 @@ def test_many_at_a_time_is_one_by_one(name: str, monkeypatch: pytest.MonkeyPatch
     single = one_by_one(monkeypatch, scene(), threads=1, **given)
     assert found.status == single.status
     assert found.messages == single.messages
+    if name in ("stops", "damped"):  # the force of a stop compares what moves: such runs are made one by one
+        assert found.statistics.batched == 0
+        return
     assert_same(found, single, 1e-10)
 
 

@@ -13,6 +13,7 @@ from atwood.errors import AtwoodError
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import decisions_of
+from atwood.forms.sides.taken_out import has_sides
 from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents
 from atwood.integrators.explicit_session import ExplicitSession, open_explicit
@@ -201,6 +202,8 @@ def find_mode(
     equations = assembly.reduced
     if equations.constraints or not equations.coordinates:
         return None, "events are watched where constraints are left among the coordinates"
+    if has_sides(assembly):
+        return None, "its laws compare what moves"
     t, q, u, length = at
     try:
         plan = make_plan(assembly, t, q, u, length, options.t_end - base.flat.t_start)
