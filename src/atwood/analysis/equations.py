@@ -299,10 +299,14 @@ class EquationsOfMotion(EquationFormulas):
     def python(self) -> str:
         """Return a module of Python that computes and solves the equations, with nothing but `math` and NumPy.
 
+        It holds for the modes that the parts start in: events are not in it. Of multipliers that redundant constraints
+        leave open, it gives the smallest.
+
         Raises
         ------
         UnsupportedError
-            If the scene calls functions of somebody's own, which cannot be written down.
+            If the scene calls functions of somebody's own, which cannot be written down, or reads values that are held
+            from sample to sample, which are no coordinates.
         """
         return module_of(self)
 
