@@ -7,6 +7,7 @@ import pytest
 
 from . import hostile, metamorphic, methods, poles, tables
 from .draw import draw
+from .kinds import run_trial
 from .oracle import STEP, Oracle
 from .scenes import Way, check_mechanism
 from .trial import Discarded
@@ -85,3 +86,9 @@ def test_the_oracle_is_consistent_by_itself() -> None:
             assert np.imag(value) / STEP == pytest.approx(float((row @ speeds + rate).real), abs=1e-9), tie.sort
             looked_at += 1
     assert looked_at > 100
+
+
+@pytest.mark.parametrize("seed", [1000, 1001, 1002, 1003])
+def test_laws_that_compare_places_agree_with_parabolas(seed: int) -> None:
+    trial, _ = run_trial("switches", seed)
+    assert not trial.findings, trial.findings[0].detail
