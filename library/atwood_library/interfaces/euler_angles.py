@@ -85,17 +85,15 @@ class EulerAngles:
     def rates(self) -> tuple[Scalar, Scalar, Scalar]:
         """Return the rates of the three angles, rad/s (Goldstein, section 4.9).
 
-        At a pole at which the axes stay, the first and the third rate share what there is evenly, so that the other
-        combination of the angles stays as it is. Where the axes just pass, the rates have no value.
+        At a pole the first and the third rate share the turn about their common axis evenly, so that the other
+        combination of the angles stays as it is, and the second angle, which is smallest or largest there, rests.
         """
         first, third, spin = self.a[self.i], self.third, self.spin
-        normal, turning = cross(first, third), cross(spin, first)
-        stays = select(dot(turning, turning) > NEARNESS * dot(spin, spin), 0.0, 1.0)
+        normal = cross(first, third)
         off = select(self.square > NEARNESS, 1.0, 0.0)
 
-        def quotient(numerator: Scalar, denominator: Scalar, at_rest: Scalar) -> Scalar:
-            held = (1.0 - off) * stays
-            return (numerator * off + at_rest * held) / (denominator * off + held)
+        def quotient(numerator: Scalar, denominator: Scalar, at_pole: Scalar) -> Scalar:
+            return (numerator * off + at_pole * (1.0 - off)) / (denominator * off + (1.0 - off))
 
         sign = 1.0 if self.again else -self.sense
         return (

@@ -83,7 +83,7 @@ def _find(assembly: Assembly, equations: Equations) -> Iterable[Curved]:
     rows = [*equations.rows, *equations.rates, *(one.second for one in equations.constraints)]
     found = dict.fromkeys(_curved_in(rows, _ALWAYS - {"log", "pow", "tan"}))
     kinematics = equations.kinematics
-    signals = resolve_signals(assembly.mechanism, equations.site, kinematics, equations.read)
+    signals = resolve_signals(assembly.mechanism, equations.site, kinematics)
     for local in equations.locals_.values():
         laws, _ = in_joint_coordinates(local, kinematics, _laws_of(local))
         mine = list(_curved_in([*laws, *signals.values()], _ALWAYS | {"div", "mul"}))
@@ -91,8 +91,9 @@ def _find(assembly: Assembly, equations: Equations) -> Iterable[Curved]:
         mine += [one for one in _curved_in(places, _ALWAYS - {"tan"} | {"div", "mul"}) if not _has_root(one.argument)]
         if mine:
             mapping = {**local_map(equations.site, local, kinematics), **signals}
-            placed = substitute([one.argument for one in mine], mapping)
-            powers = substitute([one.exponent or equations.graph.one for one in mine], mapping)
+            both = [one.argument for one in mine] + [one.exponent or equations.graph.one for one in mine]
+            both = substitute(substitute(both, mapping), equations.read)  # how reactions are solved for is no law
+            placed, powers = both[: len(mine)], both[len(mine) :]
             more = zip(mine, placed, powers, strict=True)
             found |= dict.fromkeys(Curved(a.operation, b, None if a.exponent is None else c) for a, b, c in more)
     known = _known(assembly, equations)
@@ -220,6 +221,7 @@ def watched_program(
     parameters: Sequence[Expression],
     angles: Sequence[Expression] = (),
     known: Mapping[Expression, Expression] | None = None,
+    smooth: Iterable[Expression] = (),
 ) -> Program:
     """Return a program that says how far functions change over a step of a solver.
 
@@ -240,6 +242,8 @@ def watched_program(
         The symbols of angles, of whose sines and cosines places are made.
     known
         What other coordinates and speeds are, in terms of the solver's.
+    smooth
+        What is smooth over a step whatever it is made of, as are reactions.
     """
     (time,), *states = (group.symbols for group in inputs)
     unknowns = [one for group in states for one in group]
@@ -248,7 +252,7 @@ def watched_program(
     reach = graph.symbol("watched:reach")
     along: dict[Expression, Expression | float] = {time: 1.0}
     along |= {y: graph.symbol(f"watched:{y.name}'") for y in unknowns}
-    hull = _Hull(ends, along, set(parameters), set(angles), dict(known or {}))
+    hull = _Hull(ends, along, set(parameters), set(angles), dict(known or {}), smooth)
     wanted = [x for one in curved for x in (one.argument, one.exponent) if x is not None]
     found = enclose(wanted, hull)
     score: Scalar = 0.0
@@ -289,10 +293,11 @@ class _Hull:
         parameters: set[Expression],
         coordinates: set[Expression],
         known: Mapping[Expression, Expression],
+        smooth: Iterable[Expression],
     ) -> None:
         self._ends, self._along, self._parameters, self._known = ends, dict(along), parameters, known
         self._coordinates = coordinates
-        self._smooth: dict[int, str] = {}
+        self._smooth = {one.index: "fixed" if one.is_parametric else "smooth" for one in smooth}
         self.angles: dict[int, Pair] = {}
 
     def __call__(self, node: Expression) -> Pair | None:

@@ -114,7 +114,8 @@ def _by_bounds(
         if form is not None:
             found = form.accelerations.program
             groups, parameters, known = found.inputs, found.parameters, form.known
-        return watched_program(assembly.flat.name, curved, groups, parameters, angles, known)
+        reactions = equations.read.values()
+        return watched_program(assembly.flat.name, curved, groups, parameters, angles, known, reactions)
 
     shared = assembly.shared
     try:
