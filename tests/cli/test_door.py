@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-BUDGET = 258
+BUDGET = 271
 """So many modules beside those of Python and NumPy may be loaded; the run below needs some 255 of them."""
 
 HEAVY = ("rich", "sympy", "networkx", "matplotlib", "scipy", "sksundae", "numpy.ma", "numpy.polynomial")

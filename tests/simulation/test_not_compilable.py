@@ -68,7 +68,10 @@ def looped(kind: type[Plain]) -> Scene:
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("make", [hanging, looped])
 def test_a_function_in_python_is_announced_and_runs(make: Any, form: str, solver: str) -> None:
-    with pytest.warns(UserWarning, match=r"is evaluated in Python.*odd\.energy calls the function 'cube'"):
+    with (
+        pytest.warns(UserWarning, match=r"is evaluated in Python.*odd\.energy calls the function 'cube'"),
+        pytest.warns(UserWarning, match=r"nothing is known of cube.* but samples"),
+    ):
         found = aw.simulate(make(Odd), form=form, solver=solver, rtol=1e-8, t_end=0.4, outputs=5)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -85,7 +88,10 @@ def test_the_part_that_is_named_is_the_one_that_calls() -> None:
     scene.add("blow", Force(value=lambda t: external(wind, t)))
     for name in ("push", "blow"):
         scene.connect(getattr(scene, name).point, scene.bob.point)
-    with pytest.warns(UserWarning, match=r"blow\.value calls the function 'wind'"):
+    with (
+        pytest.warns(UserWarning, match=r"blow\.value calls the function 'wind'"),
+        pytest.warns(UserWarning, match="nothing is known of wind but samples"),
+    ):
         aw.simulate(scene, t_end=0.1)
 
 

@@ -41,6 +41,7 @@ NOT_POSITIVE = [*NO_NUMBER, 0, -1, -1e-300]
 
 BAD: dict[str, list[Any]] = {
     "number": NO_NUMBER,
+    "formula": [*(one for one in NO_NUMBER if not isinstance(one, str)), "wrod", "x y +"],
     "optional number": [one for one in NO_NUMBER if one is not None],
     "scalar": [one for one in NO_NUMBER if not isinstance(one, (float, bool, int, list))],
     "condition": ["x", b"x", object(), Odd(), None, [], {}],

@@ -119,13 +119,19 @@ def _runs() -> Iterator[Call]:
             "threads": "optional whole",
             "executor": "optional object",
             "accuracy": "optional error",
+            "until": "stop condition",
             "name": "text",
         },
         also={
             "vary": ({"mass1": "x"}, {"mass1": [None]}, {"mass1": 3}, {3: [1.0]}, {"mass1": []}, {"mass1": {1.0}}),
             "start": ({"rod1.angle": [None]}, {"rod1.angle": "x"}, {None: [1.0]}, {"rod1.angle": [1j]}),
         },
-        said_as={"vary": ("mass1", "3"), "start": ("rod1.angle", "None"), "quantities": ("no.such",)},
+        said_as={
+            "vary": ("mass1", "3"),
+            "start": ("rod1.angle", "None"),
+            "quantities": ("no.such",),
+            "until": ("crosses",),
+        },
     )
     yield Call(
         "compare",
@@ -196,8 +202,9 @@ def _pictures() -> Iterator[Call]:
     shown = {"result": result()}
     also = {"times": ([], ["x"], [None], [1e9], [np.nan], "x"), "trace": (["x"],), "view": ("3", (1.0,), (0.0, 100.0))}
     said = {**_SAID, "times": ("t =",), "seconds": ("frames",)}
-    yield Call("plot", atwood.plot, shown, {"result": "object", "paths": "texts", "file": "picture"}, said_as=said)
-    yield Call("Result.plot", result().plot, {}, {"paths": "texts", "file": "picture"}, said_as=said, has_names=False)
+    drawn = {"paths": "texts", "file": "picture", "x": "optional word"}
+    yield Call("plot", atwood.plot, shown, {"result": "object", **drawn}, said_as=said)
+    yield Call("Result.plot", result().plot, {}, drawn, said_as=said, has_names=False)
     yield Call(
         "plot_mechanism",
         atwood.plot_mechanism,
@@ -626,6 +633,8 @@ def _parts() -> Iterator[Call]:
                 kind = "needed text"
             elif spec.array:
                 kind = "array"
+            elif spec.function_of:
+                kind = "formula"
             elif spec.size is not None or spec.direction:
                 kind = "axis" if spec.direction else "vector"
             else:

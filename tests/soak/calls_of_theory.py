@@ -143,7 +143,10 @@ def _linear() -> Iterator[Call]:
         {**scene, "unknowns": ["rod.angle"], "conditions": {"bob.position.x": 0.5}},
         {**_SCENE, "unknowns": "some texts", "conditions": "mapping"},
         {"conditions": ({"bob9.position.x": 1.0}, {"bob.position.x": "x"}, {3: 1.0}, {"bob.position.x": "1 kg"})},
-        {"unknowns": ("no.such", "no part", "quantity"), "conditions": ("bob.position.x", "bob9", "3", "condition")},
+        {
+            "unknowns": ("no.such", "no part", "quantity", "no parameter"),
+            "conditions": ("bob.position.x", "bob9", "3", "condition"),
+        },
     )
 
 

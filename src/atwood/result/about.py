@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from atwood.errors import AtwoodError
-from atwood.model.compose.serialization import to_data
 from atwood.result.result import Result
 
 __all__ = ["describe_all", "describe_run", "solver_name", "versions"]
@@ -124,6 +123,8 @@ def describe_all(result: Result) -> dict[str, Any]:
         As `describe_run`, with ``"parameters"`` by path in SI units, ``"source"``, the scene as `to_data` writes it,
         and the arguments of `simulate` under ``"asked"``, ``"again"``; ``"no_source"`` says why there is no scene.
     """
+    from atwood.model.compose.serialization import to_data  # few runs are saved
+
     found, source = describe_run(result), result.assembly.source
     scene = None if source is None else source.scene
     parts = [one.component for one in result.assembly.flat.parts.values()]

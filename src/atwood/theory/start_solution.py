@@ -142,7 +142,11 @@ class _Problem:
             owner, _, name = path.rpartition(".")
             value = getattr(scene[owner] if owner else scene, name, None)
             if not isinstance(value, (int, float)):
-                raise UsageError("it is no parameter with a number, and no quantity to start with", where=path)
+                raise UsageError(
+                    "it is no parameter with a number, and no quantity to start with",
+                    where=path,
+                    advice="Name a parameter, such as 'rod.length', or a coordinate or a speed, such as 'rod.angle'.",
+                )
             found.append(float(value))
         return np.array(found)
 

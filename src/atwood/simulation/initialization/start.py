@@ -22,7 +22,7 @@ from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_
 from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble, from_regular, own_names, switch_coordinates
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, scene_length
-from atwood.simulation.dynamics.undefined_values import undefined_value_at
+from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.initialization.positions import solve_positions
 from atwood.simulation.initialization.speeds import solve_speeds
 from atwood.simulation.initialization.targets import sort_targets
@@ -176,7 +176,7 @@ def _without_value(assembly: Assembly, t: float, error: KernelEvaluationError) -
     return StartError(
         f"{found.quantity} has no value where the start puts the bodies at first{why}",
         where=found.part,
-        advice="Give start values or guesses, of places and orientations, with which it has one.",
+        advice=f"Give start values or guesses, of places and orientations, with which it has one. {ADVICE_AT_START}",
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +14,12 @@ from atwood.codegen.python.backend import compile_program
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.forms.loops.closed_form import ClosedForm
 from atwood.forms.program import state_groups
 from atwood.integrators.compiled_functions import StepGuard
-from atwood.integrators.sampled_steps import GRID, SAMPLES, SampledSteps
 from atwood.simulation.problem.curved_laws import find_curved, find_external, is_needed, watched_program
+
+if TYPE_CHECKING:
+    from atwood.forms.loops.closed_form import ClosedForm
 
 __all__ = ["REACHES", "step_guard"]
 
@@ -66,6 +68,8 @@ def _by_samples(
     other: StepGuard | None,
 ) -> StepGuard:
     """Return what looks at functions in Python now and then, and say so."""
+    from atwood.integrators.sampled_steps import GRID, SAMPLES, SampledSteps  # few laws are in Python
+
     inputs, parameters, values = state_groups(assembly.own_equations), assembly.parameters, assembly.parameter_values
     if closed is not None:
         program, values = closed[0].accelerations.program, closed[1]
@@ -80,7 +84,7 @@ def _by_samples(
         return compile_program(Program(name, groups, tuple(parameters), outputs)).bind(values)
 
     of_time, of_motion = bound(inputs[:1], timed), bound(inputs, moving)
-    names = ", ".join(sorted({one.payload.name for one in calls}))
+    names = ", ".join(sorted({one.payload.name.rstrip("'") for one in calls}))
     length = abs(span[1] - span[0])
     warnings.warn(
         f"{assembly.flat.name}: nothing is known of {names} but samples, {SAMPLES} a step and {GRID} a run where it "

@@ -39,7 +39,6 @@ from atwood.simulation.run.record import Recorder, SegmentRecord
 from atwood.simulation.run.segment import run_segment
 from atwood.simulation.run.session import KeptSession
 from atwood.simulation.run.sides_of_run import SidesOfRun
-from atwood.simulation.run.stuck import failed
 from atwood.simulation.run.tolerances import allowed
 from atwood.stages import stage
 from atwood.topology.orientation_coordinates import Orientation
@@ -389,6 +388,8 @@ class _Walk:
             message = outcome.error.message
         made = self._run_so_far(status, message)
         if status == "failed":
+            from atwood.simulation.run.stuck import failed  # few runs fail
+
             error = outcome.error or failed(message, self.assembly.flat.name, self.t > self.start.time)
             error.run = made  # type: ignore[attr-defined]
             raise error
