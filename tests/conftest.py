@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import shutil
+import tempfile
 from collections import defaultdict
 
 import pytest
@@ -11,6 +14,12 @@ import pytest
 # Workers share the cores already. Threads of BLAS that wait for each other make small stacked solves many times slower.
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+# Where no compiled modules may be written beside the sources, each process that a test starts would compile them all.
+# They share a folder of them for as long as the tests run; workers of xdist have it from the process that starts them.
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", "") and "PYTHONPYCACHEPREFIX" not in os.environ:
+    os.environ["PYTHONPYCACHEPREFIX"] = _compiled = tempfile.mkdtemp(prefix="atwood-modules-")
+    atexit.register(shutil.rmtree, _compiled, ignore_errors=True)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -162,6 +162,16 @@ def test_fast_motions_have_frames_enough(tmp_path) -> None:
         assert gif.n_frames == 10
 
 
+def test_few_states_are_drawn_once_each_and_play_as_long(tmp_path) -> None:
+    from PIL import Image, ImageSequence
+
+    result = simulate(SCENES["simple-pendulum"](), t_end=0.1, outputs=5)
+    animate(result, tmp_path / "few.gif")
+    with Image.open(tmp_path / "few.gif") as gif:
+        assert gif.n_frames == 5
+        assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(gif)) == pytest.approx(2000.0, rel=0.01)
+
+
 def chain(count: int) -> Scene:
     scene = Scene(space="line")
     before = scene.add("wall", Ground()).frame

@@ -196,7 +196,7 @@ def animate(
     seconds
         How long it plays; as long as the run took in its own time when not given, but two to twenty seconds.
     frames_per_second
-        Frames in a second.
+        Frames in a second, at most; a run of fewer states than frames shows each state once.
     view, trace
         See `plot_mechanism`.
 
@@ -220,7 +220,8 @@ def animate(
     span = float(result.time[-1] - result.time[0])
     lasting = min(max(span, 2.0), 20.0) if seconds is None else seconds
     digits = int(np.clip(2.0 - np.floor(np.log10(span or 1.0)), 2, 9))
-    count = max(2, round(lasting * frames_per_second))
+    # A run of fewer states than frames is shown once each, for longer.
+    count = max(2, min(round(lasting * frames_per_second), len(result.time)))
     wanted = np.linspace(result.time[0], result.time[-1], count)
     moments = [int(np.argmin(np.abs(result.time - time))) for time in wanted]
     traced = find_connectors(result, trace)
@@ -248,7 +249,7 @@ def animate(
 
     figure.set_layout_engine("none")
     motion = FuncAnimation(figure, show, frames=count, blit=False)  # type: ignore[arg-type]
-    writer = PillowWriter(fps=frames_per_second)
+    writer = PillowWriter(fps=min(frames_per_second, count / lasting))  # type: ignore[arg-type]  # any number will do
     with TemporaryDirectory() as folder:
         made = Path(folder, "motion.gif")
         motion.save(str(made), writer=writer, dpi=80)
