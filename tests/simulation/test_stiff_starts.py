@@ -96,3 +96,21 @@ def test_first_steps_that_are_none_are_refused(given: Any) -> None:
         simulate(chain((100.0,), (1.0,), 3.0), t_end=1.0, first_step=given)
     with pytest.raises(UsageError, match="first_step"):
         simulate(chain((100.0,), (1.0,), 3.0), t_end=1.0, first_step=0.1, solver="gauss")
+
+
+@pytest.mark.parametrize("damping", [1.9e4, 2e4, 1e5])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+def test_steps_of_order_one_do_not_stay_as_short_as_a_transient(damping: float, rtol: float) -> None:
+    """They were 80,000 to 170,000 a second: each that was made longer was repeated, and no higher order was tried."""
+    run = simulate(chain((1e8,), (damping,), 3.0), solver="ida", rtol=rtol, t_end=2.0, outputs=3)
+    assert run.statistics.steps < 10_000
+    assert run["m0.position.x"][-1] - 1.0 == pytest.approx(exact((1e8,), (damping,), 3.0, 0.0, 2.0)[0], abs=1e-8)
+
+
+@pytest.mark.parametrize("at", [0.0, 0.1])
+def test_the_solver_is_chosen_again_once_a_vibration_has_died(at: float) -> None:
+    """Explicit steps would follow a vibration of 100 rad/s, of which nothing is left, for 1e6 s."""
+    run = simulate(chain((1e4,), (5.0,), 1e-3, at), t_end=1e5, outputs=3)
+    assert [one.solver for one in run.run.choices] == ["explicit", "ida"]
+    assert run.statistics.steps < 10_000
+    assert run["m0.position.x"][-1] - 1.0 == pytest.approx(exact((1e4,), (5.0,), 1e-3, at, 1e5)[0], abs=1e-7)

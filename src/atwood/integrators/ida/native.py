@@ -24,7 +24,16 @@ from atwood.integrators.event_location import EventLocator, Root, State
 from atwood.integrators.ida.callbacks import Record, explain
 from atwood.integrators.ida.library import available, library, why_not
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
-from atwood.integrators.ida.pace import FIRST_CHUNK, Pace, first_chunk
+from atwood.integrators.ida.pace import (
+    ENDLESS,
+    FIRST_CHUNK,
+    NO_GROWTH,
+    RARE_GROWTH,
+    REPEATED,
+    TRAPPED,
+    Pace,
+    first_chunk,
+)
 from atwood.integrators.ida.setup import IdaTuning, prepare
 from atwood.integrators.ida.states import checked_state, copied, is_finite
 from atwood.integrators.ida.sundae import REASONS, SHORTER, TOO_LONG
@@ -119,6 +128,7 @@ class NativeSession:
         self._no_events = (0,) * problem.event_count
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
         self._starts = 0
+        self._was_trapped = False
         self._seconds = 0.0
         self._pending: StepResult | None = None
         self._pace = Pace(FIRST_CHUNK if self._record.calls_python else first_chunk(problem.size))
@@ -345,6 +355,7 @@ class NativeSession:
                 self._here = float(times[filled - 1]), rows[-1].copy(), before[2]
             if flag in (0, self._paused_flag):
                 self._read(filled)
+                self._pending = self._judge_lap(self._reached)
             else:
                 self._pending = self._passed(flag, t)
             bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
@@ -442,9 +453,9 @@ class NativeSession:
                 begin = self._memory.begin_of_step()
                 self._searched = max(self._searched, begin if flag == ROOT_RETURN else t)
                 self._looks_on = flag != ROOT_RETURN
-            return (
-                StepResult(*copied(self._here), Status.NOTICED, self._no_events) if flag == self._noticed_flag else None
-            )
+            if flag == self._noticed_flag:
+                return StepResult(*copied(self._here), Status.NOTICED, self._no_events)
+            return self._judge_lap(self._reached)
         failure = self._judge(0 if flag == TOO_MUCH_WORK else flag, t)
         if failure is None:
             self._reached = self._searched = t
@@ -503,9 +514,21 @@ class NativeSession:
             if self._native is not None:
                 explain(self._problem, self._record, self._ahead())
             return self._stopped(Status.FAILED, "the steps became too small to move the time", self._pace.mark[0])
-        if self._pace.crawls(t, self._memory.steps(), self._repeated, self._horizon):
+        return self._judge_lap(t)
+
+    def _judge_lap(self, t: float) -> StepResult | None:
+        """Return an answer if so many steps are repeated that the run would not end; have them grow more rarely."""
+        lap = self._pace.lap_of(t, self._memory.steps(), self._repeated)
+        if lap is None:
+            return None
+        advance, repeated = lap
+        if repeated > REPEATED and advance * ENDLESS < self._horizon:
             self._stale = True
             return self._stopped(Status.FAILED, "rounding keeps the steps so short that the run would not end")
+        is_trapped = repeated > TRAPPED
+        if is_trapped or self._was_trapped:
+            self._memory.call("IDASetEtaFixedStepBounds", 1.0, NO_GROWTH if is_trapped else RARE_GROWTH)
+            self._was_trapped = is_trapped
         return None
 
     def _repeated(self) -> int:

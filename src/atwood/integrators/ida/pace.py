@@ -22,8 +22,18 @@ _FIRST_COMPILED_CHUNK, _SMALL = 500, 40
 """The same at first with compiled functions, up to so many unknowns; with more of them fewer."""
 
 
-_CRAWL, _REPEATED, _ENDLESS = 2000, 0.25, 1e9
-"""Steps do not get on if over so many of them such a share had to be repeated, and it would take so many to the end."""
+_LAP = 2000
+"""Over so many steps it is judged how they get on."""
+
+REPEATED, ENDLESS = 0.25, 1e9
+"""Steps do not get on if such a share of them had to be repeated, and it would take so many to the end."""
+
+TRAPPED, NO_GROWTH, RARE_GROWTH = 0.5, 1e6, 4.0
+"""Where so large a share is repeated, no step of the next lap is longer, and later ones only by such a factor.
+
+In what dies away fast, a step of order one that is made longer starts a new transient, and is repeated. IDA looks at
+higher orders only after steps of the same length, so that it stays at the order and at the length of the transient.
+"""
 
 
 def first_chunk(size: int) -> int:
@@ -68,11 +78,10 @@ class Pace:
             return False
         return steps - count >= STALLED_STEPS
 
-    def crawls(self, t: float, steps: int, repeated: Callable[[], int], horizon: float) -> bool:
-        """Tell whether rounding keeps steps so short that the run would never end: every few are repeated."""
+    def lap_of(self, t: float, steps: int, repeated: Callable[[], int]) -> tuple[float, float] | None:
+        """Return how far each step of a lap has come, and which share was repeated; None while the lap goes on."""
         since, count, before = self.lap
-        if steps - count < _CRAWL:
-            return False
+        if steps - count < _LAP:
+            return None
         self.lap = t, steps, repeated()
-        is_endless = (t - since) * _ENDLESS < horizon * (steps - count)
-        return is_endless and self.lap[2] - before > _REPEATED * (steps - count)
+        return (t - since) / (steps - count), (self.lap[2] - before) / (steps - count)

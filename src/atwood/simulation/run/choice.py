@@ -22,7 +22,7 @@ from atwood.late import dataclass
 from atwood.simulation.problem.explicit_scene import explicit_problem, explicit_problem_of
 from atwood.simulation.problem.options import SOLVERS, RunOptions
 from atwood.simulation.problem.problem import Plan
-from atwood.simulation.run.stiffness import Stiffness, can_be_stiff, find_stiffness
+from atwood.simulation.run.stiffness import Stiffness, can_be_stiff, find_stiffness, present_time
 
 if TYPE_CHECKING:
     from atwood.simulation.problem.closed_loops import Solved
@@ -245,7 +245,9 @@ def _in_words(found: Stiffness) -> str:
     return f"something dies away {found.ratio:.2g} times as fast as anything else happens"
 
 
-def stiffness_of(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Stiffness | None:
+def stiffness_of(
+    plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray, goes_on: bool = False
+) -> Stiffness | None:
     """Return how stiff a scene is at a state; None if nothing in it can die away.
 
     Parameters
@@ -254,11 +256,14 @@ def stiffness_of(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: Fl
         The scene in its mode, and what was asked for.
     t, q, u
         The state.
+    goes_on
+        Whether a run is there on its way: then what happens in it is as fast as the state changes, and not as at its
+        start, of which nothing may be left.
     """
     assembly = plan.assembly
     if not can_be_stiff(assembly):
         return None
-    y = np.concatenate([q, u])
+    y, count, time = np.concatenate([q, u]), len(q), plan.scales.time
     scale = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
     if plan.balance.constraints:
         from atwood.simulation.problem.closed_loops import solve_at
@@ -266,7 +271,7 @@ def stiffness_of(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: Fl
         solved = solve_at(plan, t, q, u)
         if solved is not None:
             problem = explicit_problem_of(assembly, solved.form.accelerations, solved.values)
-            y, scale = solved.reduced(y), solved.reduced(scale)
+            y, scale, count = solved.reduced(y), solved.reduced(scale), len(solved.independent)
         else:
             problem = _on_constraints(plan, t, y)
     elif assembly.form == "dae":
@@ -277,7 +282,9 @@ def stiffness_of(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: Fl
             return None
         problem = found
     span = max(options.t_end - t, 0.0)
-    return find_stiffness(problem.rates, t, y, scale, plan.scales.time, span, options.relative_tolerance)
+    if goes_on:
+        time = present_time(problem.rates, t, y, scale, count, time, span)
+    return find_stiffness(problem.rates, t, y, scale, time, span, options.relative_tolerance)
 
 
 def _on_constraints(plan: Plan, t: float, y: FloatArray) -> ExplicitProblem:

@@ -298,7 +298,7 @@ class _Runner:
 
     def _is_stiff(self, t: float, y: FloatArray) -> bool:
         plan = self.segment.plan
-        found = stiffness_of(plan, self.segment.options, t, *plan.program.split(y))
+        found = stiffness_of(plan, self.segment.options, t, *plan.program.split(y), goes_on=True)
         if found is None or not found.is_stiff:
             return False
         self.choices.append(turned_stiff(t, found))

@@ -23,7 +23,7 @@ from atwood.forms.kept import Key
 from atwood.integrators.protocol import FloatArray, Values
 from atwood.late import dataclass
 
-__all__ = ["Stiffness", "can_be_stiff", "find_stiff_rows", "find_stiffness"]
+__all__ = ["Stiffness", "can_be_stiff", "find_stiff_rows", "find_stiffness", "present_time"]
 
 RATIO = 300.0
 """A decay that is so many times as fast as anything else is left to an implicit method."""
@@ -110,6 +110,34 @@ def find_stiffness(
     if matrix is None:
         return Stiffness(0.0, 0.0, RATIO)
     return _judged(matrix, time, span, relative_tolerance)
+
+
+def present_time(
+    rates: Callable[[float, FloatArray], Values],
+    t: float,
+    y: FloatArray,
+    scale: FloatArray,
+    coordinates: int,
+    time: float,
+    span: float,
+) -> float:
+    """Return the time in which something happens at a state, s, by how fast it changes.
+
+    Parameters
+    ----------
+    rates, t, y, scale, span
+        As of `find_stiffness`.
+    coordinates
+        How many of the unknowns are coordinates; the others are their speeds.
+    time
+        What makes sizes of speeds of those of coordinates, s.
+    """
+    try:
+        changes = np.abs(np.asarray(rates(t, y), dtype=float)) / scale
+    except (KernelEvaluationError, ArithmeticError):
+        return time
+    fastest = max(np.max(changes[:coordinates]), np.sqrt(np.max(changes[coordinates:], initial=0.0) / time))
+    return min(span, 1.0 / float(fastest)) if fastest > 0.0 else span
 
 
 def find_stiff_rows(
