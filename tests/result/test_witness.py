@@ -112,7 +112,7 @@ def test_the_energy_needs_none_where_runs_are_right(form: str) -> None:
 
 def test_a_second_solution_that_missed_a_law_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where all that can be solved steps over a hill, the error is not known, and not said to be small or large."""
-    monkeypatch.setattr("atwood.simulation.problem.step_guard.find_curved", lambda assembly: ())  # nothing watches
+    monkeypatch.setattr("atwood.simulation.problem.step_guard.find_curved", lambda *_: ())  # nothing watches
     monkeypatch.setattr(second_run, "_STEPS", 0.01)
     monkeypatch.setattr(second_run, "_SHORTER", (1.0,))
     missed = simulate(hill(0.45, 0.002), rtol=1e-10, solver="taylor", samples=4000)
@@ -134,7 +134,7 @@ def test_a_second_solution_that_missed_a_law_is_not_believed(monkeypatch: pytest
 
 
 def test_a_second_solution_takes_other_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("atwood.simulation.problem.step_guard.find_curved", lambda assembly: ())  # nothing watches
+    monkeypatch.setattr("atwood.simulation.problem.step_guard.find_curved", lambda *_: ())  # nothing watches
     result = simulate(hill(), solver="taylor", rtol=1e-10)
     assert result.statistics.steps < 5
     assert result.second.statistics.steps > 90

@@ -204,6 +204,70 @@ def pendulum_over_a_magnet() -> float:
     return float(exact.y[0, -1])
 
 
+def place_after(potential: Any, seconds: float) -> float:
+    """Return where a mass of 1 kg is that begins at zero with 1 m/s: time as an integral of place, turned round."""
+    x = np.linspace(0.0, 20.0, 2_000_001)
+    slowness = 1.0 / np.sqrt(1.0 + 2.0 * (potential(np.zeros(1)) - potential(x)))
+    times = np.concatenate([[0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1])) * x[1]])
+    return float(np.interp(seconds, times, x))
+
+
+UNEVEN = {
+    "0.03*sqrt((x-2.2)^2+1e-6)": lambda x: 0.03 * np.sqrt((x - 2.2) ** 2 + 1e-6),
+    "0.02*((x-2.2)^2+1e-6)^0.35": lambda x: 0.02 * ((x - 2.2) ** 2 + 1e-6) ** 0.35,
+    "0.1*sin(200*x)*exp(-((x-5)/0.1)^2)": lambda x: 0.1 * np.sin(200 * x) * np.exp(-(((x - 5) / 0.1) ** 2)),
+    "0.05*cos(300*x)/(1+((x-4)/0.2)^2)": lambda x: 0.05 * np.cos(300 * x) / (1 + ((x - 4) / 0.2) ** 2),
+    "0.2*tanh((x-3)/0.002)": lambda x: 0.2 * np.tanh((x - 3) / 0.002),
+    "0.001*sin(50*x)^2*x^2": lambda x: 0.001 * np.sin(50 * x) ** 2 * x**2,
+}
+
+
+@pytest.mark.parametrize("solver", ["gauss", "composition"])
+@pytest.mark.parametrize("potential", UNEVEN)
+def test_steps_of_fixed_length_see_corners_and_waves_farther_on(solver: str, potential: str) -> None:
+    expected = place_after(UNEVEN[potential], 10.0)
+    assert simulate(on_a_line(potential), solver=solver)["mass.displacement"][-1] == pytest.approx(expected, abs=3e-6)
+    if solver == "composition":
+        result = simulate(on_a_line(potential), solver=solver, accuracy=1e-7)
+        assert result["mass.displacement"][-1] == pytest.approx(expected, abs=3e-6)
+
+
+@pytest.mark.parametrize(("order", "rtol"), [(2, 1e-4), (4, 1e-6), (8, 1e-6)])
+@pytest.mark.parametrize("solver", ["gauss", "composition"])
+def test_a_corner_on_a_slanted_way_far_off_is_seen_with_any_order(solver: str, order: int, rtol: float) -> None:
+    c, s = math.cos(0.7), math.sin(0.7)
+    scene = in_a_plane(f"0.03*sqrt(((x-300)*{c}+(z-400)*{s}-2.2)^2+1e-6)", (c, s))
+    scene.start.update({"mass.position.x": 300.0, "mass.position.z": 400.0})
+    along = place_after(lambda x: 0.03 * np.sqrt((x - 2.2) ** 2 + 1e-6), 10.0)
+    result = simulate(scene, solver=solver, order=order, rtol=rtol)
+    assert result["mass.position.x"][-1] == pytest.approx(300.0 + c * along, abs=100 * rtol)
+
+
+@pytest.mark.parametrize("solver", ["gauss", "composition"])
+def test_steps_that_resolve_a_wave_or_a_spring_from_the_start_stay_equal(solver: str) -> None:
+    from atwood_library.scenes import ElasticPendulum
+
+    for scene in (on_a_line("0.2*cos(x)"), on_a_line("0.3*sin(5*x)"), ElasticPendulum()):
+        assert simulate(scene, solver=solver).statistics.error_test_failures == 0
+
+
+CHOICES = {
+    "exp(-100*maximum(x-3,0.0))": lambda x: np.exp(-100 * np.maximum(x - 3, 0)),
+    "0.1*tanh(select(x<3,(x-3)*40,(x-3)*4))": lambda x: 0.1 * np.tanh((x - 3) * np.where(x < 3, 40, 4)),
+    "0.3*exp(-select(x<3, 9, (x-6)/0.01)^2)": lambda x: 0.3 * np.exp(-(np.where(x < 3, 9, (x - 6) / 0.01) ** 2)),
+    "0.3*exp(-(asin((x-5)/20)/1e-3)^2)": lambda x: 0.3 * np.exp(-((np.arcsin((x - 5) / 20) / 1e-3) ** 2)),
+    "0.3*exp(-acos((x-5)/20)^2)": lambda x: 0.3 * np.exp(-(np.arccos((x - 5) / 20) ** 2)),
+}
+
+
+@pytest.mark.parametrize("solver", ALL)
+@pytest.mark.parametrize("potential", CHOICES)
+def test_a_curved_function_of_a_choice_or_an_arc_holds_no_run_up(solver: str, potential: str) -> None:
+    expected = place_after(CHOICES[potential], 10.0)
+    result = simulate(on_a_line(potential), solver=solver, max_seconds=5)
+    assert result["mass.displacement"][-1] == pytest.approx(expected, abs=BOUND.get(solver, 1e-5))
+
+
 def test_sweeps_and_other_values_are_watched_with_their_own() -> None:
     def expected(width: float, speed: float) -> float:
         return delayed(lambda x: 0.45 * math.exp(-(((x - 2) / width) ** 2)), 2.0, width, speed)

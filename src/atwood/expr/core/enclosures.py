@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from atwood.expr.core.functions import (
     Scalar,
     absolute,
+    acos,
+    asin,
     atan,
     cos,
     exp,
@@ -140,7 +142,15 @@ def _capped(function: Callable[[Scalar], Scalar], most: float) -> Callable[[Pair
     return lambda a: (function(maximum(minimum(a[0], most), -most)), function(maximum(minimum(a[1], most), -most)))
 
 
-_TRUTH = lambda *_: (0.0, 1.0)  # noqa: E731
+def _less(a: Pair, b: Pair) -> Pair:
+    return _at_most(a[1], b[0]), _at_most(a[0], b[1])
+
+
+def _choice(c: Pair, a: Pair, b: Pair) -> Pair:
+    least, most = magnitude(c)
+    low, high = minimum(a[0], b[0]), maximum(a[1], b[1])
+    return select(least, a[0], select(most, low, b[0])), select(least, a[1], select(most, high, b[1]))
+
 
 _RULES: Mapping[str, Callable[..., Pair]] = {
     "add": lambda a, b: (a[0] + b[0], a[1] + b[1]),
@@ -159,14 +169,17 @@ _RULES: Mapping[str, Callable[..., Pair]] = {
     "sin": _wave(sin, cos),
     "cos": _wave(cos, sin),
     "tan": _tangent,
-    "asin": lambda a: (-0.5 * _PI, 0.5 * _PI),
-    "acos": lambda a: (0.0, _PI),
+    "asin": _capped(asin, 1.0),
+    "acos": lambda a: _capped(acos, 1.0)(a)[::-1],
     "atan2": lambda a, b: (-_PI, _PI),
     "absolute": magnitude,
     "sign": _rising(sign),
     "floor": _rising(floor),
     "minimum": lambda a, b: (minimum(a[0], b[0]), minimum(a[1], b[1])),
     "maximum": lambda a, b: (maximum(a[0], b[0]), maximum(a[1], b[1])),
-    "select": lambda c, a, b: (minimum(a[0], b[0]), maximum(a[1], b[1])),
-    **dict.fromkeys(("less", "less_equal", "logical_not", "logical_and", "logical_or"), _TRUTH),
+    "select": _choice,
+    **dict.fromkeys(("less", "less_equal"), _less),
+    "logical_not": lambda a: (1.0 - a[1], 1.0 - a[0]),
+    "logical_and": lambda a, b: (a[0] * b[0], a[1] * b[1]),
+    "logical_or": lambda a, b: (maximum(a[0], b[0]), maximum(a[1], b[1])),
 }

@@ -11,7 +11,7 @@ from atwood.codegen.routines.kinds import ADDRESS, NUMBER
 from atwood.codegen.routines.language import Routine, Value
 from atwood.codegen.routines.source import RoutineSource
 from atwood.integrators.composition.coefficients import steps_of
-from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, run, sample
+from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, judge, run, sample
 from atwood.integrators.gauss.layout import Layout, Memory, open_routine
 
 __all__ = ["composition_source", "write_routines"]
@@ -28,8 +28,8 @@ def composition_source(layout: Layout, order: int) -> RoutineSource:
 
 def write_routines(layout: Layout, order: int) -> list[Routine]:
     """Write the routines; see `composition_source`."""
-    parts = [_drift(layout), _kick(layout), _compose(layout, steps_of(order)), _begin(layout), _run(layout)]
-    return [*parts, _trial(layout), _speeds(layout), interpolate(layout), sample(layout)]
+    parts = [_drift(layout), _kick(layout), _compose(layout, steps_of(order)), _begin(layout)]
+    return [*parts, judge(layout), _run(layout), _trial(layout), _speeds(layout), interpolate(layout), sample(layout)]
 
 
 def _unless_found(r: Routine, code: Value, given: int = 1) -> None:

@@ -11,7 +11,7 @@ from atwood.late import dataclass
 
 __all__ = ["COUNTS", "NUMBERS", "POINTERS", "Layout", "Memory", "open_routine"]
 
-POINTERS = ("derived", "scratch", "rates", "rates_data", "derived_2")
+POINTERS = ("derived", "scratch", "rates", "rates_data", "derived_2", "guard", "guard_data")
 NUMBERS = ("t", "t_old", "stop", "step", "origin")
 COUNTS = ("limit", "steps", "failures", "evaluations", "undefined", "filled", "since")
 
@@ -42,11 +42,17 @@ class Layout:
         return 2 * self.coordinates
 
     @property
+    def width(self) -> int:
+        """The number of coordinates and speeds."""
+        return self.coordinates + self.speeds
+
+    @property
     def places(self) -> dict[str, int]:
         """Where each group begins; ``end`` is the length of the whole."""
         n, m, s = self.size, max(self.speeds, 1), self.stages
         sizes = {"pointers": len(POINTERS), "numbers": len(NUMBERS), "counts": len(COUNTS)}
         sizes |= {"y": n, "y_old": n, "rest": n, "per_size": n}
+        sizes |= {"ends": 4 * self.width, "around": 2 * self.width}
         work = {"L": s * n, "G": s * n, "Y": n, "F": n, "V": m, "U": s * m, "scale": n}
         for name in ("main", "aside"):
             sizes |= {f"{name}.{key}": size for key, size in work.items()}

@@ -16,7 +16,7 @@ from atwood.errors import KernelEvaluationError, SolveError, UnsupportedError
 from atwood.expr import Program
 from atwood.integrators.compiled_functions import StepGuard
 from atwood.integrators.event_location import State
-from atwood.integrators.explicit_problem import CompiledRates, Counts, Outcome, sample_one_by_one
+from atwood.integrators.explicit_problem import CompiledRates, Counts, Outcome
 from atwood.integrators.gauss.layout import COUNTS, NUMBERS, POINTERS, Layout
 from atwood.integrators.gauss.steps import FUNCTIONS, gauss_source
 from atwood.integrators.protocol import FloatArray
@@ -26,7 +26,7 @@ __all__ = ["CompiledGauss", "CompiledMethod", "GaussStepper", "bind_functions"]
 _UNLIMITED = 2**62
 _CALM, _SHORTEST = 8, 1e-12
 """After so many good steps one that was divided is made longer again; none is shorter than such a share."""
-_NO_VALUE = 3
+_NO_VALUE, _UNSEEN = 3, 4
 _HALVINGS, _LOOKED_AT, _CLOSE = 60, 40, 0.2
 """So many steps are tried, on so many steps of the motion each, until an error is so near to what is allowed."""
 
@@ -144,7 +144,11 @@ class GaussStepper:
         self._compiled, self._momenta, self._rates = compiled, momenta, rates
         layout = compiled.layout
         self._memory, self._keep = compiled.memory(parameter_values)
-        self._memory[2:4].view(np.uint64)[:] = rates.function, rates.data
+        self._pointers = self._memory[: len(POINTERS)].view(np.uint64)
+        self._pointers[2:4] = rates.function, rates.data
+        if guard is not None:
+            self._keep = (self._keep, guard)
+            self._pointers[_GUARD : _GUARD + 2] = guard.function, guard.data
         places, n = layout.places, layout.size
         self._places, self._session = places, c_void_p(self._memory.ctypes.data)
         self._numbers = self._memory[places["numbers"] : places["numbers"] + len(NUMBERS)]
@@ -152,9 +156,9 @@ class GaussStepper:
         self._y = self._memory[places["y"] : places["y"] + n]
         self._numbers[_STEP] = step
         self._memory[places["per_size"] : places["per_size"] + n] = 1.0 / sizes
-        self._width = layout.coordinates + layout.speeds
+        self._width = layout.width
         self._functions = compiled.functions
-        self._guard, self._longest, self._good, self._warned = guard, 0.0, 0, False
+        self._longest, self._good = 0.0, 0
 
     @property
     def counts(self) -> Counts:
@@ -189,52 +193,53 @@ class GaussStepper:
 
     def run(self, t_stop: float, steps: int) -> Outcome:
         """Take steps until one ends at or after a time, but no more than so many."""
-        if self._guard is not None:
-            return self._run_guarded(self._guard, t_stop, steps)
         self._numbers[_STOP] = t_stop
-        self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
-        return Outcome(self._checked(self._functions["run"](self._session)))
+        last = self._counts[_STEPS] + min(steps, _UNLIMITED)
+        while True:
+            code = self._go_on("run", last)
+            if code is not None and (code != Outcome.USED_UP or self._counts[_STEPS] >= last):
+                return Outcome(code)
 
-    def _run_guarded(self, guard: StepGuard, t_stop: float, steps: int) -> Outcome:
-        """Take steps one by one; those that may have passed over something are taken again as two, and so on."""
-        last = self._counts[_STEPS] + steps
-        self._numbers[_STOP] = t_stop
-        while self._numbers[_T] < t_stop:
-            if self._counts[_STEPS] >= last:
-                return Outcome.USED_UP
-            before, memory = self.state(), self._memory.copy()
-            self._counts[_LIMIT] = self._counts[_STEPS] + 1
-            outcome = self._functions["run"](self._session)
-            if not self._longest:
-                self._checked(outcome)
-            (t, y, yp), h = before, self.step
-            # The parts of a composition reach beyond its step, to both sides.
-            around = t - h, y - h * yp, yp, t + 2.0 * h, y + 2.0 * h * yp, yp
-            if outcome != Outcome.TOO_SMALL and guard.passes(*around) and guard.passes(*before, *self.state()):
-                self._good += 1
-                if self._good >= _CALM and self.step < self._longest:
-                    self._change_step(min(2.0 * self.step, self._longest), self.state())
-            elif self._longest:
-                if not self.step > _SHORTEST * self._longest:
-                    self._checked(Outcome.TOO_SMALL)
-                counts = self._counts.copy()
-                self._memory[:] = memory
-                self._counts[_EVALUATIONS] = counts[_EVALUATIONS]
+    def _go_on(self, function: str, last: int, *arguments: object) -> int | None:
+        """Take steps, one by one while they are divided; None where the last one was divided or told of."""
+        before, is_divided = self._counts[_STEPS], self.step < self._longest
+        self._counts[_LIMIT] = min(last, before + 1) if is_divided else last
+        code = self._functions[function](self._session, *arguments)
+        if code in (Outcome.TOO_SMALL, _UNSEEN):
+            self._divide(code == _UNSEEN)
+            return None
+        if is_divided and self._counts[_STEPS] > before:
+            self._good += 1
+            if self._good >= _CALM:
+                self._change_step(min(2.0 * self.step, self._longest))
+        return code
+
+    def _divide(self, is_unseen: bool) -> None:
+        """Take shorter steps from where the last one began, which failed or may have passed over something."""
+        if self._longest and self.step > _SHORTEST * self._longest:
+            if is_unseen:
+                self._y[:] = self._memory[self._places["y_old"] :][: len(self._y)]
+                self._numbers[_T] = self._numbers[_T_OLD]
+                self._counts[_STEPS] -= 1
                 self._counts[_FAILURES] += 1
-                self._change_step(0.5 * self.step, before)
-            elif not self._warned:
-                self._warned = True
-                warnings.warn(
-                    f"at t = {before[0]:.6g} a law may change by more within a step of {self.step:.3g} s than the "
-                    "method sees: give a smaller step, or none",
-                    stacklevel=2,
-                )
-        return Outcome.REACHED
+            self._change_step(0.5 * self.step)
+        elif not is_unseen:
+            raise KernelEvaluationError(
+                f"the equations of a step of {self.step:.3g} s have no solution that iteration finds: give a smaller "
+                "step"
+            )
+        elif not self._longest:
+            self._pointers[_GUARD] = 0
+            warnings.warn(
+                f"at t = {self._numbers[_T_OLD]:.6g} a law may change by more within a step of {self.step:.3g} s than "
+                "the method sees: give a smaller step, or none",
+                stacklevel=2,
+            )
 
-    def _change_step(self, step: float, state: State) -> None:
+    def _change_step(self, step: float) -> None:
         self._good = 0
         self.take_step(step)
-        self.start(state[0], state[1])
+        self._functions["begin"](self._session)
 
     def state(self) -> State:
         """Return time, values and rates at the end of the last step."""
@@ -249,25 +254,18 @@ class GaussStepper:
 
     def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
         """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
-        if self._guard is not None:
-            return sample_one_by_one(self, times, steps)
         times = np.ascontiguousarray(times, dtype=np.float64)
         y, yp = np.empty((2, len(times), self._width))
-        self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
-        tables = (array.ctypes.data for array in (y, yp))
-        outcome = self._functions["sample"](self._session, times.ctypes.data, len(times), *tables)
-        filled = int(self._counts[_FILLED])
-        if outcome == _NO_VALUE:
-            raise KernelEvaluationError(f"there is no step to t = {times[filled]:.9g} within one that there is")
-        return y[:filled], yp[:filled], Outcome(self._checked(outcome))
-
-    def _checked(self, outcome: int) -> int:
-        if outcome == Outcome.TOO_SMALL:
-            raise KernelEvaluationError(
-                f"the equations of a step of {self.step:.3g} s have no solution that iteration finds: give a smaller "
-                "step"
-            )
-        return outcome
+        last, filled = self._counts[_STEPS] + min(steps, _UNLIMITED), 0
+        while True:
+            tables = (array[filled:].ctypes.data for array in (y, yp))
+            left = times[filled:]
+            code = self._go_on("sample", last, left.ctypes.data, len(left), *tables)
+            filled += int(self._counts[_FILLED])
+            if code == _NO_VALUE:
+                raise KernelEvaluationError(f"there is no step to t = {times[filled]:.9g} within one that there is")
+            if code is not None and (code != Outcome.USED_UP or self._counts[_STEPS] >= last):
+                return y[:filled], yp[:filled], Outcome(code)
 
     def find_step(self, t: float, y: FloatArray, end: float, tolerances: FloatArray, relative: float) -> float:
         """Return a step whose error is within tolerances along the first steps of a motion, and take it from here on.
@@ -336,8 +334,9 @@ class GaussStepper:
         return worst
 
 
-_T, _STOP, _STEP = map(NUMBERS.index, ("t", "stop", "step"))
+_T, _T_OLD, _STOP, _STEP = map(NUMBERS.index, ("t", "t_old", "stop", "step"))
+_GUARD = POINTERS.index("guard")
 _LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
-_FAILURES, _EVALUATIONS = map(COUNTS.index, ("failures", "evaluations"))
+_FAILURES = COUNTS.index("failures")
 _COUNTED = tuple(map(COUNTS.index, ("steps", "failures", "evaluations", "undefined")))
 assert POINTERS[:2] == ("derived", "scratch")

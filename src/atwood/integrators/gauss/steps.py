@@ -15,7 +15,7 @@ from atwood.codegen.routines.kernels import call_kernel
 from atwood.codegen.routines.kinds import ADDRESS, CODE, INTEGER, NUMBER
 from atwood.codegen.routines.language import Routine, Value
 from atwood.codegen.routines.source import RoutineSource
-from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, run, sample
+from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, judge, run, sample
 from atwood.integrators.gauss.layout import Layout, Memory, open_routine
 from atwood.integrators.gauss.tableau import Tableau, tableau
 
@@ -47,7 +47,7 @@ def write_routines(layout: Layout, order: int) -> list[Routine]:
     method = tableau(order)
     parts = [_evaluate(layout), *(_stage(layout, method, j) for j in range(layout.stages)), _solve(layout)]
     parts += [_flat(layout, method), _ahead(layout, method), _advance(layout), _speeds(layout), _begin(layout)]
-    return [*parts, _run(layout), _trial(layout), interpolate(layout), sample(layout)]
+    return [*parts, judge(layout), _run(layout), _trial(layout), interpolate(layout), sample(layout)]
 
 
 def _weighted(weights: Sequence[float], values: Sequence[Value]) -> Value:

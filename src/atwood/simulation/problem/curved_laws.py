@@ -42,10 +42,17 @@ _FLAT = 20.0
 _TURN = 3.0
 """No angle that an argument is made of turns farther in a step, rad: its sine is between the control points then."""
 
+_ROOT, _WAVE = 2.0, 4.0
+"""A root's argument may change by the exponential of so many reaches, that of a wave by so many, as in steps of fixed
+length that are accurate."""
+
 _HIGH = 4.0
 """Powers from here on are curved."""
 
 _ALWAYS = frozenset({"exp", "tanh", "sinh", "cosh", "tan", "atan", "log", "pow"})
+
+_UNESTIMATED = frozenset({"sqrt", "sin", "cos"})
+"""Curved, too, where no error is estimated. Estimates see these: they differ on both sides of what is narrow."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +64,22 @@ class Curved:
     exponent: Expression | None = None
 
 
-def find_curved(assembly: Assembly) -> tuple[Curved, ...]:
-    """Return the functions in the laws of a scene that may change fast, in the coordinates and speeds of its form."""
-    return assembly.shared.get(_CURVED, lambda: tuple(_find(assembly, assembly.own_equations)), assembly.form)
+def find_curved(assembly: Assembly, is_estimated: bool = True) -> tuple[Curved, ...]:
+    """Return the functions in the laws of a scene that may change fast, in the coordinates and speeds of its form.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    is_estimated
+        Whether the method estimates its error in each step.
+    """
+    more = frozenset() if is_estimated else _UNESTIMATED
+
+    def find() -> tuple[Curved, ...]:
+        return tuple(_find(assembly, assembly.own_equations, more))
+
+    return assembly.shared.get(_CURVED, find, assembly.form, is_estimated)
 
 
 def find_external(assembly: Assembly) -> tuple[Expression, ...]:
@@ -79,23 +99,24 @@ def _known(assembly: Assembly, equations: Equations) -> set[Expression]:
     return {equations.time, *equations.coordinates, *equations.speeds, *assembly.parameters}
 
 
-def _find(assembly: Assembly, equations: Equations) -> Iterable[Curved]:
+def _find(assembly: Assembly, equations: Equations, more: frozenset[str]) -> Iterable[Curved]:
     rows = [*equations.rows, *equations.rates, *(one.second for one in equations.constraints)]
     found = dict.fromkeys(_curved_in(rows, _ALWAYS - {"log", "pow", "tan"}))
     kinematics = equations.kinematics
     signals = resolve_signals(assembly.mechanism, equations.site, kinematics)
     for local in equations.locals_.values():
         laws, _ = in_joint_coordinates(local, kinematics, _laws_of(local))
-        mine = list(_curved_in([*laws, *signals.values()], _ALWAYS | {"div", "mul"}))
+        mine = list(_curved_in([*laws, *signals.values()], _ALWAYS | more | {"div", "mul"}))
         places = [one.value for one in local.constraints]  # where a quotient with a root is a direction
         mine += [one for one in _curved_in(places, _ALWAYS - {"tan"} | {"div", "mul"}) if not _has_root(one.argument)]
         if mine:
             mapping = {**local_map(equations.site, local, kinematics), **signals}
             both = [one.argument for one in mine] + [one.exponent or equations.graph.one for one in mine]
             both = substitute(substitute(both, mapping), equations.read)  # how reactions are solved for is no law
-            placed, powers = both[: len(mine)], both[len(mine) :]
-            more = zip(mine, placed, powers, strict=True)
-            found |= dict.fromkeys(Curved(a.operation, b, None if a.exponent is None else c) for a, b, c in more)
+            if assembly.sides is not None:
+                both = assembly.sides.taken_out(both)
+            triples = zip(mine, both[: len(mine)], both[len(mine) :], strict=True)
+            found |= dict.fromkeys(Curved(a.operation, b, None if a.exponent is None else c) for a, b, c in triples)
     known = _known(assembly, equations)
     for one in found:
         nodes = live([one.argument] if one.exponent is None else [one.argument, one.exponent])
@@ -124,7 +145,10 @@ def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Ite
             continue
         first = node.arguments[0]
         if node.operation == "pow":
-            yield Curved("pow", first, node.arguments[1])
+            exponent = node.arguments[1]
+            yield Curved("pow", first, exponent)
+            if "sqrt" in operations and exponent.operation == "constant" and 0.0 < exponent.value < 1.0:
+                yield Curved("sqrt", first)
         elif node.operation == "div":
             over = node.arguments[1]
             if not over.is_parametric and (first.is_parametric or over.operation != "sqrt"):  # else a direction
@@ -163,9 +187,13 @@ def _share(one: Curved, argument: Pair, exponent: Pair | None, reach: Scalar) ->
         return (high - low) / reach
     if one.operation == "atan":
         return 3.0 * (_steep(high) - _steep(low)) / reach
+    if one.operation in ("sin", "cos"):
+        return (high - low) / (_WAVE * reach)
     if one.operation == "tan":
         return 3.0 * (high - low) / reach
     least, most = magnitude(argument)
+    if one.operation == "sqrt":
+        return most / (maximum(least, 1e-150) * exp(_ROOT * reach))
     if exponent is None:  # a quotient or a logarithm
         return most / (maximum(least, 1e-150) * exp(0.5 * reach))
     power = maximum(absolute(exponent[0]), absolute(exponent[1]))

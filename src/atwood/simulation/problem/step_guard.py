@@ -40,6 +40,7 @@ def step_guard(
     span: tuple[float, float],
     reach: float,
     closed: tuple[ClosedForm, FloatArray] | None = None,
+    is_estimated: bool = True,
 ) -> StepGuard | None:
     """Return what judges the steps of a session; None where no law can change faster than coordinates do.
 
@@ -54,8 +55,10 @@ def step_guard(
     closed
         Its closed loops, solved by formulas, with the values of their parameters; None where all coordinates are
         integrated.
+    is_estimated
+        Whether the method estimates its error in each step.
     """
-    found = _by_bounds(assembly, span, reach, closed)
+    found = _by_bounds(assembly, span, reach, closed, is_estimated)
     calls = find_external(assembly)
     return _by_samples(assembly, span, calls, closed, found) if calls else found
 
@@ -105,9 +108,10 @@ def _by_bounds(
     span: tuple[float, float],
     reach: float,
     closed: tuple[ClosedForm, FloatArray] | None,
+    is_estimated: bool,
 ) -> StepGuard | None:
-    curved = find_curved(assembly)
-    if not curved or not assembly.kept.get(_NEEDED, lambda: is_needed(assembly, curved, span, reach), span, reach):
+    curved, key = find_curved(assembly, is_estimated), (span, reach, is_estimated)
+    if not curved or not assembly.kept.get(_NEEDED, lambda: is_needed(assembly, curved, span, reach), *key):
         return None
     form, values = closed or (None, assembly.parameter_values)
 
@@ -127,7 +131,7 @@ def _by_bounds(
     except ImportError:  # no compiler
         return None
     with shared.lock:
-        program = shared.get(_PROGRAM, make, assembly.form, form)
+        program = shared.get(_PROGRAM, make, assembly.form, form, is_estimated)
     code = shared.get(_CODE, lambda: compile_guard(program), program)
     assert isinstance(code, GuardCode)
     return StepGuard(*code.bind(values, reach, _SHORTEST * abs(span[1] - span[0])))

@@ -56,10 +56,11 @@ class SolverRequest:
 
     def guard(self, solver: str, closed: tuple[ClosedForm, FloatArray] | None = None) -> StepGuard | None:
         """Return what judges the steps of a method besides their error; see `step_guard`."""
-        options, reach = self.options, REACHES[solver]
-        if solver in FIXED_STEPS and options.step is None:  # no error is estimated along the way
+        options, reach, is_estimated = self.options, REACHES[solver], solver not in FIXED_STEPS
+        if not is_estimated and options.step is None:
             reach *= options.relative_tolerance ** (1.0 / (1 + (options.order or 8)))
-        return step_guard(self.plan.assembly, (self.plan.assembly.flat.t_start, options.t_end), reach, closed)
+        span = self.plan.assembly.flat.t_start, options.t_end
+        return step_guard(self.plan.assembly, span, reach, closed, is_estimated)
 
     def horizon(self, t: float) -> float:
         """Return a typical length of what is left of the run at a time, s."""
