@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
-from scipy.special import ellipe, ellipk
+from scipy.special import beta, ellipe, ellipk
 
-from atwood import SolveError, UsageError, action_angle, hamiltonian, separation
+from atwood import Scene, SolveError, UsageError, action_angle, hamiltonian, separation
 from atwood.theory.action import Separation
+from atwood_library import PointMass, Potential
 from atwood_library.scenes import (
     DoublePendulum,
     DrivenPendulum,
@@ -192,3 +196,38 @@ def test_the_square_of_a_momentum_is_a_function_of_its_own_coordinate_alone(scen
             value = found.subs({one: known[str(one)] for one in found.free_symbols if one != own}).subs(own, place)
             along = float(curve.momentum(place))
             assert float(value) == pytest.approx(along**2, rel=1e-9) if np.isfinite(along) else float(value) < 0.0
+
+
+def well(energy: Callable[..., Any], place: float, speed: float) -> Scene:
+    scene = Scene(gravity=0.0, space="line")
+    field, body = scene.add("field", Potential()), scene.add("body", PointMass(mass=1.0))
+    scene.connect(field.point, body.point)
+    scene.set("field.energy_function", energy)
+    scene.start.update({"body.position.x": place, "body.velocity.x": speed})
+    return scene
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("place", "share"), [(0.5, 1.0), (2.0**0.5, 0.0), (0.0, 0.0), (-0.7, -1.0)])
+def test_on_a_separatrix_nothing_has_a_period(place: float, share: float) -> None:
+    speed = share * np.sqrt(max(0.0, 2.0 * (1.0 - (place**2 - 1.0) ** 2)))
+    with pytest.raises(SolveError, match="separatrix"):
+        action_angle(well(lambda x: (x**2 - 1.0) ** 2, place, speed))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("angle", [0.0, 0.3, np.pi])
+def test_a_pendulum_that_comes_to_stand_has_no_period(angle: float) -> None:
+    scene = SimplePendulum()
+    rate = np.sqrt(2.0 * 9.81 / scene.length * (1.0 + np.cos(angle)))
+    scene.start.update({"rod.angle": angle, "rod.angular_velocity": rate})
+    with pytest.raises(SolveError, match="separatrix"):
+        action_angle(scene)
+
+
+def test_beside_the_separatrix_there_is_one_and_in_x_to_the_fourth() -> None:
+    """The quartic oscillator: T = 4 B(1/4, 1/2)/4 sqrt(m/2)/a for V = x^4."""
+    assert action_angle(well(lambda x: x**4, 0.5, 0.0)).period == pytest.approx(beta(0.25, 0.5) * np.sqrt(0.5) / 0.5)
+    below = action_angle(well(lambda x: (x**2 - 1.0) ** 2, np.sqrt(2.0) * (1.0 - 1e-9), 0.0))
+    assert below.kind == "libration"
+    assert np.isfinite(below.period)

@@ -1,5 +1,6 @@
 """Canonical transformations: boosts, flows, generating functions of the four kinds, new coordinates of scenes."""
 
+import math
 from typing import Any
 
 import pytest
@@ -174,3 +175,25 @@ def test_coordinates_that_are_missing_or_too_few() -> None:
         point_transformation(scene, {"body.position.x": r + Q, "body.position.z": r + Q}, [r, Q])
     with pytest.raises(UsageError, match="no coordinate"):
         point_transformation(scene, {"body.position.y": r, "body.position.z": Q}, [r, Q])
+
+
+@pytest.mark.parametrize("arc", [sympy.asin, sympy.acos])
+def test_the_action_of_the_oscillator_generates_its_action_and_angle(arc: Any) -> None:
+    """``F(q, P)``, the integral of sqrt(2 P - q^2), has an arc in it; Q is the angle and P = (p^2 + q^2)/2."""
+    sign = 1 if arc is sympy.asin else -1
+    root = sympy.sqrt(2 * P - q**2)
+    found = generated_transformation(q * root / 2 + sign * P * arc(q / sympy.sqrt(2 * P)), 2, ((q,), (p,)), [Q], [P])
+    assert found.is_canonical
+    at = {q: sympy.Rational(3, 10), p: sympy.Rational(2, 5)}
+    assert abs(float(found.new_momenta[0].subs(at)) - 0.125) < 1e-15
+    angle = math.atan2(0.3, 0.4)
+    assert abs(float(found.new_coordinates[0].subs(at)) - (angle if sign == 1 else angle - math.pi / 2.0)) < 1e-14
+
+
+def test_a_generating_function_may_be_an_integral() -> None:
+    x = sympy.Symbol("x")
+    found = generated_transformation(sympy.Integral(sympy.sqrt(2 * P - x**2), (x, 0, q)), 2, ((q,), (p,)), [Q], [P])
+    assert found.is_canonical
+    assert sympy.expand(found.new_momenta[0] - (p**2 + q**2) / 2) == 0
+    at = {q: sympy.Rational(3, 10), p: sympy.Rational(2, 5)}
+    assert abs(float(found.new_coordinates[0].subs(at).evalf()) - math.atan2(0.3, 0.4)) < 1e-12

@@ -21,6 +21,9 @@ __all__ = ["Level", "level_through"]
 Energy = Callable[[FloatArray, FloatArray], FloatArray]
 """H of arrays of q and p."""
 
+Coefficients = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+"""A, B and C of places."""
+
 _FIRST, _STEEPER, _FARTHEST, _LONGEST = 1e-3, 1.05, 1e6, 0.01
 """Turning points are sought in steps that begin with this share of a size and grow so, up to so many sizes.
 
@@ -34,6 +37,12 @@ _ENOUGH, _KNOWN = 128, 1e-6
 """Points from which on it is looked whether more make it worse, and the least accuracy of what is given."""
 
 _QUADRATIC = 1e-9
+
+_BESIDE, _CLEAR, _STEEP = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), 1e3, 3.0
+"""So near to its ends, in shares of the way, a root of first order is looked for, where digits are left first.
+
+From half as far on, such a one doubles the discriminant; one of second order makes it fourfold.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +71,7 @@ class Level:
     action: float
     period: float
     error: float
-    _coefficients: Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+    _coefficients: Coefficients
 
     def momentum(self, q: FloatArray, sign: float = 1.0) -> FloatArray:
         """Return the momentum at places, on the branch where the coordinate rises (1) or falls (-1); nan beyond."""
@@ -136,17 +145,49 @@ def level_through(
         a, b, c = (float(one[0]) for one in coefficients(np.array([place])))
         return b * b - 4.0 * a * (c - total)
 
+    if not discriminant(q) > 0.0 and all(_way_inside(discriminant, q, sign, _FIRST * size) for sign in (-1.0, 1.0)):
+        raise _takes_for_ever(name)  # at rest on top of its potential
     ends = [_turning_point(discriminant, q, sign, size, turn) for sign in (-1.0, 1.0)]
     if ends[0] is not None and ends[1] is not None:
         kind, low, high = "libration", ends[0], ends[1]
         if not high - low > 1e-7 * size:
             raise SolveError(f"{name} is at rest there", where=name, advice="Take a start with more energy.")
+        if _is_separatrix(coefficients, total, low, high):
+            raise _takes_for_ever(name)
     elif turn is not None and ends[0] is None and ends[1] is None:
         kind, low, high = "rotation", q, q + turn
     else:
         raise SolveError(f"{name} comes back to no turning point: its motion has no period", where=name)
     action, period, error = _integrals(coefficients, total, kind, low, high, name)
     return Level(kind, total, (low, high), action, period, error, coefficients)
+
+
+def _is_separatrix(coefficients: Coefficients, total: float, low: float, high: float) -> bool:
+    """Return whether the discriminant has a root of higher order at an end, to which no motion comes in finite time."""
+    ends = np.array([low, high])
+    inward = np.array([high - low, low - high])
+
+    def below(share: float) -> tuple[FloatArray, FloatArray]:
+        a, b, c = coefficients(ends + share * inward)
+        rounding = 4.0 * np.finfo(float).eps * np.abs(a) * (np.abs(c) + abs(total))
+        return b * b - 4.0 * a * (c - total), rounding
+
+    open_ends = np.ones(2, dtype=bool)
+    for share in _BESIDE:
+        (whole, rounding), (half, _) = below(share), below(0.5 * share)
+        clear = open_ends & (whole > _CLEAR * rounding)
+        if np.any(whole[clear] > _STEEP * np.abs(half[clear])):
+            return True
+        open_ends &= ~clear
+    return False
+
+
+def _takes_for_ever(name: str) -> SolveError:
+    return SolveError(
+        f"{name} takes for ever to come back: its energy is that of a separatrix",
+        where=name,
+        advice="Take a start with a little more or less energy.",
+    )
 
 
 def _unit(energy: Energy, q: float, p: float, total: float) -> float:
@@ -209,7 +250,7 @@ def _way_inside(discriminant: Callable[[float], float], q: float, sign: float, s
 
 
 def _integrals(
-    coefficients: Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]],
+    coefficients: Coefficients,
     total: float,
     kind: str,
     low: float,
@@ -228,6 +269,8 @@ def _integrals(
             places, weights = low + (high - low) * x / np.pi, np.full(count, (high - low) / count)
         a, b, c = coefficients(places)
         root = np.sqrt(np.abs(b * b - 4.0 * a * (c - total)))
+        if not np.all(root > 0.0):
+            raise _takes_for_ever(name)
         if kind == "libration":
             found = float(np.sum(weights * root / np.abs(a))), float(2.0 * np.sum(weights / root))
         else:
@@ -244,8 +287,4 @@ def _integrals(
         before, count = found, 2 * count
     if best[1] <= _KNOWN:
         return *best[0], best[1]
-    raise SolveError(
-        f"{name} takes for ever to come back: its energy is that of a separatrix",
-        where=name,
-        advice="Take a start with a little more or less energy.",
-    )
+    raise _takes_for_ever(name)

@@ -210,11 +210,13 @@ def generated_transformation(
             where=str(function)[:80],
         )
     first, second = ("p", 1) if used[0] == "q" else ("q", -1), ("P", -1) if used[1] == "Q" else ("Q", 1)
-    equations, pairs = [], ((used[0], *first), (used[1], *second))
-    for by, given, sign in pairs:
-        equations += [y - sign * f.diff(x) for x, y in zip(variables[by], variables[given], strict=True)]
-    old, new = [*space.coordinates, *space.momenta], [*new_q, *new_p]
-    forward, inverse = _solved(equations, new), _solved(equations, old)
+    new = [*new_q, *new_p]
+    given = [
+        {y: _without_arcs(sign * f.diff(x)) for x, y in zip(variables[by], variables[name], strict=True)}
+        for by, name, sign in ((used[0], *first), (used[1], *second))
+    ]
+    forward = _in_turn(given[0], variables[used[1]], given[1])
+    inverse = _in_turn(given[1], variables[used[0]], given[0])
     if not forward:
         raise UsageError(
             "it leaves new coordinates or momenta undetermined, or has no solution that is found",
@@ -253,13 +255,48 @@ def _solved(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> dict[Sympy
     """Return a solution of equations; empty where none is found. Linear ones are solved as such, others in turn."""
     import sympy
 
+    if any(one.has(*unknowns) for equation in equations for one in equation.atoms(sympy.Integral)):
+        return {}
     try:
         found = sympy.solve(list(equations), list(unknowns), dict=True, simplify=False, check=False)
-    except (NotImplementedError, ValueError):
+    except _UNSOLVED:
         return {}
     whole = [one for one in found if set(one) == set(unknowns)]
     chosen = next((one for one in reversed(whole) if _is_real(one.values())), None)
     return {} if chosen is None else {key: short(value) for key, value in chosen.items()}
+
+
+_UNSOLVED = (ArithmeticError, AttributeError, LookupError, NotImplementedError, RecursionError, TypeError, ValueError)
+"""What sympy raises where it finds no solution, as of an integral by its end."""
+
+
+def _in_turn(
+    given: Mapping[Sympy, Sympy], unknowns: Sequence[Sympy], explicit: Mapping[Sympy, Sympy]
+) -> dict[Sympy, Sympy]:
+    """Return a solution for some unknowns, and what follows from these; empty where none is found.
+
+    Half of a generating function's equations hold one group of the unknowns alone, and the other half gives the others.
+    """
+    solved = _solved([one - value for one, value in given.items()], unknowns)
+    if not solved:
+        return {}
+    others = {one: short(value.xreplace(solved)) for one, value in explicit.items()}
+    return {**solved, **others}
+
+
+def _without_arcs(value: Sympy) -> Sympy:
+    """Return an expression with roots of fractions as fractions of roots, so that what arcs leave behind cancels."""
+    import sympy
+
+    def split(power: Sympy) -> Sympy:
+        above, below = sympy.fraction(sympy.together(power.base))
+        return above**power.exp / below**power.exp
+
+    def is_root(one: Sympy) -> bool:
+        return bool(one.is_Pow and one.exp.is_Rational and one.exp.q == 2)
+
+    made = value.replace(is_root, split)
+    return value if made == value or value.has(sympy.Integral) else short(made)
 
 
 def _is_real(values: Iterable[Sympy]) -> bool:
