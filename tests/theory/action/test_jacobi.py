@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import beta, ellipe, ellipk
 
-from atwood import Scene, SolveError, UsageError, action_angle, hamiltonian, separation
+from atwood import Scene, SolveError, UsageError, action_angle, exp, hamiltonian, separation
 from atwood.theory.action import Separation
 from atwood_library import PointMass, Potential
 from atwood_library.scenes import (
@@ -213,6 +213,47 @@ def test_on_a_separatrix_nothing_has_a_period(place: float, share: float) -> Non
     speed = share * np.sqrt(max(0.0, 2.0 * (1.0 - (place**2 - 1.0) ** 2)))
     with pytest.raises(SolveError, match="separatrix"):
         action_angle(well(lambda x: (x**2 - 1.0) ** 2, place, speed))
+
+
+TOPS = {
+    "of powers": (lambda x: x**4 - x**6, (2.0 / 3.0) ** 0.5),
+    "on one side": (lambda x: x**2 - x**3, 2.0 / 3.0),
+    "of fourth order": (lambda x: 1.0 - (1.0 - x**2) ** 4, 1.0),
+    "of a bell": (lambda x: x**2 * exp(-(x**2)), 1.0),
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("name", "size", "height", "off"),
+    [
+        ("of powers", 1.0, 1.0, 0.0),
+        ("of powers", 1.0, 1.0, 100.0),
+        ("on one side", 1e-3, 1.0, 0.0),
+        ("of fourth order", 1e3, 1e-6, 0.0),
+        ("of a bell", 1.0, 1.0, 0.0),
+    ],
+)
+def test_a_separatrix_is_one_whatever_its_size_and_place(name: str, size: float, height: float, off: float) -> None:
+    law, top = TOPS[name]
+
+    def energy(x: Any) -> Any:
+        return height * law((x - off) / size)
+
+    full, speeds = height * float(law(top)), {}
+    for share in (0.0, 0.3):
+        place = share * top
+        speeds[place] = float(np.sqrt(2.0 * (full - height * float(law(place)))))
+        with pytest.raises(SolveError, match="separatrix"):
+            action_angle(well(energy, off + size * place, speeds[place]))
+    below = action_angle(well(energy, off, 0.99 * speeds[0.0]))
+    assert below.kind == "libration"
+    x = below.period * speeds[0.0] / size  # as of the same law at unit size and height
+    unit = action_angle(well(law, 0.0, 0.99 * float(np.sqrt(2.0 * float(law(top))))))
+    assert x == pytest.approx(unit.period * np.sqrt(2.0 * float(law(top))), rel=1e-7)
+    if name != "of a bell":
+        with pytest.raises(SolveError, match="no turning point"):
+            action_angle(well(energy, off, 1.01 * speeds[0.0]))
 
 
 @pytest.mark.filterwarnings("error")

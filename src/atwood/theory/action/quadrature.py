@@ -24,6 +24,9 @@ Energy = Callable[[FloatArray, FloatArray], FloatArray]
 Coefficients = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 """A, B and C of places."""
 
+_SHORTEST, _CHANGE, _RISING = 1e-9, 0.1, 1.5
+"""The first step changes the discriminant by no more than such a share; or twice the way such a multiple."""
+
 _FIRST, _STEEPER, _FARTHEST, _LONGEST = 1e-3, 1.05, 1e6, 0.01
 """Turning points are sought in steps that begin with this share of a size and grow so, up to so many sizes.
 
@@ -38,7 +41,13 @@ _ENOUGH, _KNOWN = 128, 1e-6
 
 _QUADRATIC = 1e-9
 
-_BESIDE, _CLEAR, _STEEP = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), 1e3, 3.0
+_ROUNDING = 64.0 * float(np.finfo(float).eps)
+"""Of the terms of a discriminant: what is less is zero."""
+
+_TOUCHES = 1e-12
+"""Of the largest discriminant on the way: one that falls to less comes to zero, as places are rounded, too."""
+
+_BESIDE, _CLEAR, _STEEP = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), 100.0, 3.0
 """So near to its ends, in shares of the way, a root of first order is looked for, where digits are left first.
 
 From half as far on, such a one doubles the discriminant; one of second order makes it fourfold.
@@ -126,10 +135,13 @@ def level_through(
     """
     total = float(energy(np.array([q]), np.array([p]))[0])
     unit = _unit(energy, q, p, total)
+    here = max(abs(total), abs(float(energy(np.array([q]), np.zeros(1))[0])), 1e-300)
 
     def coefficients(places: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        up, none, down = (energy(places, np.full(places.shape, k * unit)) for k in (1.0, 0.0, -1.0))
-        return (up + down - 2.0 * none) / (2.0 * unit**2), (up - down) / (2.0 * unit), none
+        none = energy(places, np.zeros(places.shape))
+        units = unit * np.sqrt(np.maximum(np.abs(none) / here, 1.0))  # so large that their energy is no rounding there
+        up, down = energy(places, units), energy(places, -units)
+        return (up + down - 2.0 * none) / (2.0 * units**2), (up - down) / (2.0 * units), none
 
     a, b, c = coefficients(np.array([q]))
     twice = float(energy(np.array([q]), np.array([2.0 * unit]))[0])
@@ -145,9 +157,13 @@ def level_through(
         a, b, c = (float(one[0]) for one in coefficients(np.array([place])))
         return b * b - 4.0 * a * (c - total)
 
+    def rounding(place: float) -> float:
+        a, _, c = (float(one[0]) for one in coefficients(np.array([place])))
+        return _ROUNDING * abs(a) * (abs(c) + abs(total))
+
     if not discriminant(q) > 0.0 and all(_way_inside(discriminant, q, sign, _FIRST * size) for sign in (-1.0, 1.0)):
         raise _takes_for_ever(name)  # at rest on top of its potential
-    ends = [_turning_point(discriminant, q, sign, size, turn) for sign in (-1.0, 1.0)]
+    ends = [_turning_point(discriminant, rounding, q, sign, size, turn) for sign in (-1.0, 1.0)]
     if ends[0] is not None and ends[1] is not None:
         kind, low, high = "libration", ends[0], ends[1]
         if not high - low > 1e-7 * size:
@@ -169,7 +185,7 @@ def _is_separatrix(coefficients: Coefficients, total: float, low: float, high: f
 
     def below(share: float) -> tuple[FloatArray, FloatArray]:
         a, b, c = coefficients(ends + share * inward)
-        rounding = 4.0 * np.finfo(float).eps * np.abs(a) * (np.abs(c) + abs(total))
+        rounding = _ROUNDING * np.abs(a) * (np.abs(c) + abs(total))
         return b * b - 4.0 * a * (c - total), rounding
 
     open_ends = np.ones(2, dtype=bool)
@@ -204,7 +220,12 @@ def _unit(energy: Energy, q: float, p: float, total: float) -> float:
 
 
 def _turning_point(
-    discriminant: Callable[[float], float], q: float, sign: float, size: float, turn: float | None
+    discriminant: Callable[[float], float],
+    rounding: Callable[[float], float],
+    q: float,
+    sign: float,
+    size: float,
+    turn: float | None,
 ) -> float | None:
     """Return where the discriminant comes to zero first, on one side; None where it does not."""
     from scipy.optimize import brentq
@@ -216,6 +237,12 @@ def _turning_point(
         if step == 0.0:
             return q
         places, values = [q + sign * step], [discriminant(q + sign * step)]
+    else:  # no step passes over a hill
+        while step > _SHORTEST * size:
+            beside = [discriminant(q + sign * share * step) for share in (0.4, 0.7, 1.0)]
+            if max(abs(one - values[0]) for one in beside) <= _CHANGE * values[0]:
+                break
+            step *= 0.5
     farthest = turn if turn is not None else _FARTHEST * size
     longest = np.inf if turn is None else _LONGEST * turn
     while abs(places[-1] - q) < farthest:
@@ -227,8 +254,11 @@ def _turning_point(
             return float(brentq(discriminant, places[-2], places[-1], xtol=1e-15 * size, rtol=1e-15))
         if len(values) > 2 and values[-2] < min(values[-1], values[-3]):  # it may dip below zero between two steps
             lowest = _lowest(discriminant, places[-3], places[-1])
-            if not discriminant(lowest) > 0.0:
+            dip = discriminant(lowest)
+            if not dip > 0.0:
                 return float(brentq(discriminant, places[-3], lowest, xtol=1e-15 * size, rtol=1e-15))
+            if dip <= rounding(lowest) + _TOUCHES * max(values):
+                return lowest
         step = min(step * _STEEPER, longest)
     return None
 
@@ -236,14 +266,18 @@ def _turning_point(
 def _lowest(discriminant: Callable[[float], float], one: float, other: float) -> float:
     from scipy.optimize import minimize_scalar
 
-    bounds = (min(one, other), max(one, other))
-    return float(minimize_scalar(discriminant, bounds=bounds, method="bounded", options={"xatol": 1e-12}).x)
+    way = other - one  # shares of it are known to more digits than places are
+    found = minimize_scalar(
+        lambda share: discriminant(one + share * way), bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-12}
+    )
+    return float(one + found.x * way)
 
 
 def _way_inside(discriminant: Callable[[float], float], q: float, sign: float, step: float) -> float:
     """Return a small way from a turning point to where the motion is; zero if it is not on that side."""
-    for _ in range(20):
-        if discriminant(q + sign * step) > 0.0:
+    for _ in range(30):
+        there, before = discriminant(q + sign * step), discriminant(q + 0.5 * sign * step)
+        if there > _RISING * before > 0.0:  # it rises from there evenly
             return step
         step *= 0.5
     return 0.0

@@ -240,19 +240,24 @@ def _relative_size(value: Sympy) -> float:
     """Return the largest value at random points, relative to the terms that it is the sum of."""
     import random
 
+    import mpmath  # type: ignore[import-untyped]
     import sympy
 
     numbers = random.Random(19)
     terms = sympy.Add.make_args(sympy.expand(value))
     symbols = sorted(value.free_symbols, key=str)
+    integrals = set().union(*(one.atoms(sympy.Integral) for one in terms))
+    integrated = {one: sympy.lambdify(symbols, one, "mpmath") for one in integrals}
     worst = 0.0
     for _ in range(_POINTS):
         point = {one: sympy.Rational(numbers.randint(3000, 19000), 10000) for one in symbols}
-        found = [abs(one.xreplace(point).evalf(_DIGITS)) for one in terms]
-        whole = abs(sum(one.xreplace(point).evalf(_DIGITS) for one in terms))
-        size = max(found, default=0)
+        with mpmath.workdps(_DIGITS):
+            numbers_there = [mpmath.mpf(one.p) / one.q for one in point.values()]
+            point |= {one: sympy.sympify(known(*numbers_there)) for one, known in integrated.items()}
+        found = [one.xreplace(point).evalf(_DIGITS) for one in terms]
+        size = max(map(abs, found), default=0)
         if size:
-            worst = max(worst, float(whole / size))
+            worst = max(worst, float(abs(sum(found)) / size))
     return worst
 
 
