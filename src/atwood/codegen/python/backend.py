@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -251,9 +252,15 @@ def _execute(
         assert isinstance(function, ExternalFunction)
         call = function.function
         namespace[f"e{position}"] = np.vectorize(call, otypes=[float]) if flavour == "vectorized" else call
-    exec(compile(source, f"<{name} of {program}>", "exec"), namespace)
+    exec(_code_of(source, f"<{name} of {program}>"), namespace)
     found: Callable[..., tuple[list[Any], ...]] = namespace[name]
     return found
+
+
+@lru_cache(maxsize=512)
+def _code_of(source: str, name: str) -> CodeType:
+    """Return compiled source; scenes that are made again write the same."""
+    return compile(source, name, "exec")
 
 
 def _solve(size: int, entries: Sequence[float], right: Sequence[float]) -> Sequence[float]:
