@@ -48,7 +48,7 @@ _POLE, _OFF_POLE = 1e3, 0.7
 """At a pole angles are so many times as fast as the body; states are so many radians away from a start there."""
 
 _EACH = 3
-"""For each argument of a law that may be narrow so many states more."""
+"""For each relation so many states more."""
 
 _PACED = 5
 """At so many places it is looked how fast things happen."""
@@ -158,7 +158,8 @@ class RandomStates:
         StartError
             If the scene has no consistent start.
         """
-        count += _EACH * (self._features.count + sum(len(one) for _, one in self._free.probe.outputs))
+        plain = count
+        count += self._features.visits + _EACH * sum(len(one) for _, one in self._free.probe.outputs)
         start = find_start(self.assembly)
         random = np.random.default_rng(_SEED)
         sizes = motion_scales(self._equations, length)
@@ -179,7 +180,7 @@ class RandomStates:
             u = slow * pace * sizes * random.uniform(-1.0, 1.0, len(sizes))
             try:
                 q = self._balance.kinematic_map.moved(t, q0, step)
-                if len(found) % 3:
+                if len(found) >= plain or len(found) % 3:
                     t, q = self._features.towards(t, q, sizes, span, random)
                 q, u = self._balance.project(t, q, u, sizes)
                 if t >= start.time and not self._is_pole(t, q) and self._is_met(t, q, u, sizes, slow * pace):

@@ -30,6 +30,9 @@ _NODES, _DEGREE = 17, 12
 _ROUND, _TAIL = 1e-11, 1e-9
 """Relative to the largest coefficient, or value: what is rounding, and what shows that a polynomial does not follow."""
 
+_REFINED = 4
+"""So many steps of Newton's method lead to the root of the last derivative that is one."""
+
 _RAYS, _CLEAR = 40, 1e-3
 """Directions of a null space of several dimensions, and by which share of the largest force all must lead back."""
 
@@ -174,8 +177,12 @@ def _root(field: _Field, axis: FloatArray) -> tuple[Rest, int, float, tuple[Floa
     largest = float(np.max(np.abs(curve.coef)))
     for order in range(2, 8):
         first, second = (curve.coef[k] for k in (order - 1, order))
-        away = -float(first) / (order * float(second)) if abs(first) < abs(second) else np.inf
-        if not abs(away) <= 0.1 or abs(second) <= 1e4 * _ROUND * largest:
+        if abs(first) >= abs(second) or abs(second) <= 1e4 * _ROUND * largest:
+            continue
+        bend, away = curve.deriv(order - 1), 0.0
+        for _ in range(_REFINED):
+            away -= float(bend(away) / bend.deriv()(away))
+        if not abs(away) <= 0.1:
             continue
         shifted = curve(Polynomial([away, 1.0]))
         if float(np.max(np.abs(shifted.coef[:order]))) > _ROUND * largest:
