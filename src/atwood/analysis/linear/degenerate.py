@@ -175,7 +175,7 @@ def _root(field: _Field, axis: FloatArray) -> tuple[Rest, int, float, tuple[Floa
         return field.rest, -1, 0.0, ()
     curve, reach = found
     largest = float(np.max(np.abs(curve.coef)))
-    for order in range(2, 8):
+    for order in range(7, 1, -1):  # beside a root of some order there is one of each lower order, nearly
         first, second = (curve.coef[k] for k in (order - 1, order))
         if abs(first) >= abs(second) or abs(second) <= 1e4 * _ROUND * largest:
             continue
