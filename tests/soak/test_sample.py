@@ -55,6 +55,16 @@ def test_methods_agree(seed: int) -> None:
     assert not trial.findings, trial.findings[0].detail
 
 
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [(kind, seed) for kind in ("levels", "stiff", "claims") for seed in (1, 3, 4)] + [("rest", 12)],
+)
+def test_closed_forms_are_met(kind: str, seed: int) -> None:
+    trial, _ = run_trial(kind, seed)
+    assert "compared" in trial.tried
+    assert not trial.findings, trial.findings[0].detail
+
+
 @pytest.mark.parametrize("seed", [101, 103, 110, 117, 131, 175])
 def test_tables_agree_with_scipy(seed: int) -> None:
     trial = tables.check(seed)

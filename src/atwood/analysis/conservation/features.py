@@ -69,7 +69,9 @@ class Features:
         self.count = len(values)
         number = {one: i for i, one in enumerate(values)}
         inner = {one for value in values for one in live([value]) if one is not value}
-        terms = ([number[one] for one in live([term]) if one in number and one not in inner] for term in _summands(laws))
+        terms = (
+            [number[one] for one in live([term]) if one in number and one not in inner] for term in _summands(laws)
+        )
         self._groups = [list(one) for one in dict.fromkeys(tuple(sorted(one)) for one in terms) if len(one) > 1]
         often = [i for one, i in number.items() if one not in inner]
         self._turns = [*range(self.count)] * _EACH + often * (_OFTEN - _EACH)

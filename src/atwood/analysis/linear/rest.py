@@ -49,6 +49,9 @@ _WALK, _BACK = 40, 10
 """So many steps lead from one state to another along directions in which nothing changes, each followed by so many of
 Newton's method at most."""
 
+_HALFWAY = 0.25
+"""A state between two others is halfway if it is off by no more of their distance."""
+
 _TURNED, _NEARER = 0.1, 1e-4
 """A first step of so much where none leads nearer; by so much others must, all in the scene's sizes."""
 
@@ -276,13 +279,25 @@ class RestSearch:
             last = way
             # Along directions in which nothing changes, which need not be straight: a disc may stand at any heading.
             half, there = (self.at(self.moved(now, share * step)) for share in (0.5, 1.0))
-            if not (self.is_met(half) and self.is_met(there)):
+            is_straight = self.is_met(half) and self.is_met(there)
+            if not is_straight:
                 step *= min(1.0, 0.5 * _FAR / float(np.max(np.abs(step))))
                 there = self.seek(self.moved(now, step), _BACK)
-            if there is None:
+            if there is None or not (is_straight or self._leads(now, there)):
                 return False
             now = there
         return False
+
+    def _leads(self, one: Rest, other: Rest) -> bool:
+        """Return whether states near by are joined by rest: whether there is one about halfway between them."""
+        apart = wrapped(self.scene, difference(self.scene, one.q, other.q))
+        halfway = self.scene.tangents.moved(one.q, 0.5 * apart)
+        between = self.seek(halfway, _BACK)
+        if between is None:
+            return False
+        off = wrapped(self.scene, difference(self.scene, halfway, between.q))
+        sizes = self.scene.displacement_sizes
+        return bool(np.max(np.abs(off) / sizes) < _HALFWAY * np.max(np.abs(apart) / sizes))
 
 
 def _falling(now: Rest) -> FloatArray | None:

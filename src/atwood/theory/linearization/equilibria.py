@@ -42,6 +42,9 @@ _ALONE = 5.0
 _NEARBY = 4
 """Of so many starts one is ten to a thousand times nearer to the scene's own start, where a well may be narrow."""
 
+_FALLING = 0.3
+"""Of the starts, this share goes where forces lead."""
+
 _MEASURED = 9
 """At so many places of the region it is looked how large accelerations are."""
 
@@ -221,11 +224,12 @@ def _found(point: OperatingPoint, search: RestSearch, bounds: FloatArray) -> tup
     found: list[Degenerate] = []
     images: list[FloatArray] = []
     seen_moving, idle, taken = False, 0, 0
+    chance = np.random.default_rng(7)
     while (taken < len(places) and idle <= max(_LEAST, _IDLE * free)) or images:
         is_image = bool(images)
         q = images.pop() if is_image else places[taken]
         taken += not is_image
-        rest = search.seek(q, falls=not is_image and taken % 3 == 1)
+        rest = search.seek(q, falls=not is_image and (taken == 1 or chance.random() < _FALLING))
         idle += not is_image
         if rest is None or any(search.same(one.rest, rest) for one in found):
             continue
@@ -268,11 +272,13 @@ def _places(point: OperatingPoint, bounds: FloatArray, count: int) -> list[Float
         return []
     from scipy.stats import qmc  # a third of a second
 
-    spread = qmc.Halton(size, seed=7).random(count)
+    # Each kind of start has a sequence of its own: every so many of one lie in one part of the region.
+    wide, close = (qmc.Halton(size, seed=seed).random(count) for seed in (7, 8))
     made = []
-    for number, row in enumerate(spread):
+    for number in range(count):
+        is_near, turn = number % _NEARBY == _NEARBY - 1, number // _NEARBY
+        row, near = (close[turn], 10.0 ** -(1 + turn % 3)) if is_near else (wide[number - turn], 1.0)
         values = bounds[:, 0] + row * (bounds[:, 1] - bounds[:, 0])
-        near = 10.0 ** -(1 + number // _NEARBY % 3) if number % _NEARBY == _NEARBY - 1 else 1.0
         q = point.q.copy()
         for i, k in scene.tangents.plain:
             q[i] = values[k] if near == 1.0 else q[i] + near * (values[k] - q[i])
