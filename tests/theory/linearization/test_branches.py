@@ -50,7 +50,7 @@ def test_a_bead_leaves_the_bottom_of_its_hoop() -> None:
 def test_arc_length_passes_folds_and_finds_branch_points() -> None:
     """The normal forms of a fold, p = x^3 - x, and of a pitchfork, x (p - x^2) = 0."""
 
-    def cubic(x: np.ndarray, p: float) -> Residual:
+    def cubic(x: np.ndarray, p: float, _: object = None) -> Residual:
         return Residual(x**3 - x - (4.0 * p - 2.0), np.diag(3.0 * x**2 - 1.0), np.array([-4.0]))
 
     problem = Problem(cubic, 0.0, 1.0)
@@ -60,7 +60,7 @@ def test_arc_length_passes_folds_and_finds_branch_points() -> None:
     folds = sorted(4.0 * p - 2.0 for _, p in curve.folds)
     assert np.allclose(folds, [-2.0 / math.sqrt(27.0), 2.0 / math.sqrt(27.0)], atol=1e-10)
 
-    def fork(x: np.ndarray, p: float) -> Residual:
+    def fork(x: np.ndarray, p: float, _: object = None) -> Residual:
         q = p - 0.4
         return Residual(x * (q - x**2), np.diag(q - 3.0 * x**2), x.copy())
 

@@ -46,12 +46,12 @@ class Problem:
     Attributes
     ----------
     at
-        Residuals at (x, p); None where there are none.
+        Residuals at (x, p); None where there are none. Their derivatives by the parameter may be given, from near by.
     low, high
         Range of the parameter, of length one.
     """
 
-    at: Callable[[FloatArray, float], Residual | None]
+    at: Callable[[FloatArray, float, FloatArray | None], Residual | None]
     low: float
     high: float
 
@@ -127,7 +127,7 @@ def follow(problem: Problem, x: FloatArray, p: float, direction: FloatArray) -> 
 def branch_directions(problem: Problem, x: FloatArray, p: float) -> list[tuple[FloatArray, float, FloatArray]]:
     """Return points beside a branch point on the branch that crosses there, with directions away from it."""
     found: list[tuple[FloatArray, float, FloatArray]] = []
-    residual = problem.at(x, p)
+    residual = problem.at(x, p, None)
     if residual is None:
         return found
     _, _, directions = np.linalg.svd(residual.by_x)
@@ -146,7 +146,7 @@ def _whole(point: _Point) -> FloatArray:
 
 def _point(problem: Problem, x: FloatArray, p: float, direction: FloatArray) -> _Point | None:
     """Return a solution with its unit tangent in a direction."""
-    residual = problem.at(x, p)
+    residual = problem.at(x, p, None)
     if residual is None:
         return None
     matrix = np.hstack([residual.by_x, residual.by_p[:, None]])
@@ -170,11 +170,12 @@ def _step(problem: Problem, now: _Point, length: float) -> _Point | None:
 def _corrected(problem: Problem, guess: FloatArray, across: FloatArray) -> FloatArray | None:
     """Return the solution in the plane through a guess across a direction; None if Newton's method finds none."""
     whole = guess.copy()
-    last = np.inf
+    last, by_p = np.inf, None
     for _ in range(_STEPS):
-        residual = problem.at(whole[:-1], float(whole[-1]))
+        residual = problem.at(whole[:-1], float(whole[-1]), by_p)
         if residual is None:
             return None
+        by_p = residual.by_p  # which changes little over a step
         matrix = np.vstack([np.hstack([residual.by_x, residual.by_p[:, None]]), across])
         rows = np.max(np.abs(matrix), axis=1)
         rows[rows == 0.0] = 1.0

@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.analysis.linear.tangents import Tangents, find_tangents
 from atwood.arrays import FloatArray
@@ -42,6 +43,11 @@ class Differentiated:
     rows: int
     columns: Mapping[str, int]
     places: Mapping[str, SparseMatrix]
+
+    @cached_property
+    def numbers(self) -> dict[str, tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Rows and columns of the entries, by what the derivatives are taken."""
+        return {by: (np.array(x.rows, np.intp), np.array(x.columns, np.intp)) for by, x in self.places.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,9 +260,8 @@ class LinearScene:
         found: dict[tuple[str, str], FloatArray] = {}
         for by, count in part.columns.items():
             matrix = np.zeros((part.rows, count))
-            place = part.places.get(by)
-            if place is not None:
-                matrix[list(place.rows), list(place.columns)] = values[f"{part.name} by {by}"]
+            if by in part.numbers:
+                matrix[part.numbers[by]] = values[f"{part.name} by {by}"]
             found[part.name, by] = matrix
         return found
 

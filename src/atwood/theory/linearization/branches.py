@@ -322,10 +322,12 @@ class _Family:
         rows = [i for i in columns if i < len(a)]
         return a[rows], slopes[np.ix_(rows, columns)]
 
-    def residual(self, x: FloatArray, p: float) -> Residual | None:
-        """Return the equations at a point; None where a law has no value."""
+    def residual(self, x: FloatArray, p: float, by_p: FloatArray | None = None) -> Residual | None:
+        """Return the equations at a point, with given derivatives by the parameter; None where a law has no value."""
         try:
             value, by_x = self._forces(x, p)
+            if by_p is not None:
+                return Residual(value, by_x, by_p)
             ahead, behind = (self._forces(x, p + sign * _DIFFERENCE)[0] for sign in (1.0, -1.0))
         except (AtwoodError, ArithmeticError, np.linalg.LinAlgError):
             return None
