@@ -123,7 +123,7 @@ def roots(tmp_path_factory) -> dict[str, object]:
             SimplePendulum(), unknowns=["rod.angular_velocity"], conditions={"bob.velocity.x": 1.0}
         ),
         "locus": atwood.root_locus(scene, "gravity", [9.0, 10.0, 11.0], at=hanging),
-        "branches": atwood.equilibrium_branches(FourBar(), "gravity", (9.0, 10.0)),
+        "branches": atwood.equilibrium_branches(DoublePendulum(), "gravity", (9.0, 10.0)),
         "branch point": atwood.BranchPoint(1.0, dict.fromkeys(angles, 0.0)),
         "declared": _declared(),
         "box": atwood.solids.box(1.0, 2.0, 3.0, density=1e3),
