@@ -147,7 +147,6 @@ class _Walk:
         self._schedules: dict[Shared, Schedule] = {}
         self._plans: dict[tuple[tuple[float, ...], tuple[float, ...] | None], Plan] = {}
         self._kept, self._sides = KeptSession(), SidesOfRun(options)
-        self._piece_start = start.time
         self.segments: list[SegmentRecord] = []
         self.events: list[EventRecord] = []
         self.choices: list[Choice] = []
