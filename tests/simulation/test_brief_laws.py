@@ -13,7 +13,20 @@ from scipy.integrate import quad, solve_ivp
 
 import atwood
 import atwood_library as lib
-from atwood import Component, Point, Scalar, Scene, connector, parameter, potential, simulate
+from atwood import (
+    Component,
+    ExternalFunction,
+    Load,
+    Point,
+    Scalar,
+    Scene,
+    connector,
+    external,
+    force,
+    parameter,
+    potential,
+    simulate,
+)
 
 PLAIN = ("explicit", "taylor", "ida")
 ALL = ("auto", *PLAIN, "gauss", "composition")
@@ -295,3 +308,41 @@ def test_laws_no_faster_than_coordinates_are_not_watched() -> None:
 
     for scene in (DoublePendulum(), FourBar(), ElasticPendulum(), LagrangeTop()):
         assert not find_curved(atwood.assemble(scene))
+
+
+def slope_of_bell(x: float) -> float:
+    return 90 * (x - 2) * math.exp(-(((x - 2) / 0.1) ** 2))
+
+
+def bend_of_bell(x: float) -> float:
+    return 90 * (1 - 200 * (x - 2) ** 2) * math.exp(-(((x - 2) / 0.1) ** 2))
+
+
+TAP = ExternalFunction("tap", lambda t: 100 * math.exp(-(((t - 5.123) / 5.6418958e-3) ** 2)))
+SLOPE = ExternalFunction("slope", slope_of_bell, (ExternalFunction("bend", bend_of_bell),))
+
+
+class Pushed(Component):
+    """A hill at 2 m, by a function in Python."""
+
+    point: Point = connector(Point, "What is on it.")
+
+    @force
+    def push(self) -> list[Load]:
+        return [Load(self.point, force=atwood.Vector(external(SLOPE, self.point.position.x), 0.0, 0.0))]
+
+
+@pytest.mark.filterwarnings("ignore:.*is evaluated in Python")
+@pytest.mark.parametrize("solver", ["explicit", "ida", "ida-sundae"])
+def test_functions_in_python_are_sampled_and_that_is_said(solver: str) -> None:
+    with pytest.warns(UserWarning, match="nothing is known of tap but samples"):
+        result = simulate(on_a_line(force=lambda t: external(TAP, t), speed=0.0), solver=solver)
+    assert result["mass.speed"][-1] == pytest.approx(100 * 5.6418958e-3 * math.sqrt(math.pi), abs=1e-6)
+    scene = Scene(space="line", gravity=0.0, t_end=10.0)
+    mass, hill = scene.add("mass", lib.Mass1D(mass=1.0)), scene.add("hill", Pushed())
+    scene.connect(hill.point, mass.flange)
+    scene.start.update({"mass.displacement": 0.0, "mass.speed": 1.0})
+    with pytest.warns(UserWarning, match="nothing is known of slope but samples"):
+        result = simulate(scene, solver=solver)
+    expected = delayed(lambda x: 0.45 * math.exp(-(((x - 2) / 0.1) ** 2)), 2.0, 0.1)
+    assert result["mass.displacement"][-1] == pytest.approx(expected, abs=1e-4)
