@@ -26,6 +26,7 @@ KINDS = {
     "stiff": "stiff",
     "tables": "tables",
     "metamorphic": "metamorphic",
+    "narrow": "narrow",
     "switches": "switches",
     "memory": "memory",
 }
