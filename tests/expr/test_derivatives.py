@@ -1,5 +1,6 @@
 import math
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -153,3 +154,22 @@ def test_reverse_sweep_visits_only_what_depends_on_the_variables():
     before = len(graph)
     assert ex.vjp(outputs, [1.0], [x]) == [heavy]
     assert len(graph) == before
+
+
+@pytest.mark.parametrize("x", [-2000.0, -3.0, 0.0, 0.4, 2000.0])
+def test_a_quotient_by_what_grows_beyond_all_numbers_has_derivatives(x: float) -> None:
+    graph = ex.Graph()
+    s, k = graph.symbol("s"), graph.symbol("k")
+    laws = (
+        (1.0 / ex.cosh(s), lambda s: 1 / mpmath.cosh(s)),
+        (s / ex.cosh(k * s) ** 2, lambda s: s / mpmath.cosh(2 * s) ** 2),
+        (k / (1.0 + ex.exp(-k * s)), lambda s: 2 / (1 + mpmath.exp(-2 * s))),
+        (ex.exp(-s * s) * ex.exp(40 * s), lambda s: mpmath.exp(-s * s + 40 * s)),
+    )
+    for law, exact in laws:
+        (forward,), (back,) = ex.jvp([law], {s: 1.0}), ex.vjp([law], [1.0], [s])
+        (second,) = ex.jvp([back], {s: 1.0})
+        with mpmath.workdps(40):
+            expected = [float(mpmath.diff(exact, mpmath.mpf(x), n)) for n in (1, 1, 2)]
+        found = ex.evaluate([forward, back, second], {s: x, k: 2.0})
+        assert found == pytest.approx(expected, rel=1e-11, abs=1e-12)

@@ -281,6 +281,25 @@ def test_a_curved_function_of_a_choice_or_an_arc_holds_no_run_up(solver: str, po
     assert result["mass.displacement"][-1] == pytest.approx(expected, abs=BOUND.get(solver, 1e-5))
 
 
+LARGE = {
+    "0.3/cosh((x-3.3)/0.004)": lambda x: 0.3 / np.cosh(np.clip((x - 3.3) / 0.004, -700, 700)),
+    "0.3/cosh((x-3.3)/0.004)^2": lambda x: 0.3 / np.cosh(np.clip((x - 3.3) / 0.004, -300, 300)) ** 2,
+    "0.3/(1+exp(-(x-3)/0.002))": lambda x: 0.3 / (1 + np.exp(np.clip(-(x - 3) / 0.002, -700, 700))),
+    "0.3*exp(-((x-3)/0.02)^2)*exp(-10*((x-3)/0.02))": lambda x: (
+        0.3 * np.exp(-(((x - 3) / 0.02) ** 2) - 10 * (x - 3) / 0.02)
+    ),
+}
+
+
+@pytest.mark.parametrize("solver", ["auto", "explicit", "ida", "gauss", "composition"])
+@pytest.mark.parametrize("potential", LARGE)
+def test_a_divisor_or_a_factor_too_large_for_a_number_is_no_bar(solver: str, potential: str) -> None:
+    scale = math.exp(25.0) if "*exp(-10" in potential else 1.0  # the product's own height
+    expected = place_after(lambda x: LARGE[potential](x) / scale, 10.0)
+    result = simulate(on_a_line(f"({potential})/{scale!r}"), solver=solver)
+    assert result["mass.displacement"][-1] == pytest.approx(expected, abs=BOUND.get(solver, 1e-5))
+
+
 def test_sweeps_and_other_values_are_watched_with_their_own() -> None:
     def expected(width: float, speed: float) -> float:
         return delayed(lambda x: 0.45 * math.exp(-(((x - 2) / width) ** 2)), 2.0, width, speed)

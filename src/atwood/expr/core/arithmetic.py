@@ -187,6 +187,9 @@ def multiply(a: Expression, b: Expression) -> Expression:
         return negate(multiply(a.arguments[0], b))
     if a is b and a.operation == "sqrt":
         return a.arguments[0]
+    if a.operation == b.operation == "exp" and a is not b and not a.is_parametric and not b.is_parametric:
+        power = add(a.arguments[0], b.arguments[0])  # one factor may be too large for a number where the product is not
+        return graph.constant(math.exp(power.payload)) if power.operation == "constant" else graph.node("exp", (power,))
     if a.is_parametric != b.is_parametric:
         known, other = (a, b) if a.is_parametric else (b, a)
         inner, rest = _parametric_factor(other)

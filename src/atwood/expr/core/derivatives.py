@@ -15,6 +15,7 @@ from atwood.expr.core import algebra
 from atwood.expr.core.algebra import add, component, divide, multiply, negate, select, subtract, unary
 from atwood.expr.core.analysis import dependents, live
 from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.growth import hand_back_quotient, logarithmic_slopes, tangent_of_quotient
 from atwood.expr.core.operations import LEAVES, PIECEWISE_CONSTANT
 
 _Rule = Callable[[Expression, Expression], Expression]
@@ -44,13 +45,9 @@ def _one_minus_square(a: Expression) -> Expression:
     return subtract(a.graph.one, _square(a))
 
 
-def _half(t: Expression) -> Expression:
-    return multiply(t.graph.constant(0.5), t)
-
-
 _UNARY_RULES: dict[str, _Rule] = {
     "neg": lambda n, t: negate(t),
-    "sqrt": lambda n, t: divide(_half(t), n),
+    "sqrt": lambda n, t: divide(multiply(t.graph.constant(0.5), t), n),
     "sin": lambda n, t: multiply(unary("cos", n.arguments[0]), t),
     "cos": lambda n, t: negate(multiply(unary("sin", n.arguments[0]), t)),
     "tan": lambda n, t: multiply(add(n.graph.one, _square(n)), t),
@@ -78,14 +75,12 @@ def _radius_square(n: Expression) -> Expression:
     return add(_square(y), _square(x))
 
 
-def _first_if(operation: str) -> _Rule:
-    """Return the rule for the first argument of a minimum or maximum."""
-    return lambda n, t: select(_chooses_first(n, operation), t, n.graph.zero)
-
-
-def _second_if(operation: str) -> _Rule:
-    """Return the rule for the second argument of a minimum or maximum."""
-    return lambda n, t: select(_chooses_first(n, operation), n.graph.zero, t)
+def _if_chosen(operation: str) -> tuple[_Rule, _Rule]:
+    """Return the rules for the arguments of a minimum or maximum."""
+    return (
+        lambda n, t: select(_chooses_first(n, operation), t, n.graph.zero),
+        lambda n, t: select(_chooses_first(n, operation), n.graph.zero, t),
+    )
 
 
 def _chooses_first(n: Expression, operation: str) -> Expression:
@@ -103,8 +98,8 @@ _BINARY_RULES: dict[str, tuple[_Rule, _Rule]] = {
         lambda n, t: divide(multiply(n.arguments[1], t), _radius_square(n)),
         lambda n, t: negate(divide(multiply(n.arguments[0], t), _radius_square(n))),
     ),
-    "minimum": (_first_if("minimum"), _second_if("minimum")),
-    "maximum": (_first_if("maximum"), _second_if("maximum")),
+    "minimum": _if_chosen("minimum"),
+    "maximum": _if_chosen("maximum"),
 }
 
 
@@ -135,7 +130,7 @@ def _partial(n: Expression, position: int, t: Expression) -> Expression:
     raise AtwoodError(f"the operation {operation} has no derivative rule")
 
 
-def _tangent(n: Expression, tangents: Mapping[int, Expression]) -> Expression | None:
+def _tangent(n: Expression, tangents: Mapping[int, Expression], seeds: Mapping[int, object]) -> Expression | None:
     """Return the derivative of a node from those of its arguments; None for a structural zero."""
     operation = n.operation
     arguments = n.arguments
@@ -148,6 +143,8 @@ def _tangent(n: Expression, tangents: Mapping[int, Expression]) -> Expression | 
         return select(arguments[0], a, b)
     if len(moving) == 2 and operation == "mul" and arguments[0] is arguments[1]:
         return multiply(n.graph.constant(2.0), multiply(arguments[0], moving[0][1]))
+    if operation == "div" and (slopes := logarithmic_slopes(arguments[1], seeds)) is not None:
+        return tangent_of_quotient(n, slopes, tangents)
     if len(moving) == 2 and operation == "div":
         return divide(subtract(moving[0][1], multiply(n, moving[1][1])), arguments[1])
     if len(moving) == 2 and operation == "atan2":
@@ -193,7 +190,7 @@ def _sweep(nodes: Sequence[Expression], seeds: Mapping[int, Expression]) -> dict
                 unknowns[index] = _solve_tangent(node, tangents)
             continue
         else:
-            derivative = _tangent(node, tangents)
+            derivative = _tangent(node, tangents, seeds)
         if derivative is not None and not derivative.is_zero:
             tangents[index] = derivative
     return tangents
@@ -273,6 +270,9 @@ def vjp(
         if node.operation == "mul" and node.arguments[0] is node.arguments[1]:
             # The factor two goes to the weight, where it may meet a constant; the sum of two halves never would.
             hand_back(node.arguments[0], multiply(multiply(graph.constant(2.0), weight), node.arguments[0]))
+            continue
+        if node.operation == "div" and (slopes := logarithmic_slopes(node.arguments[1], roots)) is not None:
+            hand_back_quotient(node, slopes, weight, hand_back)
             continue
         for position, argument in enumerate(node.arguments):
             if argument.index in active:
