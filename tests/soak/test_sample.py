@@ -78,6 +78,13 @@ def test_files_and_poles(kind) -> None:
         assert not trial.findings, (seed, trial.findings[0])
 
 
+def test_rates_beside_a_pole_do_not_ask_for_more_samples_than_there_can_be() -> None:
+    """Here 10 GB were taken."""
+    with pytest.warns(UserWarning, match="may be counted wrong by whole turns"):
+        trial = poles.check(3018)
+    assert not trial.findings, trial.findings[0]
+
+
 def test_the_oracle_is_consistent_by_itself() -> None:
     """The rows on the speeds are the rates of what the constraints hold, by complex steps along the motion."""
     looked_at = 0

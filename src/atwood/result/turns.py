@@ -125,12 +125,13 @@ class TurnCounter:
         """Return the same run with so many times the samples; None if there is none."""
         from atwood.simulation.run.retrace import run_again
 
+        if factor * len(time) > _MOST:
+            return None
         if factor not in self._finer:
             inside = np.arange(1, factor) / factor
             steps = np.diff(time)
             between = (time[:-1, None] + steps[:, None] * inside)[steps > 0.0].ravel()
-            small = factor * len(time) <= _MOST
-            self._finer[factor] = run_again(self._run, np.unique(between)) if small else None
+            self._finer[factor] = run_again(self._run, np.unique(between))
         return self._finer[factor]
 
 
