@@ -4,8 +4,10 @@ from math import acos, pi
 
 import pytest
 
-from atwood import Component, Point, Scalar, Scene, connector, discrete_state, event, parameter, simulate, update
+from atwood import Scene, simulate
 from atwood_library import Ground, PointMass, Spring
+
+from ..helpers.counters import Counter
 
 WAYS = [
     *(("reduced", one) for one in ("explicit", "taylor", "ida", "gauss", "composition")),
@@ -32,24 +34,6 @@ def passings(share: float, end: float, rate: float = FREQUENCY) -> list[float]:
     first, turns = acos(share), range(int(rate * end / (2.0 * pi)) + 2)
     times = sorted(one / rate for k in turns for one in (2.0 * pi * k + first, 2.0 * pi * (k + 1) - first))
     return [one for one in times if one <= end]
-
-
-class Counter(Component):
-    """Counts how often a point passes a height, both ways."""
-
-    height: float = parameter(0.0, unit="m", doc="The height.")
-    point: Point = connector(Point, "What is counted.")
-    passed: Scalar = discrete_state(doc="How often.")
-
-    @event(direction=0, unit="m", message="it passes")
-    def passes(self) -> Scalar:
-        """Return the height above it."""
-        return self.point.position.z - self.height
-
-    @update(at="passes", sets="passed")
-    def count(self) -> Scalar:
-        """Return one more."""
-        return self.passed + 1.0
 
 
 @pytest.mark.parametrize(("form", "solver"), WAYS)
@@ -80,7 +64,7 @@ def test_a_share_of_1e_9_of_the_amplitude_is_seen_in_any_units(solver: str, size
 @pytest.mark.parametrize(("form", "solver"), WAYS)
 def test_a_component_counts_each_passing_once(form: str, solver: str) -> None:
     scene = swinging()
-    counter = scene.add("counter", Counter(height=-(1.0 + 0.09999)))
+    counter = scene.add("counter", Counter(level=-(1.0 + 0.09999), axis=2))
     scene.connect(counter.point, scene.m.point)
     run = simulate(scene, t_end=1.0, form=form, solver=solver, rtol=1e-10, **STEPS.get(solver, {}))
     assert run["counter.passed"][-1] == len(passings(0.9999, 1.0))

@@ -6,18 +6,16 @@ import pytest
 
 from atwood import (
     Component,
-    Point,
     Scalar,
     Scene,
-    connector,
     discrete_state,
-    event,
-    parameter,
     select,
     simulate,
     update,
 )
 from atwood_library import Force, PointMass, Table
+
+from ..helpers.counters import Counter
 
 WAYS = [*(("reduced", one) for one in ("explicit", "taylor", "ida", "ida-sundae")), ("dae", "explicit"), ("dae", "ida")]
 
@@ -31,24 +29,6 @@ class Clock(Component):
     def tick(self) -> Scalar:
         """Return one more."""
         return self.ticks + 1.0
-
-
-class Counter(Component):
-    """Counts how often a point passes a place, both ways."""
-
-    place: float = parameter(0.0, unit="m", doc="The place.")
-    point: Point = connector(Point, "What is counted.")
-    passed: Scalar = discrete_state(doc="How often.")
-
-    @event(direction=0, unit="m", message="it passes")
-    def passes(self) -> Scalar:
-        """Return how far behind the place it is."""
-        return self.point.position.x - self.place
-
-    @update(at="passes", sets="passed")
-    def count(self) -> Scalar:
-        """Return one more."""
-        return self.passed + 1.0
 
 
 def mover(velocity: float, at: float) -> Scene:
@@ -106,7 +86,7 @@ def test_what_passes_zero_where_a_run_is_begun_again_is_seen_once(
 def test_all_parts_whose_events_happen_together_change(form: str, solver: str) -> None:
     scene = mover(1.0, -0.3)
     for i, place in enumerate((0.0, 0.0, 1e-9, 0.2)):
-        counter = scene.add(f"counter{i}", Counter(place=place))
+        counter = scene.add(f"counter{i}", Counter(level=place))
         scene.connect(counter.point, scene.m.point)
     run = simulate(scene, form=form, solver=solver, t_end=1.0, outputs=4)
     assert [run[f"counter{i}.passed"][-1] for i in range(4)] == [1.0, 1.0, 1.0, 1.0]

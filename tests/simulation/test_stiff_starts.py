@@ -2,51 +2,21 @@
 
 from typing import Any
 
-import numpy as np
 import pytest
-from scipy.linalg import expm
 
-from atwood import Scene, UsageError, simulate, sin
-from atwood_library import Damper, Force, Ground, PointMass, Spring
+from atwood import Scene, UsageError, simulate
+
+from ..helpers.chains import exact_chain, pushed_chain
 
 
-def chain(
-    stiffness: tuple[float, ...], damping: tuple[float, ...], rate: float, at: float = 0.0, pace: float = 1.0
-) -> Scene:
-    """Return masses of 1 kg, each tied to the one before by k and c; the last is pushed by the least k sin(rate t)."""
-    scene = Scene(space="line", line_axis=(1.0, 0.0, 0.0))
-    before: Any = scene.add("ground", Ground()).frame
-    for i, (k, c) in enumerate(zip(stiffness, damping, strict=True)):
-        mass = scene.add(f"m{i}", PointMass(mass=1.0))
-        spring, damper = Spring(stiffness=k * pace**2, natural_length=1.0), Damper(damping=c * pace)
-        for name, tie in ((f"s{i}", spring), (f"d{i}", damper)):
-            scene.add(name, tie)
-            scene.connect(before, tie.a)
-            scene.connect(tie.b, mass.point)
-        scene.start.update({f"m{i}.position.x": i + 1.0 + at, f"m{i}.velocity.x": 0.0})
-        before = mass.point
-    size = min(stiffness) * pace**2
-    push = scene.add("push", Force(value=lambda t: size * sin(rate * pace * t)))
-    scene.connect(push.point, before)
-    return scene
+def chain(stiffness: tuple[float, ...], damping: tuple[float, ...], rate: float, at: float = 0.0) -> Scene:
+    """Return a chain whose last mass is pushed by the least k sin(rate t)."""
+    return pushed_chain(stiffness, damping, (min(stiffness), rate), at)
 
 
 def exact(stiffness: tuple[float, ...], damping: tuple[float, ...], rate: float, at: float, t: float) -> Any:
-    """Return displacements of the masses from balance by the exponential of the matrix with the push as two states."""
-    n = len(stiffness)
-    matrix = np.zeros((2 * n + 2, 2 * n + 2))
-    matrix[:n, n : 2 * n] = np.eye(n)
-    for rows, values in ((0, stiffness), (n, damping)):
-        for i, value in enumerate(values):
-            ends = [i] if i == 0 else [i - 1, i]
-            for a in ends:
-                for b in ends:
-                    matrix[n + a, rows + b] -= value * (1.0 if a == b else -1.0)
-    matrix[2 * n - 1, 2 * n] = min(stiffness)
-    matrix[2 * n, 2 * n + 1], matrix[2 * n + 1, 2 * n] = rate, -rate
-    start = np.zeros(2 * n + 2)
-    start[:n], start[-1] = at, 1.0
-    return (expm(matrix * t) @ start)[:n]
+    """Return its displacements from balance."""
+    return exact_chain(stiffness, damping, (min(stiffness), rate), at, t)[0]
 
 
 CASES = {

@@ -15,44 +15,15 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from atwood import (
-    Component,
-    Point,
-    Scalar,
-    Scene,
-    connector,
-    discrete_state,
-    event,
-    parameter,
-    simulate,
-    update,
-)
+from atwood import Scene, simulate
 from atwood.errors import AtwoodError
 from atwood_library import Damper, Force, Ground, PointMass, Spring
 
+from ..helpers.counters import Counter
 from .trial import Discarded, Finding, Trial
 
 WAYS = [("reduced", one) for one in ("auto", "explicit", "ida", "taylor")]
 WAYS += [("dae", "auto"), ("dae", "ida")]
-
-
-class Counter(Component):
-    """Counts how often a coordinate passes a level, both ways."""
-
-    level: float = parameter(0.0, unit="m", doc="The level.")
-    axis: int = parameter(0, integer=True, doc="Which coordinate.")
-    point: Point = connector(Point, "What is counted.")
-    passed: Scalar = discrete_state(doc="How often.")
-
-    @event(direction=0, unit="m", message="it passes")
-    def passes(self) -> Scalar:
-        """Return how far behind the level it is."""
-        return self.point.position[self.axis] - self.level
-
-    @update(at="passes", sets="passed")
-    def count(self) -> Scalar:
-        """Return one more."""
-        return self.passed + 1.0
 
 
 class Motion:

@@ -8,59 +8,18 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
 
-from atwood import Scene, simulate, sin
+from atwood import simulate
 from atwood.errors import AtwoodError
-from atwood_library import Damper, Force, Ground, PointMass, Spring
 
+from ..helpers.chains import exact_chain, pushed_chain
 from .trial import Finding, Trial
 
 WAYS = [("reduced", "auto"), ("dae", "auto"), ("reduced", "ida"), ("dae", "ida")]
 
 MOST_STEPS = 100_000
-
-
-def make(stiffness: list[float], damping: list[float], push: tuple[float, float], at: float) -> Scene:
-    """Return masses of 1 kg, each tied to the one before; all are moved from balance by a length."""
-    scene = Scene(space="line", line_axis=(1.0, 0.0, 0.0))
-    before: Any = scene.add("ground", Ground()).frame
-    for i, (k, c) in enumerate(zip(stiffness, damping, strict=True)):
-        mass = scene.add(f"m{i}", PointMass(mass=1.0))
-        for name, tie in ((f"s{i}", Spring(stiffness=k, natural_length=1.0)), (f"d{i}", Damper(damping=c))):
-            scene.add(name, tie)
-            scene.connect(before, tie.a)
-            scene.connect(tie.b, mass.point)
-        scene.start.update({f"m{i}.position.x": i + 1.0 + at, f"m{i}.velocity.x": 0.0})
-        before = mass.point
-    size, rate = push
-    force = scene.add("push", Force(value=lambda t: size * sin(rate * t)))
-    scene.connect(force.point, before)
-    return scene
-
-
-def exact(
-    stiffness: list[float], damping: list[float], push: tuple[float, float], at: float, t: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return displacements from balance, and the eigenvalues of the motion without the push."""
-    n = len(stiffness)
-    matrix = np.zeros((2 * n + 2, 2 * n + 2))
-    matrix[:n, n : 2 * n] = np.eye(n)
-    for first, values in ((0, stiffness), (n, damping)):
-        for i, value in enumerate(values):
-            ends = [i] if i == 0 else [i - 1, i]
-            for a in ends:
-                for b in ends:
-                    matrix[n + a, first + b] -= value * (1.0 if a == b else -1.0)
-    size, rate = push
-    matrix[2 * n - 1, 2 * n] = size
-    matrix[2 * n, 2 * n + 1], matrix[2 * n + 1, 2 * n] = rate, -rate
-    start = np.zeros(2 * n + 2)
-    start[:n], start[-1] = at, 1.0
-    return (expm(matrix * t) @ start)[:n], np.linalg.eigvals(matrix[: 2 * n, : 2 * n])
 
 
 def check(seed: int) -> Trial:
@@ -75,12 +34,12 @@ def check(seed: int) -> Trial:
     push = float(min(stiffness) * 10.0 ** random.uniform(-2.0, 0.0)), rate
     at = 0.0 if random.random() < 0.5 else 10.0 ** random.uniform(-6.0, -2.0)
     end = 10.0 ** random.uniform(-1.0, 1.5) / rate
-    expected, values = exact(stiffness, damping, push, at, end)
+    expected, values = exact_chain(stiffness, damping, push, at, end)
     rtol = 10.0 ** random.uniform(-9.0, -5.0)
     rings = np.abs(values.imag)
     ringing = rings * np.minimum(end, 40.0 / np.maximum(-values.real, 1e-300))  # radians before they have died away
     tried = (f"{form} {solver}", "off balance" if at else "in balance", f"masses {count}", "compared")
-    scene = make(stiffness, damping, push, at)
+    scene = pushed_chain(stiffness, damping, push, at)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

@@ -53,7 +53,6 @@ class Features:
         The scene, and its equations in the reduced form.
     laws
         What is looked at.
-
     """
 
     def __init__(self, assembly: Assembly, equations: Equations, laws: Sequence[Expression]) -> None:
@@ -66,7 +65,7 @@ class Features:
             if node.index in placed:
                 found |= {one: None for one in _arguments(node) if one.index in placed and one.index not in moving}
         values = [one for one in found if not _follows(one, found)][:_MOST]
-        self.count = len(values)
+        self._count = len(values)
         number = {one: i for i, one in enumerate(values)}
         inner = {one for value in values for one in live([value]) if one is not value}
         terms = (
@@ -74,7 +73,7 @@ class Features:
         )
         self._groups = [list(one) for one in dict.fromkeys(tuple(sorted(one)) for one in terms) if len(one) > 1]
         often = [i for one, i in number.items() if one not in inner]
-        self._turns = [*range(self.count)] * _EACH + often * (_OFTEN - _EACH)
+        self._turns = [*range(self._count)] * _EACH + often * (_OFTEN - _EACH)
         self._turn = 0
         pure = {one for node in nodes if node.operation in _PURE for one in node.arguments}
         self._pure = np.array([one in pure for one in values], dtype=bool)
@@ -95,7 +94,7 @@ class Features:
         """Return numbers of arguments: each in its turn, alone, with others at random, or with what acts with it."""
         first, self._turn = self._turns[self._turn % len(self._turns)], self._turn + 1
         together = [one for one in self._groups if first in one]
-        group, most = list(range(self.count)), int(random.integers(1, 1 + _TOGETHER))
+        group, most = list(range(self._count)), int(random.integers(1, 1 + _TOGETHER))
         if together and random.uniform() < _JOINT:
             group, most = together[int(random.integers(len(together)))], _TOGETHER
         others = [int(one) for one in random.permutation(group) if one != first]
@@ -115,7 +114,7 @@ class Features:
         random
             Where chances come from.
         """
-        if not self.count:
+        if not self._count:
             return t, q
         chosen = self._choose(random)
         relative = (random.uniform(size=len(chosen)) < 0.5) | ~self._pure[chosen]
@@ -126,7 +125,7 @@ class Features:
         still, scales = np.zeros(self._speeds), np.append(sizes, span)
         for _ in range(_STEPS):
             values, entries = (np.asarray(one, dtype=float) for one in self._kernel([t], q, still))
-            slopes = entries[: self.count * self._speeds].reshape(self.count, self._speeds)
+            slopes = entries[: self._count * self._speeds].reshape(self._count, self._speeds)
             wanted = np.where(relative, np.abs(values[chosen]), 1.0) * shares if wanted is None else wanted
             matrix = (np.column_stack([slopes, entries[slopes.size :]]) * scales)[chosen]
             missing = wanted - values[chosen]

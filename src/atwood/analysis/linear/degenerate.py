@@ -179,9 +179,9 @@ def _root(field: _Field, axis: FloatArray) -> tuple[Rest, int, float, tuple[Floa
         first, second = (curve.coef[k] for k in (order - 1, order))
         if abs(first) >= abs(second) or abs(second) <= 1e4 * _ROUND * largest:
             continue
-        bend, away = curve.deriv(order - 1), 0.0
+        bend, slope, away = curve.deriv(order - 1), curve.deriv(order), 0.0
         for _ in range(_REFINED):
-            away -= float(bend(away) / bend.deriv()(away))
+            away -= float(bend(away) / slope(away))
         if not abs(away) <= 0.1:
             continue
         shifted = curve(Polynomial([away, 1.0]))

@@ -24,16 +24,7 @@ from atwood.integrators.event_location import EventLocator, Root, State
 from atwood.integrators.ida.callbacks import Record, explain
 from atwood.integrators.ida.library import available, library, why_not
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
-from atwood.integrators.ida.pace import (
-    ENDLESS,
-    FIRST_CHUNK,
-    NO_GROWTH,
-    RARE_GROWTH,
-    REPEATED,
-    TRAPPED,
-    Pace,
-    first_chunk,
-)
+from atwood.integrators.ida.pace import FIRST_CHUNK, Pace, first_chunk
 from atwood.integrators.ida.setup import IdaTuning, prepare
 from atwood.integrators.ida.states import checked_state, copied, is_finite
 from atwood.integrators.ida.sundae import REASONS, SHORTER, TOO_LONG
@@ -128,7 +119,6 @@ class NativeSession:
         self._no_events = (0,) * problem.event_count
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
         self._starts = 0
-        self._was_trapped = False
         self._seconds = 0.0
         self._pending: StepResult | None = None
         self._pace = Pace(FIRST_CHUNK if self._record.calls_python else first_chunk(problem.size))
@@ -517,19 +507,14 @@ class NativeSession:
         return self._judge_lap(t)
 
     def _judge_lap(self, t: float) -> StepResult | None:
-        """Return an answer if so many steps are repeated that the run would not end; have them grow more rarely."""
-        lap = self._pace.lap_of(t, self._memory.steps(), self._repeated)
-        if lap is None:
+        """Return an answer if the run would not end; tell IDA how much steps must grow, where that changes."""
+        is_endless, growth = self._pace.judge_lap(t, self._memory.steps(), self._repeated, self._horizon)
+        if growth is not None:
+            self._memory.call("IDASetEtaFixedStepBounds", 1.0, growth)
+        if not is_endless:
             return None
-        advance, repeated = lap
-        if repeated > REPEATED and advance * ENDLESS < self._horizon:
-            self._stale = True
-            return self._stopped(Status.FAILED, "rounding keeps the steps so short that the run would not end")
-        is_trapped = repeated > TRAPPED
-        if is_trapped or self._was_trapped:
-            self._memory.call("IDASetEtaFixedStepBounds", 1.0, NO_GROWTH if is_trapped else RARE_GROWTH)
-            self._was_trapped = is_trapped
-        return None
+        self._stale = True
+        return self._stopped(Status.FAILED, "rounding keeps the steps so short that the run would not end")
 
     def _repeated(self) -> int:
         counts = self._memory.counts()

@@ -25,10 +25,10 @@ _FIRST_COMPILED_CHUNK, _SMALL = 500, 40
 _LAP = 2000
 """Over so many steps it is judged how they get on."""
 
-REPEATED, ENDLESS = 0.25, 1e9
+_REPEATED, _ENDLESS = 0.25, 1e9
 """Steps do not get on if such a share of them had to be repeated, and it would take so many to the end."""
 
-TRAPPED, NO_GROWTH, RARE_GROWTH = 0.5, 1e6, 4.0
+_TRAPPED, _NO_GROWTH, _RARE_GROWTH = 0.5, 1e6, 4.0
 """Where so large a share is repeated, no step of the next lap is longer, and later ones only by such a factor.
 
 In what dies away fast, a step of order one that is made longer starts a new transient, and is repeated. IDA looks at
@@ -56,12 +56,15 @@ class Pace:
     lap
         The same with the number of steps that were repeated until then, from which it is judged whether the run gets
         on.
+    is_trapped
+        Whether steps of the last lap were repeated because they were longer than those before.
     """
 
     chunk: int = FIRST_CHUNK
     allowed: int = 0
     mark: tuple[float, int] = field(default=(-inf, 0))
     lap: tuple[float, int, int] = field(default=(-inf, 0, 0))
+    is_trapped: bool = False
 
     def learn(self, seconds: float, used_up: bool) -> None:
         """Come closer to a chunk that takes a moment."""
@@ -78,10 +81,24 @@ class Pace:
             return False
         return steps - count >= STALLED_STEPS
 
-    def lap_of(self, t: float, steps: int, repeated: Callable[[], int]) -> tuple[float, float] | None:
-        """Return how far each step of a lap has come, and which share was repeated; None while the lap goes on."""
+    def judge_lap(self, t: float, steps: int, repeated: Callable[[], int], horizon: float) -> tuple[bool, float | None]:
+        """Tell, once a lap, whether the run would never end, and how much steps must grow from now on, if that changes.
+
+        Parameters
+        ----------
+        t, steps
+            The time, and the steps since the start.
+        repeated
+            Returns how many of these were repeated.
+        horizon
+            How far the run goes, s.
+        """
         since, count, before = self.lap
-        if steps - count < _LAP:
-            return None
+        taken = steps - count
+        if taken < _LAP:
+            return False, None
         self.lap = t, steps, repeated()
-        return (t - since) / (steps - count), (self.lap[2] - before) / (steps - count)
+        again, was_trapped = self.lap[2] - before, self.is_trapped
+        self.is_trapped = again > _TRAPPED * taken
+        growth = _NO_GROWTH if self.is_trapped else _RARE_GROWTH if was_trapped else None
+        return again > _REPEATED * taken and (t - since) * _ENDLESS < horizon * taken, growth
