@@ -16,8 +16,8 @@ from atwood.integrators.ida.callbacks import Record
 from atwood.integrators.ida.fixed import FixedSolver, table_layout
 from atwood.integrators.ida.library import library
 from atwood.integrators.protocol import ChoosePivots, ImplicitProblem, SolverOptions, Status, choose_linear_solver
-from atwood.linalg.body_order import Stage
-from atwood.linalg.fixed_pivots import FixedPivots, fix_pivots
+from atwood.numerics.body_order import Stage
+from atwood.numerics.fixed_pivots import FixedPivots, fix_pivots
 from atwood_library import scenes
 
 from ..helpers.runs import Prepared, packed, prepare

@@ -7,7 +7,7 @@ import pytest
 from atwood import simulate
 from atwood.codegen.llvm.columns import ColumnKernel
 from atwood.codegen.python.backend import BoundKernel
-from atwood.linalg import sparse
+from atwood.numerics import sparse
 from atwood.simulation.singular.monitor import SingularityMonitor
 from atwood_library.scenes import FourBar, FourBarRow
 

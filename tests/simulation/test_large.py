@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from atwood import Scene, StartError, simulate
-from atwood.linalg import matrices
-from atwood.linalg.matrices import from_entries
-from atwood.linalg.sparse import csr_of, free_columns, smallest_direction, solve_bordered
-from atwood.linalg.sparse_batch import Borders, Elimination, Normal, Pattern
+from atwood.numerics import matrices
+from atwood.numerics.independence import independent_rows, least_norm
+from atwood.numerics.matrices import from_entries
+from atwood.numerics.sparse import csr_of, free_columns, smallest_direction, solve_bordered
+from atwood.numerics.sparse_batch import Borders, Elimination, Normal, Pattern
 from atwood.pipeline import assemble
-from atwood.simulation.dynamics.rank import independent_rows, least_norm
 from atwood_library import Ground, PointMass, Rod
 from atwood_library.scenes.chain import Chain
 from atwood_library.scenes.four_bar import FourBar

@@ -11,7 +11,7 @@ from atwood import simulate
 from atwood.codegen.python.backend import BoundKernel
 from atwood.codegen.sundials.lookout_text import Shape
 from atwood.integrators.ida import library as sundials_library
-from atwood.linalg.matrices import to_array
+from atwood.numerics.matrices import to_array
 from atwood.simulation.singular.looks import Look
 from atwood.simulation.singular.monitor import SingularityMonitor
 from atwood_library.scenes import Bricard, FourBar, SliderCrank

@@ -24,9 +24,9 @@ from atwood.forms.places import to_maximal
 from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.numerics.independence import independent_rows
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, solve_balance
 from atwood.simulation.dynamics.columns import mass_at
-from atwood.simulation.dynamics.rank import independent_rows
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start
 

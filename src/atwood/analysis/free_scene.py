@@ -13,12 +13,12 @@ from atwood.codegen.rounding import ROUGHNESS
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linalg.matrices import from_entries, to_array
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.orientation import spin_in_world
+from atwood.numerics.independence import certain, independent_rows
+from atwood.numerics.matrices import from_entries, to_array
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, solve_balance
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
-from atwood.simulation.dynamics.rank import certain, independent_rows
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start
 

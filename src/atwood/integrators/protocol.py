@@ -23,7 +23,7 @@ from atwood.late import dataclass
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
-    from atwood.linalg.fixed_pivots import FixedPivots
+    from atwood.numerics.fixed_pivots import FixedPivots
 
 __all__ = [
     "JUST_HAPPENED",

@@ -10,10 +10,11 @@ import numpy as np
 from atwood.arguments import optional, takes
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.constraints.frobenius import integrable_together
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
 from atwood.model.compose.composite import Model
+from atwood.numerics.independence import row_scales
+from atwood.numerics.matrices import scaled, to_array
 from atwood.pipeline import SCENE, assemble_flat, assembly_of
 from atwood.reporting.offers import Offer, find_offers
 from atwood.reporting.parts import (
@@ -30,7 +31,6 @@ from atwood.reporting.parts import (
     list_ties,
 )
 from atwood.showing import fitted, html_table
-from atwood.simulation.dynamics.rank import row_scales
 from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization

@@ -16,14 +16,14 @@ from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import coordinate_program, state_program
 from atwood.late import dataclass, replace
-from atwood.linalg.matrices import scaled
 from atwood.mechanics.kinematics.mechanism import world_position
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
 from atwood.model.local.flatten import FlatScene
 from atwood.model.values.vector import Vector
+from atwood.numerics.independence import independent_rows
+from atwood.numerics.matrices import scaled
 from atwood.pipeline import assemble_flat
 from atwood.simulation.dynamics.balance import balance_of
-from atwood.simulation.dynamics.rank import independent_rows
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.problem.preparation import make_plan

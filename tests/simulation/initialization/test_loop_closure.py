@@ -10,7 +10,7 @@ import pytest
 
 import atwood
 from atwood.errors import KernelEvaluationError
-from atwood.linalg.matrices import LARGEST_FULL
+from atwood.numerics.matrices import LARGEST_FULL
 from atwood.simulation.initialization import loop_closure
 from atwood.simulation.initialization.loop_closure import Nearest, closest, closest_of_all, places_around, units_of_rows
 from atwood.simulation.initialization.system import System

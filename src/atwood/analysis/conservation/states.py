@@ -22,11 +22,11 @@ from atwood.expr import Expression, OutputGroup, Program, vjp
 from atwood.expr.core.relations import Relation, TimeRelations
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass, replace
-from atwood.linalg.matrices import from_entries, to_array
+from atwood.numerics.independence import independent_rows
+from atwood.numerics.matrices import from_entries, to_array
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, solve_balance
 from atwood.simulation.dynamics.columns import mass_at
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
-from atwood.simulation.dynamics.rank import independent_rows
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import find_start
 

@@ -18,7 +18,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.places import to_maximal
 from atwood.late import dataclass
-from atwood.linalg.matrices import to_array
+from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of
 
 __all__ = ["Rest", "RestSearch", "difference", "slopes_at", "wrapped"]

@@ -19,7 +19,7 @@ SLOTS = (
 )
 """What a block of 64-bit numbers and addresses holds, in this order.
 
-First the lists of `atwood.linalg.fixed_pivots.FixedPivots`; how many unknowns, entries and places there are; the
+First the lists of `atwood.numerics.fixed_pivots.FixedPivots`; how many unknowns, entries and places there are; the
 factors, signs for the right-hand side of the probe, and room for three vectors; the entries of the present matrix;
 whether its factors are no good; and what is then done: a function that either returns `AGAIN`, with other lists in the
 block, or factorises in another way and returns 0, or else something other; and one that then solves, given right-hand

@@ -20,7 +20,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.llvm.fixed_pivots import AGAIN, SLOTS
 from atwood.codegen.sundials.fixed_pivots import fixed_pivots_addresses
 from atwood.late import dataclass
-from atwood.linalg.fixed_pivots import FixedPivots
+from atwood.numerics.fixed_pivots import FixedPivots
 
 if TYPE_CHECKING:
     from atwood.integrators.ida.callbacks import Record

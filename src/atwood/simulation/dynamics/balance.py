@@ -14,7 +14,8 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.balance_program import BalanceProgram
 from atwood.late import dataclass
-from atwood.linalg.matrices import (
+from atwood.numerics.independence import least_norm, row_scales
+from atwood.numerics.matrices import (
     Matrix,
     from_entries,
     is_best_full,
@@ -23,7 +24,6 @@ from atwood.linalg.matrices import (
 )
 from atwood.simulation.dynamics.columns import mass_at
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
-from atwood.simulation.dynamics.rank import least_norm, row_scales
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.tolerances import tolerances
 
@@ -204,7 +204,7 @@ class Balance:
     def row_scales(
         self, now: BalanceValues | ConstraintValues, t: float, q: FloatArray, scales: FloatArray
     ) -> FloatArray:
-        """Return the size of each constraint at a place; see `atwood.simulation.dynamics.rank.row_scales`."""
+        """Return the size of each constraint at a place; see `atwood.numerics.independence.row_scales`."""
         return row_scales(now.jacobian, scales, self.errors.near(t, q, scales))
 
     def holding(self, chosen: Sequence[int]) -> list[int]:
@@ -239,7 +239,7 @@ def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -
     gamma = now.gamma if kept is None else now.gamma[kept]
     m = len(gamma)
     if not is_full(now.mass):
-        from atwood.linalg.sparse import solve_bordered
+        from atwood.numerics.sparse import solve_bordered
 
         solved = solve_bordered(now.mass, jacobian, now.bias, gamma)
         if solved is None:

@@ -9,7 +9,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr import Expression, depends_on, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linalg.matrices import to_array
+from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.redundancy import find_rank

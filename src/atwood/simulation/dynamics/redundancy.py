@@ -13,9 +13,9 @@ from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import KernelEvaluationError
 from atwood.late import dataclass, replace
-from atwood.linalg.matrices import is_full, scaled, to_array
+from atwood.numerics.independence import independent_rows, open_directions, review_rows, row_sizes
+from atwood.numerics.matrices import is_full, scaled, to_array
 from atwood.simulation.dynamics.balance import Balance
-from atwood.simulation.dynamics.rank import independent_rows, open_directions, review_rows, row_sizes
 from atwood.tolerances import tolerances
 
 __all__ = ["RankFinding", "find_rank", "kept_along", "review_kept"]
@@ -121,7 +121,7 @@ def _hangs_together(balance: Balance, t: float, q: FloatArray, scales: FloatArra
     slopes = balance.constraints_at(t, q, np.zeros_like(scales)).jacobian
     if is_full(slopes):
         return False
-    from atwood.linalg.groups import independent_by_groups
+    from atwood.numerics.groups import independent_by_groups
 
     rows = row_sizes(slopes, scales)
     units = np.maximum(rows, balance.errors.of_jacobian(t, q, scales, 0.0) / ROUGHNESS)

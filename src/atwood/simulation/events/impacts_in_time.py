@@ -15,9 +15,9 @@ from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.late import replace
-from atwood.linalg.matrices import scaled, to_array
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Constraint
+from atwood.numerics.matrices import scaled, to_array
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble
 from atwood.simulation.dynamics.reactions import maximal_state

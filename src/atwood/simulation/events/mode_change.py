@@ -13,9 +13,10 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.forms.quantities import observer
-from atwood.linalg.matrices import is_full, scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
+from atwood.numerics.independence import least_norm
+from atwood.numerics.matrices import is_full, scaled, to_array
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.line_signs import actual_line_signs
@@ -23,7 +24,6 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     Reassemble,
     switch_coordinates,
 )
-from atwood.simulation.dynamics.rank import least_norm
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.events.modes import EventRecord
@@ -201,7 +201,7 @@ def _solve_impact(
     beside the rest is then small in truth, and not in its unit.
     """
     if not is_full(now.mass):
-        from atwood.linalg.sparse import solve_bordered
+        from atwood.numerics.sparse import solve_bordered
 
         solved = solve_bordered(now.mass, now.jacobian, -(now.mass @ u), now.explicit_rate)
         if solved is not None:

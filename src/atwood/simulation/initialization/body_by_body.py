@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.late import dataclass
-from atwood.linalg.matrices import to_array
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, orientations
 from atwood.simulation.initialization.system import System
 

@@ -11,9 +11,9 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linalg.matrices import scaled
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.simulation.dynamics.rank import independent_rows
+from atwood.numerics.independence import independent_rows
+from atwood.numerics.matrices import scaled
 from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors
 from atwood.simulation.initialization.loop_closure import Nearest, closest, closest_of_all, units_of_rows
 from atwood.simulation.initialization.system import System

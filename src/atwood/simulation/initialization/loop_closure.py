@@ -14,8 +14,8 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linalg.matrices import LARGEST_FULL, scaled, to_array
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.numerics.matrices import LARGEST_FULL, scaled, to_array
 from atwood.simulation.dynamics.scales import is_length
 from atwood.simulation.initialization.system import System
 

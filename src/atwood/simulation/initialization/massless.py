@@ -8,9 +8,9 @@ from atwood.arrays import FloatArray
 from atwood.errors import StartError
 from atwood.expr import Expression, depends_on, is_zero
 from atwood.forms.assembly import Assembly
-from atwood.linalg.matrices import Matrix, is_full, scaled, to_array
+from atwood.numerics.independence import open_directions
+from atwood.numerics.matrices import Matrix, is_full, scaled, to_array
 from atwood.simulation.dynamics.balance import balance_of
-from atwood.simulation.dynamics.rank import open_directions
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_names
 
@@ -49,7 +49,7 @@ def check_massless_directions(
         return
     sizes = _sizes_of_inertia(mass, sizes)
     if not is_full(mass):
-        from atwood.linalg.sparse import massless_directions
+        from atwood.numerics.sparse import massless_directions
 
         moving = massless_directions(mass, jacobian, sizes)
         if moving is not None:

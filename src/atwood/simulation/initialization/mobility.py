@@ -14,12 +14,12 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.quantities import known_program
 from atwood.late import dataclass
-from atwood.linalg.matrices import LARGEST_FULL, scaled, to_array
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.model.declare.component import Component
 from atwood.model.declare.law import Kind
+from atwood.numerics.independence import independent_rows
+from atwood.numerics.matrices import LARGEST_FULL, scaled, to_array
 from atwood.simulation.dynamics.balance import balance_of
-from atwood.simulation.dynamics.rank import independent_rows
 from atwood.simulation.dynamics.scales import is_length, motion_scales, scene_length
 from atwood.simulation.initialization.start import Start, maximal_state
 from atwood.tolerances import tolerances

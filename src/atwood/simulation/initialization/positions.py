@@ -8,16 +8,16 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.linalg.matrices import Matrix
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.local.states import declared_starts
+from atwood.numerics.independence import row_scales
+from atwood.numerics.matrices import Matrix
 from atwood.simulation.dynamics.kinematic_map import (
     KinematicMap,
     best_rough_orientation,
     kinematic_map_of,
     reference_coordinates,
 )
-from atwood.simulation.dynamics.rank import row_scales
 from atwood.simulation.initialization.assembly_branch import wrongly_turned
 from atwood.simulation.initialization.body_by_body import placed_in_turn
 from atwood.simulation.initialization.errors import Failed, explain_positions, far_from_guess, wrong_way_round

@@ -7,10 +7,10 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.linalg.matrices import scaled
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.numerics.independence import certain, least_norm, row_scales
+from atwood.numerics.matrices import scaled
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
-from atwood.simulation.dynamics.rank import certain, least_norm, row_scales
 from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.errors import contradicted, contradiction, freedom_at
 from atwood.simulation.initialization.system import System, counted

@@ -12,16 +12,16 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
 from atwood.late import dataclass
-from atwood.linalg.matrices import (
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.numerics.independence import certain, independent_rows, least_norm, open_directions, row_scales
+from atwood.numerics.matrices import (
     Matrix,
     from_entries,
     is_full,
     scaled,
     to_array,
 )
-from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
-from atwood.simulation.dynamics.rank import certain, independent_rows, least_norm, open_directions, row_scales
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.simulation.initialization.targets import Target
 from atwood.tolerances import tolerances
@@ -211,7 +211,7 @@ def counted(
     if len(kept) == matrix.shape[1]:
         return (), repeated
     if not is_full(matrix):
-        from atwood.linalg.sparse import free_columns
+        from atwood.numerics.sparse import free_columns
 
         rows = row_scales(matrix, np.ones(matrix.shape[1]), errors)
         found = free_columns(scaled(matrix, np.ones(matrix.shape[1]), rows))

@@ -10,7 +10,7 @@ from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.simulation.dynamics.rank import row_sizes
+from atwood.numerics.independence import row_sizes
 from atwood.simulation.initialization.system import System
 from atwood.simulation.initialization.targets import Target
 from atwood.tolerances import tolerances

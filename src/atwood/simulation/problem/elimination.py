@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.forms.program import FormProgram
-from atwood.linalg.body_order import elimination_stages
-from atwood.linalg.fixed_pivots import FixedPivots, fix_pivots
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.numerics.body_order import elimination_stages
+from atwood.numerics.fixed_pivots import FixedPivots, fix_pivots
 
 __all__ = ["pivots_of"]
 
@@ -30,7 +30,7 @@ def pivots_of(equations: Equations, program: FormProgram, samples: Sequence[Floa
     program
         Programs of the form.
     samples
-        Entries of matrices for which the pivots are to be good; see `atwood.linalg.fixed_pivots.fix_pivots`.
+        Entries of matrices for which the pivots are to be good; see `atwood.numerics.fixed_pivots.fix_pivots`.
     """
     first = program.coordinates + program.speeds
     rows = np.arange(program.size, dtype=np.intp)

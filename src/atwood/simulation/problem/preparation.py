@@ -11,7 +11,7 @@ from atwood.errors import AtwoodError, KernelEvaluationError, StartError, Unsupp
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.late import replace
-from atwood.linalg.matrices import to_array
+from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import balance_of, solve_balance
 from atwood.simulation.dynamics.determined_reactions import check_read_reactions
 from atwood.simulation.dynamics.floating import seen_from_afar

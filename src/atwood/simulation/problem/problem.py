@@ -20,7 +20,7 @@ from atwood.forms.program import FormProgram
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver
 from atwood.late import dataclass, replace
-from atwood.linalg.matrices import to_array
+from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of
 from atwood.simulation.dynamics.columns import columns_of
 from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates, review_partitioning
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks
     from atwood.expr import Program
     from atwood.forms.null_space import NullSpaceProgram
-    from atwood.linalg.fixed_pivots import FixedPivots
+    from atwood.numerics.fixed_pivots import FixedPivots
     from atwood.simulation.problem.native_null_space import CompiledNullSpace
 
 __all__ = ["Plan", "dependent_speeds_of", "kept_rows"]

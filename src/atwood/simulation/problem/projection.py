@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from atwood.forms.kept import Key
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
-from atwood.linalg.matrices import is_best_full
-from atwood.simulation.dynamics.rank import trusted_sizes
+from atwood.numerics.independence import trusted_sizes
+from atwood.numerics.matrices import is_best_full
 from atwood.simulation.problem.problem import Plan
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
-    from atwood.linalg.sparse_batch import Normal
+    from atwood.numerics.sparse_batch import Normal
 
 __all__ = [
     "ConstraintsAt",
@@ -220,7 +220,7 @@ def _normal(plan: Plan) -> Normal | None:
     plain = plan.balance.kinematic_map.is_plain and len(program.holonomic) == program.constraints
     if not plain or is_best_full((program.constraints, program.speeds), len(program.jacobian_rows), many=True):
         return None
-    from atwood.linalg.sparse_batch import Normal, Pattern
+    from atwood.numerics.sparse_batch import Normal, Pattern
 
     def make() -> Normal:
         pattern = Pattern(program.jacobian_rows, program.jacobian_columns, (program.constraints, program.speeds))

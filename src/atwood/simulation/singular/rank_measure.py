@@ -13,7 +13,7 @@ from numpy.polynomial import legendre
 
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
-from atwood.linalg.matrices import scaled, to_array
+from atwood.numerics.matrices import scaled, to_array
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import ConstraintsAt, constraints_at
 from atwood.simulation.singular.collocation import Arc

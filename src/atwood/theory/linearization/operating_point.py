@@ -14,10 +14,10 @@ from atwood.errors import ParameterError, StartError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.late import dataclass, replace
-from atwood.linalg.matrices import to_array
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.parameters import variation_names
+from atwood.numerics.matrices import to_array
 from atwood.pipeline import assemble, assemble_flat
 from atwood.result.result import Result
 from atwood.simulation.dynamics.balance import balance_of

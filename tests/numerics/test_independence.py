@@ -8,8 +8,7 @@ import pytest
 from atwood import StartError, simulate
 from atwood.codegen.rounding import ROUGHNESS, WAYS, RoughProgram, roughly
 from atwood.expr import Graph, InputGroup, OutputGroup, Program, cos, sin
-from atwood.linalg.sparse import csr_of
-from atwood.simulation.dynamics.rank import (
+from atwood.numerics.independence import (
     certain,
     independent_rows,
     least_norm,
@@ -18,6 +17,7 @@ from atwood.simulation.dynamics.rank import (
     review_rows,
     row_scales,
 )
+from atwood.numerics.sparse import csr_of
 from atwood_library.scenes import FourBar
 
 EPS = float(np.finfo(float).eps)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from atwood.linalg.groups import independent_by_groups
+from atwood.numerics.groups import independent_by_groups
 
 RNG = np.random.default_rng(8)
 

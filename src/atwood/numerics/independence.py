@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.clock import within_time
 from atwood.codegen.rounding import ROUGHNESS
-from atwood.linalg.matrices import Matrix, is_full, scaled, to_array
+from atwood.numerics.matrices import Matrix, is_full, scaled, to_array
 from atwood.tolerances import tolerances
 
 __all__ = [
@@ -62,7 +62,7 @@ def row_sizes(jacobian: Matrix, scales: FloatArray) -> FloatArray:
     """Return the largest entry of each row after its columns are scaled, shape (rows,)."""
     if is_full(jacobian):
         return np.asarray(np.abs(jacobian * scales).max(axis=1, initial=0.0))
-    from atwood.linalg.sparse import csr_row_sizes
+    from atwood.numerics.sparse import csr_row_sizes
 
     return csr_row_sizes(jacobian, scales)
 
@@ -211,7 +211,7 @@ def _made_of(kept: Matrix, others: Matrix) -> FloatArray:
     """Return how often each kept row is in others, shape (others, kept)."""
     if is_full(kept):
         return np.asarray(np.linalg.lstsq(kept.T, others.T, rcond=None)[0].T)
-    from atwood.linalg.sparse import csr_made_of
+    from atwood.numerics.sparse import csr_made_of
 
     return csr_made_of(kept, others)
 
@@ -249,7 +249,7 @@ def least_size(jacobian: FloatArray, kept: NDArray[np.intp], multipliers: FloatA
 
 def _is_clear(matrix: Matrix, errors: FloatArray) -> bool:
     """Return whether it is certain, for a large matrix, that no row depends on others."""
-    from atwood.linalg.sparse import rows_are_independent
+    from atwood.numerics.sparse import rows_are_independent
 
     sizes = row_sizes(matrix, np.ones(matrix.shape[1]))
     return bool(np.all(sizes > errors / _LOOK)) and rows_are_independent(matrix, tolerances.CLEAR)
@@ -298,7 +298,7 @@ def least_norm(matrix: Matrix, right: FloatArray, unit: float = 0.0, miss: float
             return np.zeros(matrix.shape[1])
         least = max(tolerances.RANK, miss if miss < _UNCLEAR else 0.0)
         return np.asarray(np.linalg.lstsq(matrix, right, rcond=least)[0], dtype=float)
-    from atwood.linalg.sparse import csr_least_norm
+    from atwood.numerics.sparse import csr_least_norm
 
     if unit and np.abs(matrix.data).max(initial=0.0) < tolerances.RANK * unit:
         return np.zeros(matrix.shape[1])

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray, IndexArray
 from atwood.late import dataclass
-from atwood.linalg.body_order import Stage
-from atwood.linalg.remainders import Remainders, Residues, Samples
+from atwood.numerics.body_order import Stage
+from atwood.numerics.remainders import Remainders, Residues, Samples
 
 __all__ = ["FixedPivots", "fix_pivots"]
 

@@ -76,7 +76,7 @@ def from_entries(rows: Any, columns: Any, entries: Any, shape: tuple[int, int], 
         made = np.zeros(shape)
         made[rows, columns] = entries
         return made
-    from atwood.linalg.sparse import csr_of
+    from atwood.numerics.sparse import csr_of
 
     return csr_of(rows, columns, entries, shape)
 
@@ -92,6 +92,6 @@ def scaled(matrix: Matrix, columns: FloatArray, rows: FloatArray | None = None) 
     if is_full(matrix):
         wide = matrix * columns
         return wide if rows is None else wide / rows[:, None]
-    from atwood.linalg.sparse import csr_scaled
+    from atwood.numerics.sparse import csr_scaled
 
     return csr_scaled(matrix, columns, rows)

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from atwood import Scene, assemble
-from atwood.linalg.body_order import elimination_stages
-from atwood.linalg.fixed_pivots import FixedPivots, fix_pivots
+from atwood.numerics.body_order import elimination_stages
+from atwood.numerics.fixed_pivots import FixedPivots, fix_pivots
 from atwood.simulation.problem.elimination import pivots_of
 from atwood_library import Ground, PointMass, Rod, scenes
 
