@@ -15,6 +15,7 @@ from atwood.expr import Scalar
 from atwood.model.declare.connectors import Motion
 from atwood.model.declare.law import Law, scalars
 from atwood.model.values.rotation import FREE
+from atwood.numerics.rank import rank
 
 __all__ = ["Unknown", "attempt", "wrong_joint", "wrong_rates"]
 
@@ -249,10 +250,7 @@ def _tangents(trial: Trial, law: Law, poses: Mapping[str, Pose]) -> list[np.ndar
 def _rank(rows: Sequence[np.ndarray]) -> int:
     """Return how many rows are independent, each by its own size."""
     sized = [row / np.abs(row).max() for row in rows if row.size and np.abs(row).max() > 0.0]
-    if not sized:
-        return 0
-    values = np.linalg.svd(np.array(sized), compute_uv=False)
-    return int(np.sum(values > 1e-5 * values[0]))
+    return rank(np.array(sized), np.full(len(sized), TOLERANCE)) if sized else 0
 
 
 def _wrong_coordinates(

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.numerics.rank import is_clear
+
 __all__ = ["independent_by_groups"]
 
 
-def independent_by_groups(matrix: Any, groups: NDArray[np.intp], least: float) -> bool:
+def independent_by_groups(matrix: Any, groups: NDArray[np.intp]) -> bool:
     """Return whether groups of rows can be taken away, one after another, that are independent of all that is left.
 
     Such a group has columns in which no other row has entries, and its rows are independent in these. Where loops are
@@ -22,9 +24,7 @@ def independent_by_groups(matrix: Any, groups: NDArray[np.intp], least: float) -
     matrix
         A `scipy.sparse.csr_array`.
     groups
-        The number of the group of each row.
-    least
-        What the singular values of a group in its own columns must exceed.
+        The number of the group of each row; it is independent in its own columns if it `is_clear` there.
     """
     rows_of: dict[int, list[int]] = defaultdict(list)
     for row, group in enumerate(groups.tolist()):
@@ -51,7 +51,7 @@ def independent_by_groups(matrix: Any, groups: NDArray[np.intp], least: float) -
             for k in range(starts[row], starts[row + 1]):
                 if indices[k] in alone:
                     block[i, alone[indices[k]]] = entries[k]
-        if not np.linalg.svd(block, compute_uv=False)[-1] > least:
+        if not is_clear(block):
             continue
         gone.add(group)
         for column in columns_of[group]:

@@ -16,17 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.clock import within_time
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.numerics.matrices import Matrix, is_full, scaled, to_array
+from atwood.numerics.solutions import least_squares
 from atwood.tolerances import tolerances
 
 __all__ = [
     "certain",
     "independent_rows",
-    "least_norm",
-    "least_size",
-    "open_directions",
     "review_rows",
     "row_scales",
     "row_sizes",
@@ -50,12 +47,6 @@ that rounding has no say in it."""
 
 _LOOK = 1e-4
 """While more than this share of the largest row is left, errors of the chosen rows cannot matter."""
-
-_FLAT = 1e-3
-"""Columns are scaled alike down to this share of the largest: one in which only rounding is stays as small as it is."""
-
-_UNCLEAR = 1e-4
-"""Where a place misses what is to be met by more, all directions help; what rounding makes of them is little then."""
 
 
 def row_sizes(jacobian: Matrix, scales: FloatArray) -> FloatArray:
@@ -141,7 +132,7 @@ def _chosen(rows: FloatArray, errors: FloatArray, most: int, first: NDArray[np.b
         bounds = tolerances.CERTAIN * errors
         largest = float(sizes.max(where=is_open, initial=0.0))
         if chosen and largest < _LOOK:
-            weights = np.linalg.lstsq(rows[chosen].T, rows.T, rcond=None)[0]
+            weights = least_squares(rows[chosen].T, rows.T)
             bounds = tolerances.CERTAIN * np.sqrt(errors**2 + errors[chosen] ** 2 @ weights**2)
         is_open &= sizes > bounds
         if not is_open.any():
@@ -210,41 +201,10 @@ def review_rows(
 def _made_of(kept: Matrix, others: Matrix) -> FloatArray:
     """Return how often each kept row is in others, shape (others, kept)."""
     if is_full(kept):
-        return np.asarray(np.linalg.lstsq(kept.T, others.T, rcond=None)[0].T)
+        return least_squares(kept.T, others.T).T
     from atwood.numerics.sparse import csr_made_of
 
     return csr_made_of(kept, others)
-
-
-def least_size(jacobian: FloatArray, kept: NDArray[np.intp], multipliers: FloatArray) -> FloatArray:
-    """Return the multipliers of all rows of least size that have the force of some of the independent ones.
-
-    What other rows are made of, ``G_r = W G_k``, gives all that exert no force: no small number has to be called zero.
-
-    Parameters
-    ----------
-    jacobian
-        The rows at some states, shape (states, rows, columns).
-    kept
-        Which rows are independent, all others following from them.
-    multipliers
-        Of the independent rows, shape (states, kept).
-    """
-    others = np.setdiff1d(np.arange(jacobian.shape[1]), kept)
-    found = np.zeros(jacobian.shape[:2])
-    if not len(kept):
-        return found
-    columns = np.max(np.abs(jacobian[:, kept]), axis=1)
-    columns = np.maximum(columns, _FLAT * np.max(columns, axis=1, keepdims=True))
-    even = jacobian / np.where(columns > 0.0, columns, 1.0)[:, None, :]
-    rows = np.max(np.abs(even[:, kept]), axis=2)[:, :, None]
-    weights = even[:, others] @ np.linalg.pinv(even[:, kept] / rows) / np.swapaxes(rows, 1, 2)
-    found[:, kept] = multipliers
-    without_force = np.zeros((*found.shape, len(others)))
-    without_force[:, kept], without_force[:, others] = -np.swapaxes(weights, 1, 2), np.eye(len(others))
-    basis = np.linalg.qr(without_force)[0]
-    left: FloatArray = found - (basis @ (np.swapaxes(basis, 1, 2) @ found[:, :, None]))[:, :, 0]
-    return left
 
 
 def _is_clear(matrix: Matrix, errors: FloatArray) -> bool:
@@ -253,53 +213,3 @@ def _is_clear(matrix: Matrix, errors: FloatArray) -> bool:
 
     sizes = row_sizes(matrix, np.ones(matrix.shape[1]))
     return bool(np.all(sizes > errors / _LOOK)) and rows_are_independent(matrix, tolerances.CLEAR)
-
-
-def open_directions(matrix: FloatArray, least: float = 0.0) -> FloatArray:
-    """Return orthonormal directions, one row each, along which independent rows do not change.
-
-    Parameters
-    ----------
-    matrix
-        The rows, of any size.
-    least
-        Where they nearly depend on each other: what counts as no change, relative to the size of each.
-    """
-    sizes = np.linalg.norm(matrix, axis=1, keepdims=True)
-    rows = matrix / np.where(sizes > 0.0, sizes, 1.0)
-    _, values, directions = within_time(lambda: np.linalg.svd(rows))
-    return np.asarray(directions[len(matrix) if least == 0.0 else int(np.sum(values > least)) :])
-
-
-def least_norm(matrix: Matrix, right: FloatArray, unit: float = 0.0, miss: float = 0.0) -> FloatArray:
-    """Return the shortest solution of a linear system, or the best where there is none.
-
-    Parameters
-    ----------
-    matrix, right
-        The system. Columns are scaled by the scene.
-    unit
-        Size of a row that is known, where rows are scaled (`row_scales`): if all of them are below `tolerances.RANK` of
-        it, as those of a loop that closes by itself wherever it is, they are rounding and nothing is to be followed.
-    miss
-        By how much a place misses what the system takes it to, on scales on which the rows of one law are alike.
-        Derivatives there are off by as much: directions of smaller singular values, along which one would have to go
-        farther than the scene is large, are rather ones along which nothing changes, and are not followed.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If there is none since a number is not finite; some machines' libraries would look for it for ever.
-    """
-    if is_full(matrix):
-        if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
-            raise np.linalg.LinAlgError("a linear system has entries that are not finite")
-        if unit and np.abs(matrix).max(initial=0.0) < tolerances.RANK * unit:
-            return np.zeros(matrix.shape[1])
-        least = max(tolerances.RANK, miss if miss < _UNCLEAR else 0.0)
-        return np.asarray(np.linalg.lstsq(matrix, right, rcond=least)[0], dtype=float)
-    from atwood.numerics.sparse import csr_least_norm
-
-    if unit and np.abs(matrix.data).max(initial=0.0) < tolerances.RANK * unit:
-        return np.zeros(matrix.shape[1])
-    return csr_least_norm(matrix, right)

@@ -15,6 +15,7 @@ from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
 from atwood.model.compose.composite import Model
 from atwood.numerics.independence import row_scales
 from atwood.numerics.matrices import scaled, to_array
+from atwood.numerics.rank import null_space
 from atwood.pipeline import SCENE, assemble_flat, assembly_of
 from atwood.reporting.offers import Offer, find_offers
 from atwood.reporting.parts import (
@@ -315,8 +316,8 @@ def _not_unique(assembly: Assembly, plan: Plan, start: Start) -> tuple[str, ...]
     q, u = own_state(assembly, start)
     constraint_jacobian = scaled(to_array(plan.balance.at(start.time, q, np.zeros_like(u)).jacobian), plan.sizes)
     rows = row_scales(constraint_jacobian, np.ones_like(u), plan.balance.errors.near(start.time, q, plan.sizes))
-    _, _, directions = np.linalg.svd((constraint_jacobian / rows[:, None]).T)
-    involved = np.max(np.abs(directions[plan.finding.rank :]), axis=0, initial=0.0) > tolerances.FREE
+    balancing = null_space((constraint_jacobian / rows[:, None]).T, rank=plan.finding.rank)
+    involved = np.max(np.abs(balancing), axis=1, initial=0.0) > tolerances.FREE
     constraints = assembly.maximal.constraints
     return tuple(
         dict.fromkeys(f"{one.key[0]}.{one.reaction}" for one, hit in zip(constraints, involved, strict=True) if hit)

@@ -16,6 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.mechanics.outputs.part_power import Flow, PartPowers, part_energy_program, part_powers
 from atwood.numerics.matrices import to_array
+from atwood.numerics.solutions import least_norm
 from atwood.result.part_connectors import Connectors, Ends
 from atwood.result.part_energy import PartEnergies, PartEnergy
 from atwood.result.work import integral_in_steps, integral_of_samples, nodes_in_steps, samples_in_steps
@@ -299,7 +300,7 @@ def _impulses(before: SegmentRecord, after: SegmentRecord, connectors: Connector
     balance = balance_of(assembly, "dae").at(float(t[0]), q[:, 0], u_now[:, 0])
     slope, weights = to_array(balance.jacobian), multiplier_sizes(assembly, "dae")
     matrix, momenta = sizes * slope.T * weights, sizes[:, 0] * (to_array(balance.mass) @ jump[:, 0])
-    impulses = (np.linalg.lstsq(matrix, momenta, rcond=1e-11)[0] if matrix.size else np.zeros(len(slope))) * weights
+    impulses = (least_norm(matrix, momenta) if matrix.size else np.zeros(len(slope))) * weights
     program = assembly.shared.get(
         _IMPULSES, lambda: part_powers(assembly.mechanism, assembly.maximal, assembly.parameters, of_impulses=True)
     )
@@ -335,7 +336,7 @@ def _undetermined(segment: SegmentRecord, connectors: Connectors) -> set[str]:
         q, u = maximal_state(assembly, t, segment.coordinates[:, place], segment.speeds[:, place])
         matrix = sizes * to_array(balance_of(assembly, "dae").at(float(t[0]), q[:, 0], u[:, 0]).jacobian).T * weights
         anything = random.standard_normal(len(weights))
-        free = anything - np.linalg.lstsq(matrix, matrix @ anything, rcond=1e-9)[0]
+        free = anything - least_norm(matrix, matrix @ anything)
         powers = [
             _rows(assembly, program.program, t, q, u, np.zeros_like(u), (weights * each)[:, None])
             for each in (np.zeros_like(anything), anything, free)

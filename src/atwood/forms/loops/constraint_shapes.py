@@ -14,6 +14,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.rounding import WAYS, RoughProgram
 from atwood.expr import Expression
 from atwood.forms.loops.branches import Place
+from atwood.numerics.solutions import least_squares
 
 __all__ = ["ConstraintShapes"]
 
@@ -104,7 +105,7 @@ class ConstraintShapes:
                 return True
             if not _is_combination(found, basis):
                 return False
-            _, p, q = np.linalg.lstsq(basis.T, found.T, rcond=None)[0]
+            _, p, q = least_squares(basis.T, found.T)
             axes.append(np.cross(p, q) / max(float(p @ p), np.finfo(float).tiny))
         return bool(np.max(np.abs(axes[0] - axes[1])) <= _LEFT)
 
@@ -119,6 +120,6 @@ def _is_combination(values: FloatArray, basis: FloatArray) -> bool:
     """Return whether rows are combinations of others; True where they have no value, which formulas may have."""
     if not np.all(np.isfinite(values)):
         return True
-    weights = np.linalg.lstsq(basis.T, values.T, rcond=None)[0]
+    weights = least_squares(basis.T, values.T)
     left = values - (basis.T @ weights).T
     return bool(np.max(np.abs(left)) <= _LEFT * np.max(np.abs(values)))

@@ -15,6 +15,8 @@ from atwood.expr import Expression, jacobian, jvp, substitute
 from atwood.mechanics.constraints.pfaffian import NEEDED, Places
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
+from atwood.numerics.rank import null_space
+from atwood.numerics.solutions import least_squares
 from atwood.tolerances import tolerances
 
 __all__ = ["integrable_together"]
@@ -92,15 +94,14 @@ def _vanishes(numbers: FloatArray, sizes: FloatArray, m: int, q: int) -> bool:
     of_fields = changes[:, m * fields :].reshape(fields, fields, q)  # [i, j]: X_i(X_j)
     brackets = of_fields - of_fields.transpose(1, 0, 2)
     # A bracket has no part along time, and is a sum of the other fields.
-    weights = np.linalg.lstsq(components[:-1].T, brackets.reshape(fields * fields, q).T, rcond=None)[0]
+    weights = least_squares(components[:-1].T, brackets.reshape(fields * fields, q).T)
     along = weights.T.reshape(fields, fields, fields - 1)
     left = of_forms.transpose(1, 0, 2)
     derivatives = left - left.transpose(0, 2, 1) - np.einsum("kl,ijl->kij", forms[:, :-1], along)
     forms, both = forms * sizes, np.outer(sizes, sizes)
     units = np.maximum(np.max(np.abs(forms), axis=1), 1e-300)
     left, derivatives = (one * both / units[:, None, None] for one in (left, derivatives))
-    _, strengths, directions = np.linalg.svd(forms / units[:, None])
-    free = directions[int(np.sum(strengths > tolerances.RANK)) :]
-    rest = np.einsum("ai,kij,bj->kab", free, derivatives, free)
+    free = null_space(forms / units[:, None])
+    rest = np.einsum("ia,kij,jb->kab", free, derivatives, free)
     largest = max(float(np.max(np.abs(left), initial=0.0)), 1.0)
     return bool(np.max(np.abs(rest), initial=0.0) <= tolerances.RANK * largest)

@@ -25,6 +25,8 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent
 from atwood.mechanics.kinematics.motion import Movement
 from atwood.model.local.laws import LocalConstraint
+from atwood.numerics.rank import null_space
+from atwood.numerics.solutions import least_squares
 from atwood.tolerances import tolerances
 
 __all__ = ["NEEDED", "Form", "Places", "constant_pivot", "is_idle", "linear_integrals", "pfaffian_forms"]
@@ -320,14 +322,12 @@ def _combinations(
         return ()
     spans = np.stack(at_places, axis=1)
     spans = spans / np.max(np.abs(spans), axis=2, keepdims=True, initial=1e-300)
-    ranks = [int(np.linalg.matrix_rank(span, tol=tolerances.RANK)) for span in spans]
-    kernels = [np.linalg.svd(span)[2][rank:] for span, rank in zip(spans, ranks, strict=True)]
+    kernels = [null_space(span).T for span in spans]
     alone = [np.eye(len(sizes))[i] for i in range(len(sizes) - 1) if i not in set(own)]
-    _, strengths, directions = np.linalg.svd(np.vstack([*kernels, *(row[None] for row in alone)]))
-    common = directions[int(np.sum(strengths > tolerances.RANK)) :]
+    common = null_space(np.vstack([*kernels, *(row[None] for row in alone)])).T
     found: list[tuple[tuple[int, ...], tuple[tuple[int, float], ...]]] = []
     for row in _reduced(common):
-        weights = np.linalg.lstsq(spans[0].T, row, rcond=None)[0]
+        weights = least_squares(spans[0].T, row)
         members = tuple(int(i) for i in np.argsort(np.abs(weights), kind="stable") if abs(weights[i]) > tolerances.RANK)
         if not members or any(set(members) & set(others) for others, _ in found):
             continue  # the next round finds it

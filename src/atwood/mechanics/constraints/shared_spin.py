@@ -19,11 +19,15 @@ from atwood.mechanics.constraints.spin_places import Place, places_of
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.model.local.laws import LocalPart
 from atwood.model.values.rotation import Rotation
+from atwood.numerics.rank import null_space
 
 __all__ = ["Axis", "spinning_together"]
 
 _NONE = 1e-9
 """Relative to the terms that cancel: a change that is rounding."""
+
+_TYPED = 1e-6
+"""Directions are typed with as few digits: what they hold by less they do not hold."""
 
 _PLACES = 2
 """At so many places at random laws are asked; a law that changes with a spin does so nearly everywhere."""
@@ -95,7 +99,7 @@ def _across_hinges(mechanism: Mechanism, axes: Mapping[int, Axis], known: Mappin
             for node in open_ends:
                 one = axes[body_of[node]]
                 across = np.cross(one.turns[node] @ hinge, one.direction)
-                if np.linalg.norm(across) > 1e-6 * np.linalg.norm(hinge):
+                if np.linalg.norm(across) > _TYPED * np.linalg.norm(hinge):
                     found.add(body_of[node])
     return found
 
@@ -107,12 +111,7 @@ def _each(bodies: Sequence[int], touched: set[int]) -> FloatArray:
 
 def _left(ways: FloatArray, rows: FloatArray) -> FloatArray:
     """Return a basis of the ways in which rows are zero."""
-    seen = rows @ ways
-    if not seen.size:
-        return ways
-    _, values, right = np.linalg.svd(seen)
-    rank = int(np.sum(values > 1e-6 * max(1.0, float(np.abs(rows).max()))))
-    return np.asarray(ways @ right[rank:].T)
+    return np.asarray(ways @ null_space(rows @ ways, _TYPED * float(np.abs(rows).max(initial=1.0))))
 
 
 def _held(bodies: Sequence[int], ways: FloatArray) -> list[int]:

@@ -14,7 +14,7 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.balance_program import BalanceProgram
 from atwood.late import dataclass
-from atwood.numerics.independence import least_norm, row_scales
+from atwood.numerics.independence import row_scales
 from atwood.numerics.matrices import (
     Matrix,
     from_entries,
@@ -22,6 +22,7 @@ from atwood.numerics.matrices import (
     is_full,
     scaled,
 )
+from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.columns import mass_at
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors

@@ -10,6 +10,7 @@ from atwood.expr import Expression, depends_on, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.numerics.matrices import to_array
+from atwood.numerics.rank import decompose
 from atwood.simulation.dynamics.balance import Balance, balance_of
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.redundancy import find_rank
@@ -84,8 +85,8 @@ class _OpenWays:
 def _balancing(balance: Balance, t: float, q: FloatArray, scales: FloatArray, rank: int) -> _OpenWays:
     now = balance.constraints_at(t, q, np.zeros_like(scales))
     rows = balance.row_scales(now, t, q, scales)
-    left, _, right = np.linalg.svd(to_array(now.jacobian) * scales / rows[:, None])
-    return _OpenWays(left[:, rank:], 1.0 / rows, scales[:, None] * right[rank:].T)
+    found = decompose(to_array(now.jacobian) * scales / rows[:, None], rank=rank)
+    return _OpenWays(found.left_null_space, 1.0 / rows, scales[:, None] * found.null_space)
 
 
 def _depend_on(assembly: Assembly, known: dict[Expression, float], scales: FloatArray, ways: _OpenWays) -> bool:

@@ -18,6 +18,7 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly, Coordinates
 from atwood.forms.balance_program import RatesProgram
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.numerics.solutions import least_squares
 
 __all__ = ["KinematicMap", "best_rough_orientation", "kinematic_map_of", "orientations", "reference_coordinates"]
 
@@ -100,10 +101,7 @@ class KinematicMap:
                 kind == "quaternion" and q[orientation] @ other[orientation] < 0.0
             ):  # either sign is the same orientation
                 target[orientation] *= -1.0
-        matrix = self.matrix(t, q)
-        if not (np.isfinite(matrix).all() and np.isfinite(target - q).all()):
-            raise np.linalg.LinAlgError("two places cannot be compared: their coordinates are not finite")
-        return np.asarray(np.linalg.lstsq(matrix, target - q, rcond=None)[0], dtype=float)
+        return least_squares(self.matrix(t, q), target - q)
 
     def normalized(self, q: FloatArray) -> FloatArray:
         """Return coordinates with orientations of size one: one state, or many of shape (coordinates, samples)."""

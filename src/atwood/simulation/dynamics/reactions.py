@@ -21,8 +21,8 @@ from atwood.forms.balance_program import BalanceProgram
 from atwood.forms.kept import Key
 from atwood.forms.places import internal_reactions_of, to_maximal
 from atwood.late import dataclass
-from atwood.numerics.independence import least_size
 from atwood.numerics.matrices import is_best_full
+from atwood.numerics.solutions import least_size
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.columns import masses_at
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of

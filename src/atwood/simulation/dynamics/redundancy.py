@@ -13,8 +13,9 @@ from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import KernelEvaluationError
 from atwood.late import dataclass, replace
-from atwood.numerics.independence import independent_rows, open_directions, review_rows, row_sizes
+from atwood.numerics.independence import independent_rows, review_rows, row_sizes
 from atwood.numerics.matrices import is_full, scaled, to_array
+from atwood.numerics.rank import is_clear, lost_rank, open_directions, singular_values
 from atwood.simulation.dynamics.balance import Balance
 from atwood.tolerances import tolerances
 
@@ -73,10 +74,6 @@ class _Place:
     kept: list[int]
     miss: float
 
-    def smallest(self, kept: list[int], units: FloatArray) -> FloatArray:
-        """Return the singular values of some rows in given units."""
-        return np.asarray(np.linalg.svd(self.jacobian[kept] / units[kept, None], compute_uv=False))
-
 
 def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> RankFinding:
     """Find the rank of the constraints.
@@ -99,7 +96,7 @@ def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> 
     # A row may be small because it vanishes at a singular position: it is measured by the terms that cancel in it.
     units = np.maximum(row_sizes(here.jacobian, np.ones(len(scales))), here.errors / ROUGHNESS)
     everything = list(range(count))
-    if len(here.kept) == count and here.smallest(everything, units)[-1] > tolerances.CLEAR:
+    if len(here.kept) == count and is_clear(here.jacobian / units[:, None]):
         return RankFinding(tuple(everything), (), count, count)
     nearby, is_movable = _nearby(balance, t, q, scales, here)
     if is_movable and not nearby:
@@ -125,9 +122,7 @@ def _hangs_together(balance: Balance, t: float, q: FloatArray, scales: FloatArra
 
     rows = row_sizes(slopes, scales)
     units = np.maximum(rows, balance.errors.of_jacobian(t, q, scales, 0.0) / ROUGHNESS)
-    return bool(np.all(rows > 0.0)) and independent_by_groups(
-        scaled(slopes, scales, units), balance.errors.laws, tolerances.CLEAR
-    )
+    return bool(np.all(rows > 0.0)) and independent_by_groups(scaled(slopes, scales, units), balance.errors.laws)
 
 
 def review_kept(finding: RankFinding, balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> RankFinding:
@@ -231,8 +226,8 @@ def _lost(here: _Place, nearby: list[_Place], kept: list[int]) -> tuple[int, ...
         return ()
     ones = np.ones(here.jacobian.shape[1])
     units = np.max([row_sizes(place.jacobian, ones) for place in (here, *nearby)], axis=0)
-    away = max(float(place.smallest(kept, units)[-1]) for place in nearby)
-    missing = int(np.sum(here.smallest(kept, units) < tolerances.SINGULAR * away))
+    first, *others = (singular_values(place.jacobian[kept] / units[kept, None]) for place in (here, *nearby))
+    missing = lost_rank(first, max(float(values[-1]) for values in others))
     if not missing:
         return ()
     left = independent_rows(here.jacobian[kept], here.errors[kept], len(kept) - missing)

@@ -18,6 +18,7 @@ from atwood.late import replace
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.numerics.matrices import scaled, to_array
+from atwood.numerics.solutions import least_squares
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble
 from atwood.simulation.dynamics.reactions import maximal_state
@@ -172,7 +173,7 @@ def _rebalanced(balance: Balance, t: float, q: FloatArray, now: BalanceValues) -
     still = np.zeros(len(free))
     for _ in range(_ITERATIONS):
         step = np.zeros_like(still)
-        step[free] = np.linalg.lstsq(to_array(now.jacobian)[:, free], -now.value, rcond=None)[0]
+        step[free] = least_squares(to_array(now.jacobian)[:, free], -now.value)
         q = balance.kinematic_map.moved(t, q, step)
         if np.max(np.abs(step)) <= _ROUNDED * np.max(np.abs(q)):
             break

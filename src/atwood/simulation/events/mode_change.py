@@ -15,8 +15,8 @@ from atwood.forms.places import to_maximal
 from atwood.forms.quantities import observer
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
-from atwood.numerics.independence import least_norm
 from atwood.numerics.matrices import is_full, scaled, to_array
+from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.line_signs import actual_line_signs
@@ -192,6 +192,10 @@ def _reaction_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
     return assembly.shared.get(_REACTION_EVENTS, make)
 
 
+_LIGHT = 1e-12
+"""A body that is lighter than the heaviest one by more is rounding of its mass matrix."""
+
+
 def _solve_impact(
     now: BalanceValues, u: FloatArray, sizes: FloatArray, rows: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -210,7 +214,8 @@ def _solve_impact(
     mass, slope = sizes[:, None] * to_array(now.mass) * sizes, to_array(scaled(now.jacobian, sizes, rows))
     mass = mass / (np.max(np.abs(mass), initial=0.0) or 1.0)
     matrix = np.block([[mass, -slope.T], [slope, np.zeros((m, m))]])
-    found = np.linalg.lstsq(matrix, np.concatenate([mass @ (u / sizes), -now.explicit_rate / rows]), rcond=1e-12)[0]
+    right = np.concatenate([mass @ (u / sizes), -now.explicit_rate / rows])
+    found = least_norm(matrix, right, errors=_LIGHT)
     return found[:n] * sizes, found[n:]
 
 

@@ -17,6 +17,7 @@ from atwood.errors import KernelEvaluationError
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.matrices import to_array
+from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, orientations
 from atwood.simulation.initialization.system import System
 
@@ -128,7 +129,7 @@ def _followed(
             break
         residual, matrix = task.at(q)
         step = np.zeros(task.system.speeds)
-        step[moving] = np.linalg.lstsq(matrix[np.ix_(rows, moving)], residual[rows], rcond=1e-9)[0]
+        step[moving] = least_norm(matrix[np.ix_(rows, moving)], residual[rows])
         for _ in range(5):
             trial = task.kinematic_map.moved(task.time, q, -step)
             left = task.misfit(trial, rows)

@@ -15,6 +15,7 @@ from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.model.local.laws import LocalConnector, LocalConstraint, LocalPart
+from atwood.numerics.solutions import least_norm
 from atwood.tolerances import tolerances
 
 __all__ = ["ClosureError", "find_closure_errors"]
@@ -151,7 +152,7 @@ def _least(values: Sequence[Expression], local: LocalPart, known: Numbers, moved
                 break
             derivative = np.array([(at(by + h * e) - at(by - h * e)) / (2.0 * h) for e in np.eye(n)]).T
             # Of all movements that would do to first order the least one: not only the least change of this one.
-            by = np.linalg.lstsq(derivative, derivative @ by - now, rcond=tolerances.RANK)[0]
+            by = least_norm(derivative, derivative @ by - now)
         if float(np.linalg.norm(at(by))) <= tolerances.CLOSED * max(own, unit) and np.all(np.isfinite(by)):
             return float(np.linalg.norm(by))
     return own

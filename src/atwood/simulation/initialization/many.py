@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.numerics.rank import rank
+from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.initialization.system import Conditions
 from atwood.tolerances import tolerances
@@ -112,8 +114,8 @@ def _least_steps(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray, NDA
         else:
             found = np.asarray(across @ np.linalg.solve(matrix @ across, right[:, :, None]), dtype=np.float64)
     except np.linalg.LinAlgError:  # rows of one run depend on each other
-        found = np.asarray(np.linalg.pinv(matrix, rcond=tolerances.RANK) @ right[:, :, None], dtype=np.float64)
-        known[:] = np.linalg.matrix_rank(matrix) == matrix.shape[1]
+        found = least_norm(matrix, right[:, :, None])
+        known[:] = rank(matrix) == matrix.shape[1]
     return found[:, :, 0], known
 
 
@@ -171,7 +173,7 @@ def meet_speeds(
         rows = np.max(np.abs(matrix[moving] * sizes[moving, None, :]), axis=2)
         rows[rows == 0.0] = 1.0
         scaled = matrix[moving] * sizes[moving, None, :] / rows[:, :, None]
-        step = np.linalg.pinv(scaled, rcond=tolerances.RANK) @ (residual[moving] / rows)[:, :, None]
+        step = least_norm(scaled, (residual[moving] / rows)[:, :, None])
         u[moving] -= sizes[moving] * step[:, :, 0]
         residual = look()
     own = np.einsum("rij,rj->ri", np.abs(matrix), np.abs(u)) + np.abs(wanted).T

@@ -8,8 +8,8 @@ from atwood.arrays import FloatArray
 from atwood.errors import StartError
 from atwood.expr import Expression, depends_on, is_zero
 from atwood.forms.assembly import Assembly
-from atwood.numerics.independence import open_directions
 from atwood.numerics.matrices import Matrix, is_full, scaled, to_array
+from atwood.numerics.rank import open_directions
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_names

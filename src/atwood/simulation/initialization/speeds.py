@@ -8,8 +8,9 @@ from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.numerics.independence import certain, least_norm, row_scales
+from atwood.numerics.independence import certain, row_scales
 from atwood.numerics.matrices import scaled
+from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.errors import contradicted, contradiction, freedom_at

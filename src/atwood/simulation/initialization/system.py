@@ -13,7 +13,7 @@ from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.numerics.independence import certain, independent_rows, least_norm, open_directions, row_scales
+from atwood.numerics.independence import certain, independent_rows, row_scales
 from atwood.numerics.matrices import (
     Matrix,
     from_entries,
@@ -21,6 +21,8 @@ from atwood.numerics.matrices import (
     scaled,
     to_array,
 )
+from atwood.numerics.rank import open_directions
+from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.simulation.initialization.targets import Target

@@ -14,6 +14,7 @@ from numpy.polynomial import legendre
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.numerics.matrices import scaled, to_array
+from atwood.numerics.rank import decompose, lost_rank, rank, singular_values
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import ConstraintsAt, constraints_at
 from atwood.simulation.singular.collocation import Arc
@@ -91,7 +92,7 @@ class RankMeasure:
                 return np.ones(count)  # what constraints there are follow from what is eliminated
             if not np.all(np.isfinite(slopes)):
                 return np.full(count, np.nan)
-            return np.asarray(np.linalg.svd(slopes, compute_uv=False)[:, -1])
+            return np.asarray(singular_values(slopes)[:, -1])
         right = np.sin(_GOLDEN * np.arange(1.0, now.value.shape[1] + 1.0)) * np.ones((count, 1))
         with np.errstate(all="ignore"):
             step = now.step(right / share)
@@ -225,15 +226,16 @@ def find_loss(measure: RankMeasure, arc: Arc, t: float, away: float) -> Loss | N
     away
         The measure a little away from it.
     """
-    finding, least = measure.plan.finding, tolerances.SINGULAR * away
+    finding = measure.plan.finding
     q = measure.plan.balance.kinematic_map.normalized(arc.at(np.array([t]))[0][:, 0])
     constraint_jacobian, misses = measure.jacobian_at(t, q)
     kept = list(finding.kept)
-    if not np.linalg.svd(constraint_jacobian[kept], compute_uv=False)[-1] < least:
+    if not lost_rank(singular_values(constraint_jacobian[kept]), away):
         return None
     if not np.max(misses, initial=0.0) < tolerances.NEARLY_FITS:
         return None
-    lost = finding.rank - int(np.sum(np.linalg.svd(constraint_jacobian, compute_uv=False) > least))
+    least = tolerances.SINGULAR * away
+    lost = finding.rank - rank(constraint_jacobian, least)
     if lost <= 0:
         return Loss(0, ())
     left = set(_independent(constraint_jacobian, least))
@@ -244,8 +246,7 @@ def nearly_lost(measure: RankMeasure, t: float, q: FloatArray) -> int:
     """Return the number of the constraint that most nearly follows from the others at a place."""
     constraint_jacobian, _ = measure.jacobian_at(t, measure.plan.balance.kinematic_map.normalized(q))
     kept = list(measure.plan.finding.kept)
-    left = np.linalg.svd(constraint_jacobian[kept])[0]
-    return kept[int(np.argmax(np.abs(left[:, -1])))]
+    return kept[int(np.argmax(np.abs(decompose(constraint_jacobian[kept]).left[:, -1])))]
 
 
 def _independent(constraint_jacobian: FloatArray, least: float) -> list[int]:

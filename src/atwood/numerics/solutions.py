@@ -1,0 +1,113 @@
+"""Solutions of linear systems that need not be square: the shortest, and the best."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import ComplexArray, FloatArray
+from atwood.numerics.matrices import Matrix, is_full
+from atwood.tolerances import tolerances
+
+__all__ = ["least_norm", "least_size", "least_squares"]
+
+_Numbers = TypeVar("_Numbers", FloatArray, ComplexArray)
+
+_UNCLEAR = 1e-4
+"""Where a place misses what is to be met by more, all directions help; what rounding makes of them is little then."""
+
+_FLAT = 1e-3
+"""Columns are scaled alike down to this share of the largest: one in which only rounding is stays as small as it is."""
+
+
+def least_norm(
+    matrix: Matrix, right: FloatArray, unit: float = 0.0, miss: float = 0.0, errors: float | None = None
+) -> FloatArray:
+    """Return the shortest solution of a linear system, or the best where there is none.
+
+    Directions whose singular values are errors of the matrix are not followed (G. Golub and C. Van Loan, *Matrix
+    Computations*, section 5.5.3).
+
+    Parameters
+    ----------
+    matrix, right
+        The system, its columns in units of like size; or of each of a stack, the right-hand sides as columns.
+    unit
+        Size of a row that is known, where rows are scaled (`row_scales`): if all of them are below `tolerances.RANK` of
+        it, as those of a loop that closes by itself wherever it is, they are rounding and nothing is to be followed.
+    miss
+        By how much a place misses what the system takes it to, on scales on which the rows of one law are alike.
+        Derivatives there are off by as much: directions of smaller singular values, along which one would have to go
+        farther than the scene is large, are rather ones along which nothing changes, and are not followed.
+    errors
+        How far the matrix may be off, relative to its largest singular value; `tolerances.RANK` unless given.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If there is none since a number is not finite; some machines' libraries would look for it for ever.
+    """
+    least = tolerances.RANK if errors is None else errors
+    if not is_full(matrix):
+        from atwood.numerics.sparse import csr_least_norm
+
+        is_nothing = unit and np.abs(matrix.data).max(initial=0.0) < least * unit
+        return np.zeros(matrix.shape[1]) if is_nothing else csr_least_norm(matrix, right)
+    if matrix.ndim > 2:
+        return np.asarray(np.linalg.pinv(matrix, rcond=least) @ right, dtype=float)
+    _check_finite(matrix, right)
+    if unit and np.abs(matrix).max(initial=0.0) < least * unit:
+        return np.zeros(matrix.shape[1])
+    least = max(least, miss if miss < _UNCLEAR else 0.0)
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=least)[0], dtype=float)
+
+
+def least_squares(matrix: _Numbers, right: _Numbers) -> _Numbers:
+    """Return what solves a linear system best, where columns are independent by construction and no rank is asked.
+
+    Parameters
+    ----------
+    matrix, right
+        The system; of several right-hand sides as columns, each has its own solution.
+    """
+    _check_finite(matrix, right)
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0])
+
+
+def _check_finite(*arrays: _Numbers) -> None:
+    """Refuse what some machines' libraries would work on for ever."""
+    if not all(np.isfinite(one).all() for one in arrays):
+        raise np.linalg.LinAlgError("a linear system has entries that are not finite")
+
+
+def least_size(jacobian: FloatArray, kept: NDArray[np.intp], multipliers: FloatArray) -> FloatArray:
+    """Return the multipliers of all rows of least size that have the force of some of the independent ones.
+
+    What other rows are made of, ``G_r = W G_k``, gives all that exert no force: no small number has to be called zero.
+
+    Parameters
+    ----------
+    jacobian
+        The rows at some states, shape (states, rows, columns).
+    kept
+        Which rows are independent, all others following from them.
+    multipliers
+        Of the independent rows, shape (states, kept).
+    """
+    others = np.setdiff1d(np.arange(jacobian.shape[1]), kept)
+    found = np.zeros(jacobian.shape[:2])
+    if not len(kept):
+        return found
+    columns = np.max(np.abs(jacobian[:, kept]), axis=1)
+    columns = np.maximum(columns, _FLAT * np.max(columns, axis=1, keepdims=True))
+    even = jacobian / np.where(columns > 0.0, columns, 1.0)[:, None, :]
+    rows = np.max(np.abs(even[:, kept]), axis=2)[:, :, None]
+    weights = even[:, others] @ np.linalg.pinv(even[:, kept] / rows) / np.swapaxes(rows, 1, 2)
+    found[:, kept] = multipliers
+    without_force = np.zeros((*found.shape, len(others)))
+    without_force[:, kept], without_force[:, others] = -np.swapaxes(weights, 1, 2), np.eye(len(others))
+    basis = np.linalg.qr(without_force)[0]
+    left: FloatArray = found - (basis @ (np.swapaxes(basis, 1, 2) @ found[:, :, None]))[:, :, 0]
+    return left
